@@ -1,0 +1,1 @@
+"""springcheck: simulation engines judged to rounding by a mass on a spring."""

@@ -1,0 +1,40 @@
+"""OpenMM: particles tied by HarmonicBondForce, moved by its own integrators."""
+
+from __future__ import annotations
+
+from springcheck.engines import Engine
+from springcheck.model import Method
+
+_TERMS = frozenset({"wall-spring", "spring"})
+
+_PLATFORMS = ("Reference", "CPU") + tuple(
+    f"{platform}{precision}"
+    for platform in ("OpenCL", "CUDA", "HIP")
+    for precision in ("", "-single", "-mixed", "-double")
+)
+
+
+def _method(name: str, scheme: str, about: str, *, rebuilds: bool = False) -> Method:
+    return Method(
+        engine="openmm", name=name, scheme=scheme, about=about, terms=_TERMS, rebuilds_velocity=rebuilds
+    )
+
+
+ENGINE = Engine(
+    name="openmm",
+    title="OpenMM",
+    distribution="openmm",
+    module="openmm",
+    platforms=_PLATFORMS,
+    methods={
+        method.name: method
+        for method in (
+            _method(
+                "verlet", "velocity-verlet", "VerletIntegrator, started and read synchronised", rebuilds=True
+            ),
+            _method("leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", rebuilds=True),
+            _method("euler", "explicit-euler", "explicit Euler by CustomIntegrator"),
+            _method("semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator"),
+        )
+    },
+)

@@ -1,0 +1,434 @@
+"""The mathematics of the methods: one-step maps as data, and what follows from them exactly.
+
+A scheme is either a splitting (a sequence of kicks ``p += c h F(q)`` and drifts ``q += d h p/m``) or a
+Runge-Kutta tableau.  Coefficients are exact: fractions, or decimal strings of 40 digits where they are
+irrational.  `step` carries out a scheme in the width of the numbers it is given; everything else
+(matrix, determinant, frequency, shadow energy, stability) is derived from that one definition.
+
+Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
+the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
+(2016) for the tableaux; Ruth, IEEE Trans. Nucl. Sci. 30 (1983) 2669; Forest & Ruth, Physica D 43
+(1990) 105; Yoshida, Phys. Lett. A 150 (1990) 262.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from springcheck.model import Extended, Force, Reals
+
+Coefficient: TypeAlias = Fraction | str
+Stage: TypeAlias = tuple[Literal["kick", "drift"], Coefficient]
+
+ONE, HALF = Fraction(1), Fraction(1, 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scheme:
+    """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
+
+    `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.
+    A scheme with neither stages nor tableau has no one-step map: an adaptive solver.
+    """
+
+    name: str
+    title: str
+    order: int
+    limit: float
+    symplectic: bool
+    stages: tuple[Stage, ...] = ()
+    a: tuple[tuple[Fraction, ...], ...] = ()
+    b: tuple[Fraction, ...] = ()
+    source: str = ""
+
+    @property
+    def implicit(self) -> bool:
+        """Whether a step solves an equation."""
+        return any(x for i, row in enumerate(self.a) for x in row[i:])
+
+    @property
+    def one_step(self) -> bool:
+        """Whether the scheme is a map from one state to the next."""
+        return bool(self.stages or self.b)
+
+
+def _mirrored(*half: Stage) -> tuple[Stage, ...]:
+    return (*half, *reversed(half[:-1]))
+
+
+# The cube root of 2 makes Forest-Ruth's and Yoshida's fourth-order coefficients irrational:
+# x1 = 1/(2 - 2**(1/3)), x0 = 1 - 2 x1; kicks and drifts are x1/2, (x0 + x1)/2, x1 and x0.
+_X1 = "1.351207191959657634047687808971460826922"
+_X0 = "-1.702414383919315268095375617942921653844"
+_HALF_X1 = "0.675603595979828817023843904485730413461"
+_HALF_X0_X1 = "-0.175603595979828817023843904485730413461"
+
+
+def _row(*numbers: int | Fraction) -> tuple[Fraction, ...]:
+    return tuple(Fraction(x) for x in numbers)
+
+
+_ALL = (
+    Scheme(
+        name="explicit-euler",
+        title="explicit Euler",
+        order=1,
+        limit=0.0,
+        symplectic=False,
+        a=(_row(0),),
+        b=_row(1),
+        source="Euler 1768",
+    ),
+    Scheme(
+        name="semi-implicit-euler",
+        title="semi-implicit Euler, kick-drift",
+        order=1,
+        limit=2.0,
+        symplectic=True,
+        stages=(("kick", ONE), ("drift", ONE)),
+        source="Hairer, Lubich & Wanner, I.1.2; the blog's own",
+    ),
+    Scheme(
+        name="semi-implicit-euler-drift-kick",
+        title="semi-implicit Euler, drift-kick",
+        order=1,
+        limit=2.0,
+        symplectic=True,
+        stages=(("drift", ONE), ("kick", ONE)),
+        source="Hairer, Lubich & Wanner, I.1.2",
+    ),
+    Scheme(
+        name="implicit-euler",
+        title="implicit Euler",
+        order=1,
+        limit=np.inf,
+        symplectic=False,
+        a=(_row(1),),
+        b=_row(1),
+        source="Hairer, Lubich & Wanner, I.1.2",
+    ),
+    Scheme(
+        name="velocity-verlet",
+        title="velocity Verlet",
+        order=2,
+        limit=2.0,
+        symplectic=True,
+        stages=_mirrored(("kick", HALF), ("drift", ONE)),
+        source="Swope et al., J. Chem. Phys. 76 (1982) 637",
+    ),
+    Scheme(
+        name="position-verlet",
+        title="position Verlet",
+        order=2,
+        limit=2.0,
+        symplectic=True,
+        stages=_mirrored(("drift", HALF), ("kick", ONE)),
+        source="Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990",
+    ),
+    Scheme(
+        name="implicit-midpoint",
+        title="implicit midpoint",
+        order=2,
+        limit=np.inf,
+        symplectic=True,
+        a=((HALF,),),
+        b=_row(1),
+        source="Hairer, Lubich & Wanner, I.1.2",
+    ),
+    Scheme(
+        name="trapezoidal",
+        title="trapezoidal rule (Newmark average acceleration)",
+        order=2,
+        limit=np.inf,
+        symplectic=False,
+        a=(_row(0, 0), _row(HALF, HALF)),
+        b=_row(HALF, HALF),
+        source="Newmark, J. Eng. Mech. Div. 85 (1959) 67, beta 1/4, gamma 1/2",
+    ),
+    Scheme(
+        name="rk2-midpoint",
+        title="explicit midpoint (RK2)",
+        order=2,
+        limit=0.0,
+        symplectic=False,
+        a=(_row(0, 0), _row(HALF, 0)),
+        b=_row(0, 1),
+        source="Runge 1895",
+    ),
+    Scheme(
+        name="rk2-heun",
+        title="Heun (RK2)",
+        order=2,
+        limit=0.0,
+        symplectic=False,
+        a=(_row(0, 0), _row(1, 0)),
+        b=_row(HALF, HALF),
+        source="Heun 1900",
+    ),
+    Scheme(
+        name="rk4",
+        title="classical Runge-Kutta (RK4)",
+        order=4,
+        limit=float(np.sqrt(8.0)),
+        symplectic=False,
+        a=(_row(0, 0, 0, 0), _row(HALF, 0, 0, 0), _row(0, HALF, 0, 0), _row(0, 0, 1, 0)),
+        b=_row(Fraction(1, 6), Fraction(1, 3), Fraction(1, 3), Fraction(1, 6)),
+        source="Kutta 1901",
+    ),
+    Scheme(
+        name="ruth3",
+        title="Ruth, third order",
+        order=3,
+        limit=2.507481170952355,
+        symplectic=True,
+        stages=(
+            ("kick", Fraction(7, 24)),
+            ("drift", Fraction(2, 3)),
+            ("kick", Fraction(3, 4)),
+            ("drift", Fraction(-2, 3)),
+            ("kick", Fraction(-1, 24)),
+            ("drift", ONE),
+        ),
+        source="Ruth 1983",
+    ),
+    Scheme(
+        name="forest-ruth",
+        title="Forest-Ruth, fourth order, drift first",
+        order=4,
+        limit=1.5734019474345401,
+        symplectic=True,
+        stages=_mirrored(("drift", _HALF_X1), ("kick", _X1), ("drift", _HALF_X0_X1), ("kick", _X0)),
+        source="Forest & Ruth 1990",
+    ),
+    Scheme(
+        name="yoshida4",
+        title="Yoshida, fourth order, kick first",
+        order=4,
+        limit=1.5734019474345401,
+        symplectic=True,
+        stages=_mirrored(("kick", _HALF_X1), ("drift", _X1), ("kick", _HALF_X0_X1), ("drift", _X0)),
+        source="Yoshida 1990",
+    ),
+    Scheme(
+        name="adams",
+        title="CVODE Adams-Moulton, orders 1-12",
+        order=0,
+        limit=np.inf,
+        symplectic=False,
+        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
+    ),
+    Scheme(
+        name="bdf",
+        title="CVODE BDF, orders 1-5",
+        order=0,
+        limit=np.inf,
+        symplectic=False,
+        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
+    ),
+)
+
+SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
+
+
+def number(c: Coefficient, width: type[Any]) -> Any:
+    """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
+    return width(c.numerator) / width(c.denominator) if isinstance(c, Fraction) else width(c)
+
+
+def _sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
+    for c, x in terms:
+        if c:
+            start = start + c * x
+    return start
+
+
+def step(
+    scheme: Scheme, q: Reals, p: Reals, *, h: Any, m: Reals, force: Force, stiffness: Reals | None = None
+) -> tuple[Reals, Reals]:
+    """One step from (q, p), each (..., n), in the width of q.
+
+    Implicit schemes need `stiffness`, the second derivatives of the potential, (n, n) or (..., n, n);
+    double precision is enough, because it only steers an iteration whose residual has the full width.
+    """
+    width = q.dtype.type
+    h, m = width(h), m.astype(width)
+    if scheme.stages:
+        for kind, c in scheme.stages:
+            ch = number(c, width) * h
+            if kind == "kick":
+                p = p + ch * force(q, p)
+            else:
+                q = q + ch * (p / m)
+        return q, p
+    forces: list[Reals] = []
+    velocities: list[Reals] = []
+    for row in scheme.a:
+        past = [number(c, width) * h for c in row[: len(forces)]]
+        qs = _sum(list(zip(past, velocities, strict=True)), q)
+        ps = _sum(list(zip(past, forces, strict=True)), p)
+        own = row[len(forces)]
+        if own:
+            if stiffness is None:
+                raise ValueError(f"{scheme.name} needs the stiffness of the scene")
+            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness)
+        forces.append(force(qs, ps))
+        velocities.append(ps / m)
+    weights = [number(c, width) * h for c in scheme.b]
+    return (
+        _sum(list(zip(weights, velocities, strict=True)), q),
+        _sum(list(zip(weights, forces, strict=True)), p),
+    )
+
+
+def _implicit_stage(
+    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals
+) -> tuple[Reals, Reals]:
+    """Solve Q = q + x P/m, P = p + x F(Q) by Newton's iteration."""
+    matrix = np.asarray(stiffness, dtype=np.float64) * (float(x) ** 2 / m.astype(np.float64))[:, None]
+    matrix = matrix + np.eye(len(m))
+    guess = q
+    for _ in range(50):
+        residual = guess - q - x * (p + x * force(guess, p)) / m
+        if matrix.shape == (1, 1):
+            change = residual / matrix[0, 0]
+        else:
+            change = np.linalg.solve(matrix, residual.astype(np.float64)[..., None])[..., 0]
+        guess = guess - change
+        if not np.any(np.abs(change) > np.finfo(q.dtype).eps * np.abs(guess)):
+            break
+    return guess, p + x * force(guess, p)
+
+
+def magnitude_step(
+    scheme: Scheme,
+    q: Reals,
+    p: Reals,
+    *,
+    h: float,
+    m: Reals,
+    magnitude: Force,
+    stiffness: Reals | None = None,
+) -> tuple[Reals, Reals]:
+    """What bounds the rounding of `step`: the same step with every difference taken as a sum.
+
+    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is multiplied by the norm of the inverse
+    of the matrix that it solves, the condition of its step.
+    """
+    q, p, h = np.abs(q), np.abs(p), abs(h)
+    if scheme.stages:
+        stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
+        for kind, c in stages:
+            if kind == "kick":
+                p = p + c * h * magnitude(q, p)
+            else:
+                q = q + c * h * p / m
+        return q, p
+    rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
+    forces: list[Reals] = []
+    velocities: list[Reals] = []
+    for row in rows:
+        qs = _sum(list(zip(row, velocities, strict=False)), q)
+        ps = _sum(list(zip(row, forces, strict=False)), p)
+        own = row[len(forces)]
+        if own:
+            condition = 1.0
+            if stiffness is not None:
+                matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / m[:, None]
+                condition = float(np.linalg.norm(np.linalg.inv(matrix), np.inf))
+            qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0)
+            ps = ps + own * magnitude(qs, ps)
+        forces.append(magnitude(qs, ps))
+        velocities.append(ps / m)
+    weights = [abs(float(c)) * h for c in scheme.b]
+    return (
+        _sum(list(zip(weights, velocities, strict=True)), q),
+        _sum(list(zip(weights, forces, strict=True)), p),
+    )
+
+
+def roundings(scheme: Scheme) -> int:
+    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4."""
+    if scheme.stages:
+        return 4 + sum(6 if kind == "kick" else 3 for kind, _ in scheme.stages)
+    return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)
+
+
+def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
+    """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
+
+    Found by stepping the two unit vectors, so the scheme is written down once.
+    """
+    m, k = np.atleast_1d(np.asarray(m, np.longdouble)), np.atleast_1d(np.asarray(k, np.longdouble))
+    m, k = np.broadcast_arrays(m, k)
+    friction = np.asarray(c, np.longdouble)
+
+    def force(q: Reals, p: Reals) -> Reals:
+        return np.asarray(-k * q - friction * (p / m))
+
+    out = np.empty((len(m), 2, 2), dtype=np.longdouble)
+    if scheme.implicit:
+        for j in range(len(m)):
+            mj, kj = m[j : j + 1], k[j : j + 1]
+            columns = step(
+                scheme,
+                np.eye(2, dtype=np.longdouble)[0][:, None],
+                np.eye(2, dtype=np.longdouble)[1][:, None],
+                h=h,
+                m=mj,
+                force=lambda q, p, kj=kj: np.asarray(-kj * q),
+                stiffness=kj[:, None],
+            )
+            out[j, 0], out[j, 1] = columns[0][:, 0], columns[1][:, 0]
+        return out
+    ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
+    q, p = step(scheme, np.stack([ones, zeros]), np.stack([zeros, ones]), h=h, m=m, force=force)
+    out[:, 0, :], out[:, 1, :] = q.T, p.T
+    return out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rotation:
+    """The powers of one-step matrices of determinant d: M**j = d**(j/2) (C I + S (M/sqrt(d) - cos(angle) I)).
+
+    With `angle` the phase of one step, C = cos(j angle) and S = sin(j angle)/sin(angle); hyperbolic where
+    the motion is unbounded (`growth` > 0 then, and `sign` the sign of the eigenvalues), linear between.
+    """
+
+    determinant: Extended
+    angle: Extended
+    growth: Extended
+    sign: Extended
+
+
+def rotation(matrices: Extended) -> Rotation:
+    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2)."""
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1]
+    c, d = matrices[:, 1, 0], matrices[:, 1, 1]
+    determinant = a * d - b * c
+    # -discriminant/4 = det sin(angle)**2; b*c is -(h w)**2 to leading order, so nothing cancels
+    minus = -((a - d) ** 2 / 4 + b * c)
+    half_trace = (a + d) / 2
+    root = np.sqrt(np.abs(minus))
+    turning = minus > 0
+    angle = np.where(turning, np.arctan2(root, half_trace), 0)
+    growth = np.where(minus < 0, np.arctanh(np.minimum(root / np.maximum(np.abs(half_trace), root), 1)), 0)
+    return Rotation(
+        determinant=determinant,
+        angle=angle,
+        growth=growth,
+        sign=np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1)),
+    )
+
+
+def invariant(matrices: Extended, *, h: float) -> Extended:
+    """Coefficients (n, 3) of the quadratic form s_qq q**2 + s_qp q p + s_pp p**2 that a step multiplies
+    by the determinant of its matrix: the shadow energy, equal to H up to order h [M L2/T2].
+
+    For every 2 x 2 matrix, M21 q**2 + (M22 - M11) q p - M12 p**2 has that property; -1/2h scales it to H.
+    """
+    out = np.stack([matrices[:, 1, 0], matrices[:, 1, 1] - matrices[:, 0, 0], -matrices[:, 0, 1]], axis=-1)
+    return np.asarray(out / np.longdouble(-2 * np.longdouble(h)))
