@@ -206,6 +206,8 @@ class Trajectory:
     """Total energy of each frame, (f,) [M L2/T2]; None where the scene asks for none."""
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
+    off_axis: float | None = None
+    """Largest |y| or |z| seen, for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
 

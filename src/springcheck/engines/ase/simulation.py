@@ -1,0 +1,109 @@
+"""One spring system in ASE: `Atoms` with a short calculator of springs, moved by ase.md.
+
+ASE counts length in A, energy in eV, mass in u, so that its time unit is A sqrt(u/eV), 10.18 fs.
+Reduced scenes map to these one to one; "md" scenes (nm, ps, u) are converted at this border by the
+two constants below.  No energy constant takes part: u (nm/ps)**2 is converted by lengths and times,
+so the motion cannot depend on the rounding of the mole.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import ase.units
+import numpy as np
+from ase import Atoms
+from ase.calculators.calculator import Calculator, all_changes
+from ase.md.verlet import VelocityVerlet
+
+from springcheck import mechanics
+from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Term
+
+NANOMETRE = 10.0 * ase.units.Ang
+PICOSECOND = 1000.0 * ase.units.fs
+
+
+def version() -> dict[str, str]:
+    """Version of ASE."""
+    return {"ase": ase.__version__}
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """NumPy's double precision."""
+    return Arithmetic()
+
+
+def convention(method: Method) -> str:
+    """Kick, drift, kick: momenta are synchronised."""
+    return "synchronised"
+
+
+class Springs(Calculator):  # type: ignore[misc]
+    """The terms of a scene along x, as an ASE calculator.  `length` and `time` are the scene's units."""
+
+    implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
+
+    def __init__(self, terms: tuple[Term, ...], length: float, time: float) -> None:
+        super().__init__()
+        self.force_calls = 0
+        self._terms = terms
+        self._force = mechanics.force(terms)
+        self._length = length
+        self._of_force = length / time**2
+
+    def calculate(
+        self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = all_changes
+    ) -> None:
+        super().calculate(atoms, properties, system_changes)
+        x = self.atoms.positions[:, 0]
+        q = x if self._length == 1.0 else x / self._length
+        if "forces" in properties:
+            self.force_calls += 1
+            forces = np.zeros((len(q), 3))
+            forces[:, 0] = self._force(q, q)
+            if self._of_force != 1.0:
+                forces *= self._of_force
+            self.results["forces"] = forces
+        if "energy" in properties:
+            energy = sum(float(term.energy(q)) for term in self._terms)
+            self.results["energy"] = energy * self._of_force * self._length
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """Atoms with a calculator, and the dynamics."""
+    length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
+    positions = np.zeros((scene.n, 3))
+    positions[:, 0] = scene.q * length
+    momenta = np.zeros((scene.n, 3))
+    momenta[:, 0] = scene.p * (length / time)
+    atoms = Atoms(numbers=np.zeros(scene.n, dtype=int), positions=positions, masses=scene.m, momenta=momenta)
+    atoms.calc = Springs(scene.terms, length, time)
+    return _Dynamics(atoms, VelocityVerlet(atoms, timestep=step * time), length, length / time)
+
+
+class _Dynamics:
+    """ASE's dynamics in motion."""
+
+    def __init__(self, atoms: Atoms, dynamics: VelocityVerlet, length: float, momentum: float) -> None:
+        self.off_axis = 0.0
+        self._atoms = atoms
+        self._dynamics = dynamics
+        self._length = length
+        self._momentum = momentum
+
+    @property
+    def force_calls(self) -> int:
+        """Forces that ASE asked for."""
+        return int(self._atoms.calc.force_calls)
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        atoms, run = self._atoms, self._dynamics.run
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row in range(len(q)):
+                run(every)
+                q[row] = atoms.arrays["positions"][:, 0]
+                p[row] = atoms.arrays["momenta"][:, 0]
+            if self._length != 1.0:
+                q /= self._length
+                p /= self._momentum
+        self.off_axis = max(self.off_axis, float(np.max(np.abs(atoms.positions[:, 1:]), initial=0.0)))

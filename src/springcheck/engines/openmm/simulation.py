@@ -1,0 +1,224 @@
+"""One spring system in OpenMM: built by hand, moved by OpenMM's integrators, read synchronised.
+
+The `System` is built by hand because `ForceField.createSystem` would add a `CMMotionRemover`, which
+freezes a single bound particle.  A wall is a particle of mass 0, which OpenMM never moves, standing
+where the spring is at rest: a bond of rest length 0 works through q = 0 and costs no digits.
+
+`VerletIntegrator` is a leapfrog: the velocity that it stores belongs to t - h/2, and it takes the one
+that it is handed for that.  Handed v0 it is the kick-drift Euler ("leapfrog" here).  Handed
+v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("verlet" here).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import openmm as mm
+
+from springcheck import mechanics
+from springcheck.errors import MethodError
+from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+from springcheck.schemes import SCHEMES
+
+FIXED_POINT = 2.0**-32
+"""GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
+mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow near 2**31 above."""
+
+_PRECISIONS = {
+    "single": Arithmetic(name="single", state=2.0**-24, force=2.0**-24, quantum=FIXED_POINT, overflow=2.0**31),
+    "mixed": Arithmetic(name="mixed", state=2.0**-24, force=2.0**-24, quantum=FIXED_POINT, overflow=2.0**31),
+    "double": Arithmetic(
+        name="double, forces in fixed point", quantum=FIXED_POINT, overflow=2.0**31
+    ),
+}
+
+
+def version() -> dict[str, str]:
+    """Version of OpenMM."""
+    return {"openmm": str(mm.Platform.getOpenMMVersion())}
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
+    if label.platform in ("", "Reference", "CPU"):
+        return Arithmetic()
+    return _PRECISIONS[label.precision or "single"]
+
+
+def convention(method: Method) -> str:
+    """How the stored velocities were read."""
+    if method.name == "verlet":
+        return "stored half a step early by OpenMM; started half a kick back and read half a kick on"
+    if method.name == "leapfrog":
+        return "as OpenMM stores them, taken for synchronised"
+    return "synchronised"
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """Build system, integrator and context.  MethodError: the platform is not here."""
+    origins = _origins(scene, method)
+    system, positions = _system(scene, origins)
+    integrator = _integrator(method.name, step)
+    context = _context(system, integrator, label)
+    force = mechanics.force(scene.terms)
+    early = 0.5 * step if method.name == "verlet" else 0.0
+    velocities = np.zeros_like(positions)
+    velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / scene.m
+    context.setPositions(positions)
+    context.setVelocities(velocities)
+    return _Context(scene=scene, origins=origins, context=context, integrator=integrator, half_kick=early)
+
+
+def _origins(scene: Scene, method: Method) -> Floats:
+    """Where each particle's OpenMM coordinate is counted from, (n,) [L].
+
+    OpenMM's bonds know their length, not its sign, so a bond of a rest length is the scene's spring
+    only while it does not turn over.  Where the energy rules that out by a factor of 4 and the scheme
+    does not feed energy in, real positions are used (origins 0).  Elsewhere each particle is counted
+    from its own rest position, so that every bond has rest length 0 and the two laws are one.
+    """
+    origins = np.zeros(scene.n)
+    pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
+    energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
+    bounded = SCHEMES[method.scheme].symplectic
+
+    def safe(term: mechanics.Spring) -> bool:
+        u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
+        return bool(np.all((term.rest == 0) | (bounded & (u > 0) & (0.5 * term.k * term.rest**2 > energy))))
+
+    if all(safe(term) for term in pairs):
+        return origins
+    neighbours: dict[int, list[tuple[int, float]]] = {}
+    for term in pairs:
+        for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
+            neighbours.setdefault(a, []).append((b, rest))
+            neighbours.setdefault(b, []).append((a, -rest))
+    seen: set[int] = set()
+    for root in neighbours:
+        if root in seen:
+            continue
+        seen.add(root)
+        front = [root]
+        while front:
+            a = front.pop()
+            for b, rest in neighbours[a]:
+                if b not in seen:
+                    seen.add(b)
+                    origins[b] = origins[a] + rest
+                    front.append(b)
+                elif origins[b] != origins[a] + rest:
+                    raise MethodError(
+                        f"the springs around particles {a} and {b} have no common rest, and OpenMM's "
+                        "HarmonicBondForce knows only the length of a bond that may turn over"
+                    )
+    return origins
+
+
+def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
+    """Particles along x, then one fixed anchor for each rest point; positions (N, 3)."""
+    system = mm.System()
+    for m in scene.m.tolist():
+        system.addParticle(m)
+    x = (scene.q - origins).tolist()
+    bonds = mm.HarmonicBondForce()
+    for term in scene.terms:
+        if isinstance(term, mechanics.WallSpring):
+            anchors: dict[float, int] = {}
+            for i, k, at in zip(
+                term.i.tolist(), term.k.tolist(), (term.at - origins[term.i]).tolist(), strict=True
+            ):
+                if at not in anchors:
+                    anchors[at] = system.addParticle(0.0)
+                    x.append(at)
+                bonds.addBond(anchors[at], i, 0.0, k)
+        elif isinstance(term, mechanics.Spring):
+            lengths = np.abs(term.rest - (origins[term.b] - origins[term.a]))
+            for a, b, k, length in zip(
+                term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
+            ):
+                bonds.addBond(a, b, length, k)
+    if bonds.getNumBonds():
+        system.addForce(bonds)
+    positions = np.zeros((len(x), 3))
+    positions[:, 0] = x
+    return system, positions
+
+
+def _integrator(name: str, step: float) -> mm.Integrator:
+    if name in ("verlet", "leapfrog"):
+        return mm.VerletIntegrator(step)
+    integrator = mm.CustomIntegrator(step)
+    if name == "euler":
+        integrator.addPerDofVariable("v0", 0)
+        integrator.addComputePerDof("v0", "v")
+        integrator.addComputePerDof("v", "v + dt*(f/m)")
+        integrator.addComputePerDof("x", "x + dt*v0")
+    else:
+        integrator.addComputePerDof("v", "v + dt*(f/m)")
+        integrator.addComputePerDof("x", "x + dt*v")
+    return integrator
+
+
+def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.Context:
+    name = label.platform or "Reference"
+    here = [mm.Platform.getPlatform(i).getName() for i in range(mm.Platform.getNumPlatforms())]
+    if name not in here:
+        raise MethodError(f"{label}: OpenMM has no platform {name} on this machine; it has {', '.join(here)}")
+    properties = {"Precision": label.precision} if label.precision else {}
+    try:
+        return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
+    except mm.OpenMMException as error:
+        raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
+
+
+class _Context:
+    """A context in motion.  Reads go to one buffer: the public accessors wrap units, 20 us a frame."""
+
+    def __init__(
+        self,
+        *,
+        scene: Scene,
+        origins: Floats,
+        context: mm.Context,
+        integrator: mm.Integrator,
+        half_kick: float,
+    ) -> None:
+        self.force_calls = 0
+        self.off_axis = 0.0
+        self._context = context
+        self._integrator = integrator
+        self._m = scene.m
+        self._origins = origins if np.any(origins) else None
+        self._force = mechanics.force(scene.terms)
+        self._half_kick = half_kick
+        self._x = np.zeros((context.getSystem().getNumParticles(), 3))
+        self._v = np.zeros_like(self._x)
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        take, get = self._integrator.step, self._context.getState
+        x, v = self._x, self._v
+        x_line, v_line = x[: q.shape[1], 0], v[: q.shape[1], 0]
+        positions, velocities = mm.State.Positions, mm.State.Velocities
+        row = 0
+        try:
+            for row in range(len(q)):
+                take(every)
+                state = get(positions=True, velocities=True)
+                state._getVectorAsNumpy(positions, x)
+                state._getVectorAsNumpy(velocities, v)
+                q[row] = x_line
+                p[row] = v_line
+            row += 1
+        except mm.OpenMMException as error:
+            raise Stopped(row, str(error)) from error
+        finally:
+            self._synchronise(q[:row], p[:row])
+            self.force_calls += every * row
+            self.off_axis = max(self.off_axis, float(np.max(np.abs(x[:, 1:]), initial=0.0)))
+
+    def _synchronise(self, q: Floats, p: Floats) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self._origins is not None:
+                q += self._origins
+            p *= self._m
+            if self._half_kick:
+                p += self._half_kick * self._force(q, p)

@@ -1,0 +1,93 @@
+"""One scene by CVODE, SUNDIALS' adaptive multistep solver, through scikit-sundae.
+
+The tolerance is relative and per step.  The absolute tolerance is the same fraction of the amplitude
+that the energy of the start allows each component, because q and p may differ in size by many orders
+(p ~ m w q).  The Jacobian is supplied: a difference quotient would call the force behind our back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import sksundae
+from sksundae.cvode import CVODE
+
+from springcheck import mechanics
+from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+
+MOST_STEPS = 10_000_000
+"""Internal steps allowed between two outputs; the library's own default of 500 is far too few."""
+
+
+def version() -> dict[str, str]:
+    """Versions of the wrapper and of SUNDIALS beneath it."""
+    return {"scikit-sundae": sksundae.__version__, "sundials": str(sksundae.SUNDIALS_VERSION)}
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """SUNDIALS' realtype is double in the wheels."""
+    return Arithmetic()
+
+
+def convention(method: Method) -> str:
+    """q and p are one vector of one time."""
+    return "synchronised"
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A solver standing at the start."""
+    return _Solver(scene, "Adams" if method.name == "adams" else "BDF", step)
+
+
+def absolute_tolerance(scene: Scene) -> Floats:
+    """`scene.tolerance` times the amplitude of each component of (q, p) at the energy of the start (2n,)."""
+    unit = mechanics.norm(scene).unit
+    k = np.abs(np.diag(mechanics.stiffness(scene, scene.q))).astype(np.float64)
+    duration = abs(scene.step) * scene.steps
+    p = np.sqrt(2 * scene.m) * float(unit)
+    held = k > 0
+    q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * float(unit), p / scene.m * duration)
+    return np.asarray(scene.tolerance * np.concatenate([q, p]))
+
+
+class _Solver:
+    """CVODE, stepped from output to output.  Outputs between internal steps are interpolated by CVODE."""
+
+    def __init__(self, scene: Scene, method: str, step: float) -> None:
+        self.force_calls = 0
+        n, m = scene.n, scene.m
+        force = mechanics.force(scene.terms)
+
+        def derivative(t: float, y: Floats, yp: Floats) -> None:
+            self.force_calls += 1
+            q, p = y[:n], y[n:]
+            yp[:n] = p / m
+            yp[n:] = force(q, p)
+
+        def jacobian(t: float, y: Floats, yp: Floats, jacobian: Floats) -> None:
+            jacobian[:n, n:] = np.diag(1 / m)
+            jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
+
+        self._solver = CVODE(
+            derivative,
+            method=method,
+            rtol=scene.tolerance,
+            atol=absolute_tolerance(scene),
+            jacfn=jacobian,
+            max_num_steps=MOST_STEPS,
+        )
+        self._solver.init_step(0.0, np.concatenate([scene.q, scene.p]))
+        self._n, self._step, self._done = n, step, 0
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        n, take = self._n, self._solver.step
+        for row in range(len(q)):
+            self._done += every
+            try:
+                result = take(self._done * self._step)
+            except RuntimeError as error:
+                raise Stopped(row, str(error)) from error
+            if not result.success:
+                raise Stopped(row, str(result.message))
+            y = result.y
+            q[row] = y[:n]
+            p[row] = y[n:]

@@ -1,0 +1,230 @@
+"""The driver: one scene by one method, recorded in chunks, timed, its outcome judged.
+
+The engine only moves.  Clock, chunks, energies, progress and divergence are kept here, alike for all.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Literal, Protocol
+
+import numpy as np
+
+from springcheck import engines, mechanics
+from springcheck.errors import MethodError, SceneError
+from springcheck.model import (
+    Arithmetic,
+    Floats,
+    Label,
+    Outcome,
+    Scene,
+    Simulation,
+    Stopped,
+    Timing,
+    Trajectory,
+)
+
+CHUNK = 1 << 16
+"""Numbers per array and chunk: 512 KiB, which stays in the cache."""
+
+
+class Sink(Protocol):
+    """Takes recorded frames: t (f,), q and p (f, n), energy (f,) or None.  The arrays are reused."""
+
+    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None: ...
+
+
+Progress = Callable[[int], None]
+"""Called with the number of steps done since the last call."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """What is known of a run apart from its frames."""
+
+    label: Label
+    scheme: str
+    step: float
+    every: int
+    tolerance: float | None
+    outcome: Outcome
+    timing: Timing
+    force_calls: int
+    arithmetic: Arithmetic
+    rebuilds_velocity: bool
+    off_axis: float | None
+    """Largest |y| or |z| seen, for engines in three dimensions."""
+    origin: dict[str, str]
+
+
+def play(scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None) -> Record:
+    """Run a scene and hand every recorded frame, the start first, to `sink`.
+
+    Memory does not grow with the length of the run.  Ctrl-C ends the run with the outcome
+    `interrupted`; the frames before it have been handed over.
+
+    Raises:
+        MethodError: the method cannot serve the scene, or its engine or platform is not here.
+    """
+    reason = engines.refusal(scene, label)
+    if reason:
+        raise MethodError(f"{label}: {reason}")
+    method = engines.method(label)
+    driver = engines.load(label.engine)
+    began = perf_counter()
+    simulation = driver.start(scene, method, label, scene.step)
+    start_seconds = perf_counter() - began
+
+    with_energy = "energy" in scene.quantities
+    rows = max(1, min(CHUNK // scene.n, scene.frames))
+    q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
+    q[0], p[0] = scene.q, scene.p
+    _hand_over(scene, sink, 0, q[:1], p[:1], with_energy)
+    run_seconds = 0.0
+    outcome = Outcome(status="complete", step=scene.steps)
+    frame = 1
+    while frame < scene.frames:
+        f = min(rows, scene.frames - frame)
+        status, good, message, seconds = _advance(simulation, scene.every, q[:f], p[:f])
+        run_seconds += seconds
+        if good:
+            _hand_over(scene, sink, frame, q[:good], p[:good], with_energy)
+        frame += good
+        if progress:
+            progress(good * scene.every)
+        if status != "complete":
+            outcome = Outcome(status=status, step=(frame - 1) * scene.every, message=message)
+            break
+    return Record(
+        label=label,
+        scheme=method.scheme,
+        step=scene.step,
+        every=scene.every,
+        tolerance=scene.tolerance if method.adaptive else None,
+        outcome=outcome,
+        timing=Timing(start=start_seconds, run=run_seconds),
+        force_calls=simulation.force_calls,
+        arithmetic=driver.arithmetic(label),
+        rebuilds_velocity=method.rebuilds_velocity,
+        off_axis=getattr(simulation, "off_axis", None),
+        origin={
+            **driver.version(),
+            "engine": engines.engine(label.engine).title,
+            "method": method.about,
+            "velocity": driver.convention(method),
+        },
+    )
+
+
+Ending = Literal["complete", "diverged", "stopped", "interrupted"]
+
+
+def _advance(simulation: Simulation, every: int, q: Floats, p: Floats) -> tuple[Ending, int, str, float]:
+    """Advance one chunk: how it ended, how many rows are good, why, and the seconds it took."""
+    status: Ending = "complete"
+    good, message = len(q), ""
+    began = perf_counter()
+    try:
+        simulation.advance(every, q, p)
+    except Stopped as stop:
+        status, good, message = "stopped", stop.rows, str(stop)
+    except KeyboardInterrupt:
+        # which rows of the chunk were filled is not known: none of them is kept
+        return "interrupted", 0, "interrupted", perf_counter() - began
+    seconds = perf_counter() - began
+    finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
+    if not finite.all():
+        good = int(np.argmin(finite))
+        status, message = "diverged", "not finite from the next frame on"
+    elif status == "stopped" and "nan" in message.lower():
+        status = "diverged"
+    return status, good, message, seconds
+
+
+def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, with_energy: bool) -> None:
+    t = np.arange(frame, frame + len(q), dtype=np.float64) * scene.every * scene.step
+    energy = None
+    if with_energy:
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+            energy = np.asarray(mechanics.energy(scene, q, p), dtype=np.float64)
+    sink(t, q, p, energy)
+
+
+class Gather:
+    """A sink that keeps everything in memory."""
+
+    def __init__(self, scene: Scene) -> None:
+        size = scene.frames * (2 * scene.n + 2) * 8
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 1 << 33
+        if size > memory // 2:
+            raise SceneError(
+                f"scene {scene.name}: {scene.frames} frames of {scene.n} particles take {size / 1e9:.3g} GB, more "
+                "than half of this machine's memory; raise record.every, or let `springcheck run` stream to a file"
+            )
+        self._frames = 0
+        self._t = np.empty(scene.frames)
+        self._q, self._p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
+        self._energy = np.empty(scene.frames) if "energy" in scene.quantities else None
+
+    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
+        a, b = self._frames, self._frames + len(t)
+        self._t[a:b], self._q[a:b], self._p[a:b] = t, q, p
+        if self._energy is not None and energy is not None:
+            self._energy[a:b] = energy
+        self._frames = b
+
+    def trajectory(self, record: Record) -> Trajectory:
+        """The frames with what is known of the run."""
+        f = self._frames
+        return trajectory(
+            record, self._t[:f], self._q[:f], self._p[:f], None if self._energy is None else self._energy[:f]
+        )
+
+
+def trajectory(record: Record, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> Trajectory:
+    """A trajectory, or a piece of one, of a recorded run."""
+    return Trajectory(
+        label=str(record.label),
+        scheme=record.scheme,
+        t=t,
+        q=q,
+        p=p,
+        energy=energy,
+        step=record.step,
+        every=record.every,
+        outcome=record.outcome,
+        timing=record.timing,
+        force_calls=record.force_calls,
+        tolerance=record.tolerance,
+        arithmetic=record.arithmetic,
+        rebuilds_velocity=record.rebuilds_velocity,
+        off_axis=record.off_axis,
+        origin=record.origin,
+    )
+
+
+def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) -> Trajectory:
+    """Run a scene by one method and return its trajectory, row 0 the start.
+
+    `method` is a label such as ``"ase:velocity-verlet"`` or ``"openmm:verlet@CPU"``.  A run that
+    diverges or stops returns what was finite, and says so in `outcome`.
+
+    Raises:
+        MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
+        SceneError: the trajectory would not fit into memory.
+    """
+    label = engines.parse(method) if isinstance(method, str) else method
+    gather = Gather(scene)
+    return gather.trajectory(play(scene, label, gather, progress=progress))
+
+
+def bare(scene: Scene, label: Label) -> Timing:
+    """Time the engine alone: all steps in one call, one row read at the end."""
+    return play(replace(scene, every=scene.steps, quantities=("q", "p")), label, _nothing).timing
+
+
+def _nothing(t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
+    return None
