@@ -1,0 +1,231 @@
+"""The loops of the own methods: plain Python that runs interpreted or compiled, bit for bit the same.
+
+Interpreted, the rows `m, k, q, p ...` are lists of floats (Python's floats neither warn nor raise when
+they overflow); compiled, they are arrays.  So no kernel may contain what rounds or fails differently
+there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
+
+Every kernel takes `(every, h, *constants, q, p, qs, ps)`, fills row after row of qs and ps (f, n) with
+the state `every` steps later, and returns the last state.  There are three layouts:
+
+one     a single particle on one spring at rest in 0; its state stays in two registers
+many    particles side by side, each on one wall spring: n systems in one
+joined  any terms; forces are summed over the terms in the order of `forces`, then over each term's list
+
+To add a term to `joined`: write its loop, add it to `HELPERS` and `forces`, and name its fields in
+`simulation.FIELDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+Row: TypeAlias = Any
+"""A list of numbers, or a one-dimensional array of them."""
+Terms: TypeAlias = Any
+"""One tuple of rows for each kind of term, in the order of `simulation.FIELDS`."""
+State: TypeAlias = Any
+Kernel: TypeAlias = Callable[..., State]
+
+BLOCK = 512
+"""Particles of `many` that are carried through all steps before the next ones: 5 rows of 4 KiB stay in
+the first-level cache.  They do not act on each other, so the order changes no number."""
+
+
+def one_euler(every: int, h: float, m: float, k: float, q: float, p: float, qs: Row, ps: Row) -> State:
+    """Explicit Euler: both from the old state."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            q, p = q + (p / m) * h, p + (-k * q) * h
+        qs[row, 0] = q
+        ps[row, 0] = p
+    return q, p
+
+
+def one_semi_implicit_euler(
+    every: int, h: float, m: float, k: float, q: float, p: float, qs: Row, ps: Row
+) -> State:
+    """Semi-implicit Euler: kick, then drift with the new momentum."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            p = p + (-k * q) * h
+            q = q + (p / m) * h
+        qs[row, 0] = q
+        ps[row, 0] = p
+    return q, p
+
+
+def one_implicit_euler(
+    every: int, h: float, m: float, k: float, inverse: float, q: float, p: float, qs: Row, ps: Row
+) -> State:
+    """Implicit Euler: p' = (p + h F(q)) / (1 + h**2 k/m), then drift; `inverse` is 1 over the divisor."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            p = (p + (-k * q) * h) * inverse
+            q = q + (p / m) * h
+        qs[row, 0] = q
+        ps[row, 0] = p
+    return q, p
+
+
+def many_euler(every: int, h: float, m: Row, k: Row, at: Row, q: Row, p: Row, qs: Row, ps: Row) -> State:
+    """Explicit Euler of independent wall springs."""
+    for first in range(0, len(m), BLOCK):
+        last = min(first + BLOCK, len(m))
+        for row in range(len(qs)):
+            for _ in range(every):
+                for i in range(first, last):
+                    x = q[i]
+                    q[i] = x + (p[i] / m[i]) * h
+                    p[i] = p[i] + (-k[i] * (x - at[i])) * h
+            for i in range(first, last):
+                qs[row, i] = q[i]
+                ps[row, i] = p[i]
+    return q, p
+
+
+def many_semi_implicit_euler(
+    every: int, h: float, m: Row, k: Row, at: Row, q: Row, p: Row, qs: Row, ps: Row
+) -> State:
+    """Semi-implicit Euler of independent wall springs."""
+    for first in range(0, len(m), BLOCK):
+        last = min(first + BLOCK, len(m))
+        for row in range(len(qs)):
+            for _ in range(every):
+                for i in range(first, last):
+                    x = p[i] + (-k[i] * (q[i] - at[i])) * h
+                    p[i] = x
+                    q[i] = q[i] + (x / m[i]) * h
+            for i in range(first, last):
+                qs[row, i] = q[i]
+                ps[row, i] = p[i]
+    return q, p
+
+
+def many_implicit_euler(
+    every: int, h: float, m: Row, k: Row, at: Row, inverse: Row, q: Row, p: Row, qs: Row, ps: Row
+) -> State:
+    """Implicit Euler of independent wall springs, each as in `one_implicit_euler`."""
+    for first in range(0, len(m), BLOCK):
+        last = min(first + BLOCK, len(m))
+        for row in range(len(qs)):
+            for _ in range(every):
+                for i in range(first, last):
+                    x = (p[i] + (-k[i] * (q[i] - at[i])) * h) * inverse[i]
+                    p[i] = x
+                    q[i] = q[i] + (x / m[i]) * h
+            for i in range(first, last):
+                qs[row, i] = q[i]
+                ps[row, i] = p[i]
+    return q, p
+
+
+def wall_springs(i: Row, k: Row, at: Row, q: Row, f: Row) -> None:
+    """Add -k (q - at) to f."""
+    for s in range(len(i)):
+        f[i[s]] += -k[s] * (q[i[s]] - at[s])
+
+
+def springs(a: Row, b: Row, k: Row, rest: Row, q: Row, f: Row) -> None:
+    """Add the tension k (q[b] - q[a] - rest) to f[a] and take it from f[b]."""
+    for s in range(len(a)):
+        tension = k[s] * (q[b[s]] - q[a[s]] - rest[s])
+        f[a[s]] += tension
+        f[b[s]] -= tension
+
+
+def quartics(i: Row, b: Row, at: Row, q: Row, f: Row) -> None:
+    """Add -b (q - at)**3 to f."""
+    for s in range(len(i)):
+        u = q[i[s]] - at[s]
+        f[i[s]] += -b[s] * (u * u * u)
+
+
+def forces(terms: Terms, q: Row, p: Row, f: Row) -> None:
+    """Fill f with the force on every particle."""
+    walls, pairs, wells = terms
+    for i in range(len(f)):
+        f[i] = 0.0
+    wall_springs(walls[0], walls[1], walls[2], q, f)
+    springs(pairs[0], pairs[1], pairs[2], pairs[3], q, f)
+    quartics(wells[0], wells[1], wells[2], q, f)
+
+
+def joined_euler(
+    every: int, h: float, m: Row, terms: Terms, f: Row, q: Row, p: Row, qs: Row, ps: Row
+) -> State:
+    """Explicit Euler of any terms."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            forces(terms, q, p, f)
+            for i in range(len(m)):
+                q[i] = q[i] + (p[i] / m[i]) * h
+                p[i] = p[i] + f[i] * h
+        for i in range(len(m)):
+            qs[row, i] = q[i]
+            ps[row, i] = p[i]
+    return q, p
+
+
+def joined_semi_implicit_euler(
+    every: int, h: float, m: Row, terms: Terms, f: Row, q: Row, p: Row, qs: Row, ps: Row
+) -> State:
+    """Semi-implicit Euler of any terms."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            forces(terms, q, p, f)
+            for i in range(len(m)):
+                x = p[i] + f[i] * h
+                p[i] = x
+                q[i] = q[i] + (x / m[i]) * h
+        for i in range(len(m)):
+            qs[row, i] = q[i]
+            ps[row, i] = p[i]
+    return q, p
+
+
+def joined_implicit_euler(
+    every: int, h: float, m: Row, terms: Terms, f: Row, inverse: Row, q: Row, p: Row, qs: Row, ps: Row
+) -> State:
+    """Implicit Euler of linear terms: p' = inverse (p + h F(q)), then drift.
+
+    `inverse` holds the columns of (1 + h**2 K / m)**-1.  Column by column every p[i] is summed in the
+    same order as in a row-wise product, and the inner loop is free of dependences.
+    """
+    for row in range(len(qs)):
+        for _ in range(every):
+            forces(terms, q, p, f)
+            for i in range(len(m)):
+                f[i] = p[i] + f[i] * h
+                p[i] = 0.0
+            for j in range(len(m)):
+                column = inverse[j]
+                x = f[j]
+                for i in range(len(m)):
+                    p[i] += column[i] * x
+            for i in range(len(m)):
+                q[i] = q[i] + (p[i] / m[i]) * h
+        for i in range(len(m)):
+            qs[row, i] = q[i]
+            ps[row, i] = p[i]
+    return q, p
+
+
+HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, forces)
+"""What kernels call, each after what it calls itself."""
+
+ONE: dict[str, Kernel] = {
+    "euler": one_euler,
+    "semi-implicit-euler": one_semi_implicit_euler,
+    "implicit-euler": one_implicit_euler,
+}
+MANY: dict[str, Kernel] = {
+    "euler": many_euler,
+    "semi-implicit-euler": many_semi_implicit_euler,
+    "implicit-euler": many_implicit_euler,
+}
+JOINED: dict[str, Kernel] = {
+    "euler": joined_euler,
+    "semi-implicit-euler": joined_semi_implicit_euler,
+    "implicit-euler": joined_implicit_euler,
+}

@@ -1,0 +1,237 @@
+"""springcheck's own methods, interpreted where a run is short and compiled where it is long.
+
+numba is imported only for a run that is worth it (see `WORTH`).  The numbers are the same either way,
+to the last bit, so a machine without numba, or with a cache folder that cannot be written, gets them too.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from types import FunctionType
+from typing import Any, cast
+
+import numpy as np
+
+from springcheck import mechanics
+from springcheck.engines.own import kernels
+from springcheck.errors import MethodError
+from springcheck.model import Arithmetic, Floats, Label, Method, Scene
+
+WORTH = 1_000_000
+"""Spring-steps from which compiling pays: importing numba takes 0.2 s and compiling 0.4 s, the time of
+1.5 million interpreted steps of one spring at 400 ns; less once the compiled code is cached."""
+
+DENSE = 2000
+"""Joined particles that implicit Euler accepts: its matrix fills 8 n**2 bytes, 32 MB here."""
+
+FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "wall-spring": (("i",), ("k", "at")),
+    "spring": (("a", "b"), ("k", "rest")),
+    "quartic": (("i",), ("b", "at")),
+}
+"""Indices and parameters of each kind of term, in the order in which `kernels.forces` takes them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """A kernel and what it works on: floats, arrays, and tuples of them; `work` spring-steps a step."""
+
+    kernel: kernels.Kernel
+    constants: tuple[Any, ...]
+    q: Any
+    p: Any
+    work: float
+
+
+class Own:
+    """A started run of an own method.  `compiled` says which way it goes."""
+
+    def __init__(self, layout: Layout, h: float, kernel: kernels.Kernel, *, compiled: bool) -> None:
+        self.force_calls = 0
+        self.compiled = compiled
+        self._h = h
+        self._kernel = kernel
+        keep = _identity if compiled else _as_lists
+        self._constants = keep(layout.constants)
+        self._state = keep((layout.q, layout.p))
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        """Fill q and p (f, n), one force evaluation a step; overflow fills in inf and nan, silently."""
+        qs, ps = np.ascontiguousarray(q), np.ascontiguousarray(p)
+        self._state = self._kernel(every, self._h, *self._constants, *self._state, qs, ps)
+        if qs is not q:
+            q[...] = qs
+        if ps is not p:
+            p[...] = ps
+        self.force_calls += every * len(q)
+
+
+def version() -> dict[str, str]:
+    """Of this package, the interpreter and NumPy, and of numba where it is installed."""
+    found = {
+        "springcheck": _installed("springcheck"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": _installed("numba"),
+    }
+    return {name: text for name, text in found.items() if text}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Own:
+    """Start a run of `scene.steps` steps of length `step`; compiles here where that pays."""
+    return prepare(scene, method.name, step)
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """IEEE double precision throughout."""
+    return Arithmetic()
+
+
+def convention(method: Method) -> str:
+    """Of the momenta."""
+    return "positions and momenta belong to the same time"
+
+
+def prepare(scene: Scene, method: str, step: float, *, compiled: bool | None = None) -> Own:
+    """Like `start`; `compiled` forces the kernel either way, left out the length of the run decides.
+
+    Forced, a missing numba is an ImportError; left out, the interpreted kernel serves.
+    """
+    h = float(step)
+    with np.errstate(all="ignore"):
+        layout = _layout(scene, method, h)
+    if compiled is None:
+        kernel = _try_to_compile(layout, h) if layout.work * scene.steps >= WORTH else None
+    else:
+        kernel = _compile(layout, h) if compiled else None
+    return Own(layout, h, kernel or layout.kernel, compiled=kernel is not None)
+
+
+def _layout(scene: Scene, method: str, h: float) -> Layout:
+    m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
+    implicit = method == "implicit-euler"
+    walls = _single_walls(scene)
+    if walls is not None:
+        k, at = walls
+        inverse = (1 / (1 + h * h * (k / m)),) if implicit else ()
+        if scene.n == 1 and at[0] == 0:
+            constants = tuple(float(x[0]) for x in (m, k, *inverse))
+            return Layout(
+                kernel=kernels.ONE[method], constants=constants, q=float(q[0]), p=float(p[0]), work=1
+            )
+        return Layout(
+            kernel=kernels.MANY[method], constants=(m, k, at, *inverse), q=q, p=p, work=float(scene.n)
+        )
+    terms = tuple(_rows(scene, key) for key in FIELDS)
+    work = float(scene.n + sum(len(rows[0]) for rows in terms))
+    inverse = ()
+    if implicit:
+        inverse = (_inverse(scene, h),)
+        # one product and sum of the matrix costs about an eighth of a spring
+        work += scene.n**2 / 8
+    return Layout(
+        kernel=kernels.JOINED[method],
+        constants=(m, terms, np.zeros(scene.n), *inverse),
+        q=q,
+        p=p,
+        work=work,
+    )
+
+
+def _single_walls(scene: Scene) -> tuple[Floats, Floats] | None:
+    """Stiffness and rest point of every particle (n,), where each has at most one wall spring and no more."""
+    k, at, count = np.zeros(scene.n), np.zeros(scene.n), np.zeros(scene.n, dtype=np.int64)
+    for term in scene.terms:
+        if not isinstance(term, mechanics.WallSpring):
+            return None
+        np.add.at(count, term.i, 1)
+        k[term.i], at[term.i] = term.k, term.at
+    return (k, at) if np.all(count <= 1) else None
+
+
+def _rows(scene: Scene, key: str) -> tuple[Any, ...]:
+    """Indices and parameters of all terms of one kind, each (s,); s is 0 where the scene has none."""
+    indices, parameters = FIELDS[key]
+    found = [term for term in scene.terms if term.key == key]
+    return tuple(
+        np.concatenate([np.empty(0, kind), *(np.asarray(getattr(term, name), kind) for term in found)])
+        for names, kind in ((indices, np.int64), (parameters, np.float64))
+        for name in names
+    )
+
+
+def _inverse(scene: Scene, h: float) -> Floats:
+    """Columns of (1 + h**2 K / m)**-1, as rows (n, n); not a number throughout where there is none."""
+    if scene.n > DENSE:
+        raise MethodError(
+            f"own:implicit-euler solves for at most {DENSE} joined particles; scene {scene.name!r} has "
+            f"{scene.n}; leave the method out"
+        )
+    k = np.asarray(mechanics.stiffness(scene, scene.q), dtype=np.float64)
+    try:
+        return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) + h * h * (k / scene.m)).T)
+    except np.linalg.LinAlgError:
+        return np.full((scene.n, scene.n), np.nan)
+
+
+def _identity(value: Any) -> Any:
+    return value
+
+
+def _as_lists(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_as_lists(x) for x in value)
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _try_to_compile(layout: Layout, h: float) -> kernels.Kernel | None:
+    try:
+        return _compile(layout, h)
+    except ImportError:
+        return None
+
+
+def _compile(layout: Layout, h: float) -> kernels.Kernel:
+    """The layout's kernel, compiled for its types by a call that fills no row, so that `advance` does not."""
+    none = np.empty((0, np.size(layout.q)))
+    arguments = (1, h, *layout.constants, layout.q, layout.p, none, none.copy())
+    for saved in (True, False):
+        try:
+            kernel = _jit(layout.kernel, saved)
+            kernel(*arguments)
+        except (OSError, RuntimeError):
+            # no folder for the compiled code can be written: compile for this process alone
+            if not saved:
+                raise
+        else:
+            break
+    return kernel
+
+
+@cache
+def _jit(kernel: kernels.Kernel, saved: bool) -> kernels.Kernel:
+    """numba's version of a kernel, without fastmath: that would contract and reorder."""
+    import numba
+
+    jit: Callable[[FunctionType], Any] = numba.njit(cache=saved, error_model="numpy")
+    names: dict[str, Any] = dict(vars(kernels))
+    for helper in kernels.HELPERS:
+        names[helper.__name__] = jit(_with_names(helper, names))
+    return cast(kernels.Kernel, jit(_with_names(kernel, names)))
+
+
+def _with_names(function: Callable[..., Any], names: dict[str, Any]) -> FunctionType:
+    """The same code, calling the helpers in `names`: numba calls none that it has not compiled."""
+    code = cast(FunctionType, function).__code__
+    return FunctionType(code, dict(names), function.__name__)
+
+
+def _installed(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
