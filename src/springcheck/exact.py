@@ -57,14 +57,15 @@ def modes(scene: Scene) -> Modes:
         raise ValueError(f"scene {scene.name!r} is not linear: it has no normal modes")
     root_m = np.sqrt(scene.m.astype(np.longdouble))
     zero = np.zeros(scene.n, dtype=np.longdouble)
-    pull = mechanics.force(scene.terms)(zero, zero) / root_m
+    pull: Extended = np.asarray(mechanics.force(scene.terms)(zero, zero) / root_m, np.longdouble)
     if mechanics.is_separate(scene):
         k = np.zeros(scene.n, dtype=np.longdouble)
         for term in scene.terms:
             assert isinstance(term, mechanics.WallSpring)
             np.add.at(k, term.i, term.k.astype(np.longdouble))
         return Modes(w2=k / scene.m, pull=pull, root_m=root_m, vectors=None)
-    symmetric = mechanics.stiffness(scene, zero) / root_m[:, None] / root_m
+    scaled = mechanics.stiffness(scene, zero) / root_m[:, None] / root_m
+    symmetric = np.asarray(scaled, np.longdouble)
     w2, vectors = _eigen(symmetric)
     # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
     w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)

@@ -8,7 +8,7 @@ it into `TERMS`, and name its key in the methods of the engines that serve it.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,7 +23,8 @@ def scatter(out: Reals, index: Integers, values: Reals) -> None:
     elif len(np.unique(index)) == len(index):
         out[..., index] += values
     else:
-        np.add.at(out, (..., index), values)
+        where: Any = (..., index)
+        np.add.at(out, where, values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,6 +134,23 @@ def is_linear(scene: Scene) -> bool:
 def is_separate(scene: Scene) -> bool:
     """Whether no term joins two particles: n independent systems side by side."""
     return all(term.bodies == 1 for term in scene.terms)
+
+
+def in_single(scene: Scene) -> Scene:
+    """The scene with every parameter of its terms rounded to single precision."""
+
+    def rounded(term: Any) -> Any:
+        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        return replace(
+            term,
+            **{
+                name: value.astype(np.float32).astype(np.float64)
+                for name, value in values.items()
+                if value.dtype == np.float64
+            },
+        )
+
+    return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
 
 
 def force(terms: Iterable[Term]) -> Force:
@@ -253,4 +271,4 @@ def norm(scene: Scene) -> Norm:
     unit = kinetic_energy(scene, p)
     for term in scene.terms:
         unit = unit + np.abs(term.energy(q))
-    return Norm(scene=scene, groups=groups, duration=duration, unit=np.sqrt(unit)[()])
+    return Norm(scene=scene, groups=groups, duration=duration, unit=np.longdouble(np.sqrt(unit)))

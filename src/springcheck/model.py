@@ -131,6 +131,8 @@ class Arithmetic:
     """Smallest step of a force that is summed in fixed point, in the engine's own unit of force."""
     overflow: float = float("inf")
     """Largest force that the fixed-point sum holds."""
+    parameters: Literal["double", "single"] = "double"
+    """Width in which force constants and rest lengths are kept."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +152,10 @@ class Label:
 class Simulation(Protocol):
     """A started engine.  It moves and does nothing else: the driver records, times and judges."""
 
-    force_calls: int
+    @property
+    def force_calls(self) -> int:
+        """Evaluations of the force so far, counted by us."""
+        ...
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n): row i holds the state `every` steps after row i-1, both at the same time.

@@ -25,7 +25,7 @@ class _Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=Tr
     """A table of a scene file: what is not a field of it is refused."""
 
 
-class ParticleTable(_Table):
+class ParticleTable(_Table, frozen=True):
     """mass [M], position [L] and momentum [M L/T] at the start."""
 
     mass: Positive
@@ -33,7 +33,7 @@ class ParticleTable(_Table):
     momentum: float = 0.0
 
 
-class SpringTable(_Table):
+class SpringTable(_Table, frozen=True):
     """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L]."""
 
     ends: tuple[End, End]
@@ -42,7 +42,7 @@ class SpringTable(_Table):
     wall: float = 0.0
 
 
-class QuarticTable(_Table):
+class QuarticTable(_Table, frozen=True):
     """A stiffening well V = coefficient/4 (q - at)**4 of one particle."""
 
     particle: int
@@ -50,7 +50,7 @@ class QuarticTable(_Table):
     at: float = 0.0
 
 
-class TimeTable(_Table):
+class TimeTable(_Table, frozen=True):
     """Step [T], number of steps, and the relative tolerance per step of adaptive solvers."""
 
     step: float
@@ -59,20 +59,20 @@ class TimeTable(_Table):
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
-class MethodsTable(_Table):
+class MethodsTable(_Table, frozen=True):
     """Labels or globs of the methods to run; all that can serve the scene when left out."""
 
     include: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] = ("*",)
 
 
-class RecordTable(_Table):
+class RecordTable(_Table, frozen=True):
     """Every how many steps a frame is kept, and what of it."""
 
     every: Count | None = None
     quantities: tuple[Literal["q", "p", "energy"], ...] = ("q", "p", "energy")
 
 
-class SceneTable(_Table):
+class SceneTable(_Table, frozen=True):
     """A whole scene file."""
 
     title: str
@@ -110,7 +110,8 @@ def load_scene(name_or_path: str | Path) -> Scene:
         path = folder() / f"{name_or_path}.toml"
         if not path.is_file():
             raise SceneError(
-                f"no scene {str(name_or_path)!r}: shipped are {', '.join(names())}; a file's name ends in .toml"
+                f"no scene {str(name_or_path)!r}: shipped are {', '.join(names())}; "
+                "the name of a file of your own ends in .toml"
             )
     try:
         text = path.read_text(encoding="utf-8")
@@ -242,16 +243,16 @@ def _terms(table: SceneTable, n: int) -> Iterator[Term]:
         match spring.ends:
             case ("wall", "wall"):
                 raise _MistakeError(f"{field}: a spring between two walls moves nothing")
-            case ("wall", int(i)):
-                walls.append((i, spring.stiffness, spring.wall + spring.rest))
-            case (int(i), "wall"):
-                walls.append((i, spring.stiffness, spring.wall - spring.rest))
-            case (int(a), int(b)):
-                if a == b:
-                    raise _MistakeError(f"{field} = [{a}, {b}]: the two ends are the same particle")
+            case ("wall", int(particle)):
+                walls.append((particle, spring.stiffness, spring.wall + spring.rest))
+            case (int(particle), "wall"):
+                walls.append((particle, spring.stiffness, spring.wall - spring.rest))
+            case (int(one), int(other)):
+                if one == other:
+                    raise _MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
                 if spring.wall:
                     raise _MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
-                pairs.append((a, b, spring.stiffness, spring.rest))
+                pairs.append((one, other, spring.stiffness, spring.rest))
     if walls:
         i, k, at = zip(*walls, strict=True)
         yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.array(at))
@@ -260,7 +261,9 @@ def _terms(table: SceneTable, n: int) -> Iterator[Term]:
         yield mechanics.Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest))
     if table.quartic:
         yield mechanics.Quartic(
-            i=np.array([_particle(x.particle, n, f"quartic[{j}].particle") for j, x in enumerate(table.quartic)]),
+            i=np.array(
+                [_particle(x.particle, n, f"quartic[{j}].particle") for j, x in enumerate(table.quartic)]
+            ),
             b=np.array([x.coefficient for x in table.quartic]),
             at=np.array([x.at for x in table.quartic]),
         )

@@ -19,7 +19,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.model import Extended, Force, Reals
+from springcheck.model import Extended, Floats, Force, Integers, Reals
 
 Coefficient: TypeAlias = Fraction | str
 Stage: TypeAlias = tuple[Literal["kick", "drift"], Coefficient]
@@ -337,7 +337,8 @@ def magnitude_step(
         if own:
             condition = 1.0
             if stiffness is not None:
-                matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / m[:, None]
+                masses = m.astype(np.float64)[:, None]
+                matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / masses
                 condition = float(np.linalg.norm(np.linalg.inv(matrix), np.inf))
             qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0)
             ps = ps + own * magnitude(qs, ps)
@@ -373,13 +374,17 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     if scheme.implicit:
         for j in range(len(m)):
             mj, kj = m[j : j + 1], k[j : j + 1]
+
+            def pull(q: Reals, p: Reals, kj: Reals = kj) -> Reals:
+                return np.asarray(-kj * q)
+
             columns = step(
                 scheme,
                 np.eye(2, dtype=np.longdouble)[0][:, None],
                 np.eye(2, dtype=np.longdouble)[1][:, None],
                 h=h,
                 m=mj,
-                force=lambda q, p, kj=kj: np.asarray(-kj * q),
+                force=pull,
                 stiffness=kj[:, None],
             )
             out[j, 0], out[j, 1] = columns[0][:, 0], columns[1][:, 0]
@@ -432,3 +437,69 @@ def invariant(matrices: Extended, *, h: float) -> Extended:
     """
     out = np.stack([matrices[:, 1, 0], matrices[:, 1, 1] - matrices[:, 0, 0], -matrices[:, 0, 1]], axis=-1)
     return np.asarray(out / np.longdouble(-2 * np.longdouble(h)))
+
+
+def propagate(
+    matrices: Extended, y: Extended, v: Extended, steps: Integers, *, area_preserving: bool
+) -> tuple[Extended, Extended]:
+    """Closed form of the discrete motion: M**j (y, v) of n modes for j in steps (f,) -> (f, n), twice.
+
+    M**j = d**(j/2) (C + S (M/sqrt(d) - c)) with d the determinant, c = cos(angle), C = cos(j angle) and
+    S = sin(j angle)/sin(angle); hyperbolic where the eigenvalues are real, j at the edge between.
+    """
+    turn = rotation(matrices)
+    j = np.asarray(steps).astype(np.longdouble)[:, None]
+    d = np.ones_like(turn.determinant) if area_preserving else turn.determinant
+    if np.any(d <= 0):
+        raise ValueError("a step that turns area over has no phase")
+    sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
+    x, g = turn.angle, turn.growth
+    one = np.ones_like(x)
+    with np.errstate(over="ignore", invalid="ignore"):
+        turning, growing = x != 0, g != 0
+        near = np.where(turning, np.cos(x), np.where(growing, turn.sign * np.cosh(g), turn.sign * one))
+        even = np.where(turning, np.cos(j * x), np.where(growing, sign * np.cosh(j * g), sign))
+        sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))
+        odd = np.where(
+            turning,
+            np.sin(j * x) / sine,
+            np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
+        )
+        root = np.sqrt(d)
+        size = np.exp(j / 2 * np.log(d))
+        a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
+        c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
+        return (
+            np.asarray(size * (even * y + odd * (a * y + b * v))),
+            np.asarray(size * (even * v + odd * (c * y + e * v))),
+        )
+
+
+def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
+    """How much j steps can enlarge one rounding a step: (sum over i < j of |M**i| / r**i, r**j).
+
+    r >= 1 is the spectral radius.  Norms are taken in energy coordinates (w y, v), w (n,) > 0, and the
+    worst mode counts; (f,) each.  At the edge of stability |M**i| grows with i, and the sum with j**2.
+    """
+    turn = rotation(matrices)
+    d = np.abs(turn.determinant)
+    root = np.sqrt(d)
+    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(turn.growth))
+    rest = np.stack(
+        [
+            np.stack([matrices[:, 0, 0] / root - near, w * matrices[:, 0, 1] / root], axis=-1),
+            np.stack([matrices[:, 1, 0] / w / root, matrices[:, 1, 1] / root - near], axis=-1),
+        ],
+        axis=-2,
+    )
+    size = np.sqrt(np.sum(rest * rest, axis=(-2, -1)))
+    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(turn.growth))
+    longest = np.where(sine > 0, 1 / np.where(sine > 0, sine, 1), np.inf)
+    radius = np.maximum(root * np.exp(turn.growth), 1)
+    j = np.asarray(steps).astype(np.longdouble)[:, None]
+    short = np.minimum(j, longest)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
+        total = np.max(j + size * np.maximum(ramp, 0), axis=-1)
+        grown = np.max(radius**j, axis=-1)
+    return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)

@@ -158,11 +158,14 @@ class Gather:
 
     def __init__(self, scene: Scene) -> None:
         size = scene.frames * (2 * scene.n + 2) * 8
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 1 << 33
+        memory = (
+            os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 1 << 33
+        )
         if size > memory // 2:
             raise SceneError(
-                f"scene {scene.name}: {scene.frames} frames of {scene.n} particles take {size / 1e9:.3g} GB, more "
-                "than half of this machine's memory; raise record.every, or let `springcheck run` stream to a file"
+                f"scene {scene.name}: {scene.frames} frames of {scene.n} particles take {size / 1e9:.3g} GB, "
+                "more than half of this machine's memory; raise record.every, or let `springcheck run` "
+                "stream to a file"
             )
         self._frames = 0
         self._t = np.empty(scene.frames)

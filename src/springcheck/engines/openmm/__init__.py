@@ -7,11 +7,9 @@ from springcheck.model import Method
 
 _TERMS = frozenset({"wall-spring", "spring"})
 
-_PLATFORMS = ("Reference", "CPU") + tuple(
-    f"{platform}{precision}"
-    for platform in ("OpenCL", "CUDA", "HIP")
-    for precision in ("", "-single", "-mixed", "-double")
-)
+_GPU = ("OpenCL", "CUDA", "HIP")
+_PRECISIONS = ("", "-single", "-mixed", "-double")
+_PLATFORMS = ("Reference", "CPU", *(name + precision for name in _GPU for precision in _PRECISIONS))
 
 
 def _method(name: str, scheme: str, about: str, *, rebuilds: bool = False) -> Method:

@@ -24,12 +24,17 @@ FIXED_POINT = 2.0**-32
 mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow near 2**31 above."""
 
 _PRECISIONS = {
-    "single": Arithmetic(name="single", state=2.0**-24, force=2.0**-24, quantum=FIXED_POINT, overflow=2.0**31),
-    "mixed": Arithmetic(name="mixed", state=2.0**-24, force=2.0**-24, quantum=FIXED_POINT, overflow=2.0**31),
-    "double": Arithmetic(
-        name="double, forces in fixed point", quantum=FIXED_POINT, overflow=2.0**31
-    ),
+    name: Arithmetic(
+        name=name, state=state, force=force, quantum=FIXED_POINT, overflow=2.0**31, parameters="single"
+    )
+    for name, state, force in (
+        ("single", 2.0**-24, 2.0**-24),
+        ("mixed", 2.0**-48, 2.0**-24),
+        ("double", 2.0**-53, 2.0**-53),
+    )
 }
+"""Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
+"mixed" keeps positions as a float and a float of correction, together 48 bits."""
 
 
 def version() -> dict[str, str]:

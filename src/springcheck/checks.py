@@ -1,0 +1,493 @@
+"""The checks: one function each, one number against one bound, and the bound's reason.
+
+A check looks at a recorded trajectory, or at a piece of one.  The first line of its docstring is its
+sentence in the report.  Bounds are formulas: roundings counted along one step, times what the map can
+make of them.  Values and bounds of the rounding checks are in units of one rounding of what was added
+up, so that "4.1 of 19" reads: four roundings were seen where nineteen take place.
+
+Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
+Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need
+the solution and holds for nonlinear scenes too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+
+from springcheck import exact, mechanics, schemes
+from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
+
+SMALLEST = np.longdouble(5e-324)
+"""What an operation can lose to underflow: one unit of a subnormal double."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A trajectory, or a piece of it, with what the checks share: computed at most once."""
+
+    trajectory: Trajectory
+    scene: Scene
+
+    @property
+    def scheme(self) -> schemes.Scheme:
+        """The scheme that the method claims to run."""
+        return schemes.SCHEMES[self.trajectory.scheme]
+
+    @cached_property
+    def judged(self) -> Scene:
+        """The scene with its parameters as the engine's arithmetic keeps them."""
+        single = self.trajectory.arithmetic.parameters == "single"
+        return mechanics.in_single(self.scene) if single else self.scene
+
+    @cached_property
+    def steps(self) -> Integers:
+        """The number of steps behind each frame."""
+        first = round(float(self.trajectory.t[0] / self.trajectory.step))
+        return first + np.arange(len(self.trajectory.t)) * self.trajectory.every
+
+    @cached_property
+    def linear(self) -> bool:
+        return mechanics.is_linear(self.scene)
+
+    @cached_property
+    def modes(self) -> exact.Modes:
+        return exact.modes(self.judged)
+
+    @cached_property
+    def matrices(self) -> Extended:
+        """One-step matrices of the modes, on (y, v)."""
+        one = np.ones(1, dtype=np.longdouble)
+        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2)
+
+    @cached_property
+    def w(self) -> Extended:
+        """Frequencies that scale mode positions to velocities; a free mode takes 1/duration."""
+        duration = abs(self.trajectory.step) * max(int(self.steps[-1]), 1)
+        w = np.sqrt(np.abs(self.modes.w2))
+        return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
+
+    @cached_property
+    def next_states(self) -> tuple[Extended, Extended]:
+        """The scheme's own next state after each frame but the last, in extended precision."""
+        q = self.trajectory.q[:-1].astype(np.longdouble)
+        p = self.trajectory.p[:-1].astype(np.longdouble)
+        return advance(self, q, p, self.trajectory.every)
+
+    @cached_property
+    def allowance(self) -> tuple[Extended, Extended]:
+        """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
+        run, scene = self.trajectory, self.judged
+        rounding = run.arithmetic
+        q, p = run.q[:-1].astype(np.longdouble), run.p[:-1].astype(np.longdouble)
+        h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+        sizes = mechanics.magnitude(scene.terms)
+        stiff = mechanics.stiffness(scene, scene.q) if self.scheme.implicit else None
+        size_q, size_p = schemes.magnitude_step(
+            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, stiffness=stiff
+        )
+        of_q, of_p = rounding.state * size_q, rounding.state * size_p
+        extra = np.zeros_like(p)
+        if rounding.force > rounding.state:
+            extra += rounding.force * h * sizes(np.abs(q), np.abs(p))
+        if rounding.quantum:
+            extra += rounding.quantum * h
+        if run.rebuilds_velocity:
+            extra += rounding.state * m * (np.abs(q) + size_q) / h
+        return of_q + h / m * extra + SMALLEST, of_p + extra + SMALLEST
+
+    @cached_property
+    def norm(self) -> mechanics.Norm:
+        return mechanics.norm(self.judged)
+
+    @cached_property
+    def rounding(self) -> float:
+        """The largest allowance of a step in the norm of errors, up to each frame (f-1,)."""
+        return float(np.max(self.norm(*self.allowance)))
+
+    @property
+    def roundings(self) -> int:
+        """Roundings along one step."""
+        return schemes.roundings(self.scheme)
+
+    def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
+        """Passed only if the value is a number within the bound."""
+        return Verdict(
+            method=self.trajectory.label,
+            check=check,
+            value=value,
+            bound=bound,
+            unit=unit,
+            passed=bool(value <= bound),
+            why=why,
+        )
+
+    def not_applicable(self, check: str, why: str) -> Verdict:
+        """Reported as what it is, never as passed."""
+        return Verdict(
+            method=self.trajectory.label,
+            check=check,
+            value=float("nan"),
+            bound=float("nan"),
+            unit="",
+            passed=None,
+            why=why,
+        )
+
+
+def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:
+    """So many steps of the scheme from states (f, n), in extended precision."""
+    scene = case.judged
+    force = mechanics.force(scene.terms)
+    m = scene.m.astype(np.longdouble)
+    a: Reals = q
+    b: Reals = p
+    stiff = mechanics.stiffness(scene, scene.q) if case.scheme.implicit else None
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(steps):
+            a, b = schemes.step(case.scheme, a, b, h=case.trajectory.step, m=m, force=force, stiffness=stiff)
+    return np.asarray(a), np.asarray(b)
+
+
+Check: TypeAlias = Callable[[Case], Verdict]
+
+
+def _no_map(case: Case) -> str | None:
+    """Why a check of the scheme's one-step map does not apply, or None."""
+    if not case.scheme.one_step:
+        return "an adaptive solver has no one-step map; it is judged by its tolerance"
+    if len(case.trajectory.t) < 2:
+        return "there is no second frame"
+    return None
+
+
+def start(case: Case) -> Verdict:
+    """Row 0 is the start, exactly."""
+    run, scene = case.trajectory, case.scene
+    if case.steps[0] != 0:
+        return case.not_applicable("start", "this piece does not hold the start")
+    value = float(max(np.max(np.abs(run.q[0] - scene.q)), np.max(np.abs(run.p[0] - scene.p))))
+    return case.verdict("start", value, 0.0, "", "the start is recorded, not computed")
+
+
+def times(case: Case) -> Verdict:
+    """Times are the number of steps times the step, rounded once."""
+    run = case.trajectory
+    value = float(np.max(np.abs(run.t - case.steps * run.step)))
+    return case.verdict("times", value, 0.0, "T", "one product, no accumulation")
+
+
+def line(case: Case) -> Verdict:
+    """y and z stay exactly 0."""
+    off = case.trajectory.off_axis
+    if off is None:
+        return case.not_applicable("line", "the engine moves along a line only")
+    return case.verdict("line", off, 0.0, "L", "every force along y and z is a product with 0")
+
+
+def step_defect(case: Case) -> Verdict:
+    """Each step is the scheme's own step, to rounding."""
+    why_not = _no_map(case)
+    if why_not:
+        return case.not_applicable("step-defect", why_not)
+    run = case.trajectory
+    q, p = case.next_states
+    dq, dp = np.abs(q - run.q[1:]), np.abs(p - run.p[1:])
+    of_q, of_p = case.allowance
+    if run.every == 1:
+        value = float(max(np.max(dq / of_q), np.max(dp / of_p)))
+        return case.verdict(
+            "step-defect",
+            value,
+            float(case.roundings),
+            "roundings",
+            f"roundings along one step of {case.scheme.title}; does not grow with the run",
+        )
+    bound = case.roundings * _amplified(case, run.every)
+    sizes = case.norm(dq, dp), case.norm(of_q, of_p)
+    value = float(np.max(sizes[0] / np.max(sizes[1])))
+    return case.verdict(
+        "step-defect",
+        value,
+        bound,
+        "roundings",
+        f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run",
+    )
+
+
+def _amplified(case: Case, steps: int) -> float:
+    """What the map can make of one rounding a step in so many steps."""
+    if case.linear:
+        total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
+        return float(total[0] * grown[0])
+    h = abs(case.trajectory.step)
+    span = np.max(np.abs(case.trajectory.q), axis=0)
+    stiff = np.abs(mechanics.stiffness(case.judged, span)) / case.judged.m
+    growth = 1 + h * float(np.sqrt(np.max(np.sum(stiff, axis=1))))
+    return float((growth**steps - 1) / (growth - 1)) if growth > 1 else float(steps)
+
+
+def _closed(case: Case) -> str | None:
+    reason = _no_map(case)
+    if reason:
+        return reason
+    if not case.linear:
+        return "an anharmonic scene's discrete motion has no closed form"
+    if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
+        return "a mode under a constant pull has no closed form here"
+    if np.any(schemes.rotation(case.matrices).determinant <= 0):
+        return "the step turns area over: it has no phase"
+    return None
+
+
+def closed_states(case: Case) -> tuple[Extended, Extended]:
+    """The scheme's closed-form motion at the frames: mode coordinates about their centres, (f, n) each."""
+    y, v = case.modes.into(case.scene.q, case.scene.p)
+    return schemes.propagate(
+        case.matrices, y - case.modes.centre(), v, case.steps, area_preserving=case.scheme.symplectic
+    )
+
+
+def growth_bound(case: Case) -> tuple[Floats, Floats]:
+    """Bound on the distance from the closed form at each frame, in units of one rounding, and that unit.
+
+    One rounding a step, enlarged by the map from the step where it arises, and all of one sign.
+    """
+    total, grown = schemes.amplification(case.matrices, case.w, case.steps)
+    size = case.norm(*case.allowance)
+    size = np.maximum.accumulate(np.concatenate([size[:1], size]))
+    unit = np.maximum(size, np.asarray(size[0] * grown, np.float64))
+    return np.asarray(case.roundings * total), np.asarray(unit)
+
+
+def closed_form(case: Case) -> Verdict:
+    """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
+    why_not = _closed(case)
+    if why_not:
+        return case.not_applicable("closed-form", why_not)
+    y, v = closed_states(case)
+    q, p = case.modes.out_of(y + case.modes.centre(), v)
+    distance = case.norm(case.trajectory.q - q, case.trajectory.p - p)
+    bound, unit = growth_bound(case)
+    late = case.steps > 0
+    ratio = np.where(late, distance / unit / np.where(late, bound, 1), 0)
+    worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+    return case.verdict(
+        "closed-form",
+        float(distance[worst] / unit[worst]),
+        float(bound[worst]),
+        "roundings",
+        f"one rounding of each of {case.steps[worst]} steps, carried on by the map, all of one sign",
+    )
+
+
+def shadow_energy(case: Case) -> Verdict:
+    """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
+    why_not = _closed(case)
+    if why_not:
+        return case.not_applicable("shadow-energy", why_not)
+    run = case.trajectory
+    form = schemes.invariant(case.matrices, h=run.step)
+    y, v = case.modes.into(run.q, run.p)
+    u = y - case.modes.centre()
+    stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
+    turn = schemes.rotation(case.matrices)
+    factor = np.ones_like(turn.determinant) if case.scheme.symplectic else turn.determinant
+    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.modes.centre()
+    first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
+    expected = first * factor ** case.steps[:, None].astype(np.longdouble)
+    # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
+    shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
+    _, unit = growth_bound(case)
+    size = np.maximum.accumulate(case.norm(run.q - _rest(case), run.p))
+    scale = 2 * shape * size * unit * np.longdouble(case.norm.unit) ** 2
+    off = np.max(np.abs(stored - expected), axis=1)
+    late = case.steps > 0
+    seen = np.where(late, off / np.where(scale > 0, scale, 1), 0)
+    limit = np.where(late, case.roundings * np.maximum(case.steps, 1), 1)
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
+    return case.verdict(
+        "shadow-energy",
+        float(seen[worst]),
+        float(limit[worst]),
+        "roundings",
+        f"{case.steps[worst]} steps, each rounded {case.roundings} times, all of one sign",
+    )
+
+
+def _rest(case: Case) -> Floats:
+    q, _ = case.modes.out_of(case.modes.centre(), np.zeros_like(case.modes.w2))
+    return np.asarray(q, np.float64)
+
+
+def frequency(case: Case) -> Verdict:
+    """The phase turns by the scheme's own frequency, to rounding."""
+    why_not = _closed(case)
+    if why_not:
+        return case.not_applicable("frequency", why_not)
+    turn = schemes.rotation(case.matrices)
+    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.modes.centre()
+    strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
+    j = int(np.argmax(strength))
+    if strength[j] <= 0:
+        return case.not_applicable("frequency", "no mode oscillates")
+    form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
+    y, v = case.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
+    steps = int(case.steps[-1])
+    if steps == 0:
+        return case.not_applicable("frequency", "nothing has moved yet")
+    # in the coordinates of the invariant form a step is a plain rotation by -angle
+    phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
+    backwards = -1 if case.trajectory.step < 0 else 1
+    expected = backwards * turn.angle[j] * np.longdouble(steps)
+    off = phase - expected
+    off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
+    off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
+    bound, unit = growth_bound(case)
+    amplitude = case.norm(case.trajectory.q - _rest(case), case.trajectory.p)[-1]
+    mode = abs(float(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j])))
+    whole = float(case.norm.unit) * np.sqrt(2) * amplitude
+    # an error e of a state of size z turns its phase by e/z, times the shape of the invariant ellipse
+    shape = float(
+        (np.abs(form[0]) / case.w[j] ** 2 + abs(form[1]) / case.w[j] + abs(form[2]))
+        / abs(np.sqrt(np.abs(form[0] * form[2] - form[1] ** 2 / 4)) / case.w[j])
+    )
+    limit = float(bound[-1] * unit[-1] / amplitude * (whole / mode) * shape / abs(expected))
+    true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
+    return case.verdict(
+        "frequency",
+        float(abs(off) / abs(expected)),
+        limit,
+        "relative",
+        f"the closed form's bound as an angle; the scheme itself is off the true frequency by {true:.2e}",
+    )
+
+
+_LOW_TWO_PI = 2 * (np.longdouble("3.14159265358979323846264338327950288") - np.longdouble(np.pi))
+"""What the double 2 pi lacks."""
+
+
+def _phase(form: Extended, u: np.longdouble, v: np.longdouble) -> np.longdouble:
+    x = np.sqrt(np.abs(form[0] - form[1] ** 2 / (4 * form[2]))) * u
+    y = np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
+    return np.longdouble(np.arctan2(-y, x))
+
+
+def momentum(case: Case) -> Verdict:
+    """Nothing outside pulls, so the total momentum stays."""
+    if any(term.bodies == 1 for term in case.scene.terms):
+        return case.not_applicable("momentum", "walls or wells take up momentum")
+    if not case.scheme.one_step:
+        return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
+    run = case.trajectory
+    total = np.sum(run.p.astype(np.longdouble), axis=1)
+    off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
+    _, of_p = case.allowance
+    unit = np.maximum.accumulate(np.sum(of_p, axis=1))
+    limit = case.roundings * case.steps[1:].astype(np.float64)
+    seen = np.asarray(off[1:] / unit, np.float64)
+    worst = int(np.argmax(seen / limit))
+    return case.verdict(
+        "momentum",
+        float(seen[worst]),
+        float(limit[worst]),
+        "roundings",
+        f"forces cancel in pairs; {case.steps[worst + 1]} steps, each rounded, all of one sign",
+    )
+
+
+def energies(case: Case) -> Verdict:
+    """Stored energies are those of the stored states, bit for bit."""
+    run = case.trajectory
+    if run.energy is None:
+        return case.not_applicable("energies", "the scene keeps no energies")
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        again = np.asarray(mechanics.energy(case.scene, run.q, run.p), np.float64)
+    same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
+    value = float(np.count_nonzero(~same))
+    return case.verdict("energies", value, 0.0, "frames", "one formula, one order of operations")
+
+
+def tolerance(case: Case) -> Verdict:
+    """The error of an adaptive solver is what its tolerance allows."""
+    run = case.trajectory
+    if case.scheme.one_step or run.tolerance is None:
+        return case.not_applicable("tolerance", "a method of fixed step has no tolerance")
+    if not exact.has_true_motion(case.scene):
+        return case.not_applicable("tolerance", "the true motion of this scene has no closed form")
+    q, p = exact.true_motion(case.scene, case.steps, run.step)
+    value = float(np.max(case.norm(run.q - q, run.p - p)))
+    growth = 1.0
+    if np.any(case.modes.w2 <= 0):
+        fastest = float(np.sqrt(np.max(np.where(case.modes.w2 < 0, -case.modes.w2, 0))))
+        growth = float(np.exp(min(fastest * abs(float(run.t[-1])), 700.0))) * max(abs(float(run.t[-1])), 1.0)
+    bound = run.tolerance * run.force_calls * np.sqrt(8 * case.scene.n) * growth
+    return case.verdict(
+        "tolerance",
+        value,
+        float(bound),
+        "of the start",
+        f"{run.tolerance:g} a step of every component, at most {run.force_calls} internal steps",
+    )
+
+
+def arithmetic(case: Case) -> Verdict:
+    """The size of the step defect is that of the arithmetic the method says it has."""
+    why_not = _no_map(case)
+    if why_not:
+        return case.not_applicable("arithmetic", why_not)
+    named = case.trajectory.arithmetic
+    if named.state <= 2.0**-53 and named.force <= 2.0**-53 and not named.quantum:
+        return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
+    seen = step_defect(case)
+    floor = 2.0**-8
+    return Verdict(
+        method=seen.method,
+        check="arithmetic",
+        value=seen.value,
+        bound=seen.bound,
+        unit=seen.unit,
+        passed=bool(floor <= seen.value <= seen.bound),
+        why=f"{named.name} precision: a value above is worse arithmetic, one below 2**-8 is better",
+    )
+
+
+CHECKS: tuple[Check, ...] = (
+    start,
+    times,
+    line,
+    step_defect,
+    arithmetic,
+    closed_form,
+    shadow_energy,
+    frequency,
+    momentum,
+    energies,
+    tolerance,
+)
+
+
+def judge(scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS) -> list[Verdict]:
+    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None."""
+    case = Case(trajectory=trajectory, scene=scene)
+    return [check(case) for check in checks]
+
+
+def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
+    """Of the verdicts on the pieces of one trajectory, the worst of each check."""
+    out: list[Verdict] = []
+    for same in zip(*pieces, strict=True):
+        judged = [verdict for verdict in same if verdict.passed is not None]
+        out.append(max(judged, key=_badness) if judged else same[0])
+    return out
+
+
+def _badness(verdict: Verdict) -> tuple[bool, float]:
+    ratio = verdict.value / verdict.bound if verdict.bound else verdict.value
+    return (not verdict.passed, ratio if np.isfinite(ratio) else np.inf)
