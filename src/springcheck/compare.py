@@ -1,0 +1,102 @@
+"""Which trajectories are the same motion, and how closely: differences of every pair, over all frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck import checks, exact, mechanics
+from springcheck.model import Extended, Floats, Scene, Trajectory
+
+EXACT = "exact"
+"""The label of the true motion among the others."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """Largest difference of each pair over all frames, in units of the start (`mechanics.Norm`).
+
+    max_difference (l, l), symmetric; NaN where one of the two runs did not complete.
+    """
+
+    labels: tuple[str, ...]
+    max_difference: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Same:
+    """Trajectories that are one motion: no pair of neighbours differs by more than `allowed`."""
+
+    labels: tuple[str, ...]
+    difference: float
+    allowed: float
+
+
+def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
+    """Compare trajectories, or pieces of them over the same frames, with each other and the true motion."""
+    norm = mechanics.norm(scene)
+    states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
+    longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)
+    if longest is not None and exact.has_true_motion(scene):
+        steps = checks.Case(trajectory=longest, scene=scene).steps
+        states[EXACT] = exact.true_motion(scene, steps, longest.step)
+    frames = len(longest.t) if longest is not None else 0
+    states.update((label, (piece.q, piece.p)) for label, piece in pieces.items())
+    labels = tuple(states)
+    out = np.zeros((len(labels), len(labels)))
+    for i, a in enumerate(labels):
+        for j, b in enumerate(labels[:i]):
+            (qa, pa), (qb, pb) = states[a], states[b]
+            whole = len(qa) == len(qb) == frames
+            out[i, j] = out[j, i] = np.max(norm(qa - qb, pa - pb)) if whole else np.nan
+    return Comparison(labels=labels, max_difference=out)
+
+
+def merge(comparisons: Sequence[Comparison]) -> Comparison:
+    """The comparison of whole trajectories from those of their pieces."""
+    worst = np.max([comparison.max_difference for comparison in comparisons], axis=0)
+    return Comparison(labels=comparisons[0].labels, max_difference=np.asarray(worst))
+
+
+def allowed(scene: Scene, trajectory: Trajectory) -> float:
+    """How far rounding, or the tolerance, may take a trajectory from the motion that it stands for."""
+    case = checks.Case(trajectory=trajectory, scene=scene)
+    if not case.scheme.one_step:
+        return checks.tolerance_bound(case)
+    if len(trajectory.t) < 2:
+        return 0.0
+    if case.linear:
+        bound, unit = checks.growth_bound(case)
+        return float(np.max(bound * unit))
+    # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
+    steps = float(case.steps[-1])
+    return case.roundings * case.rounding * steps * (1 + steps * checks.fastest(case) * abs(trajectory.step) / 2)
+
+
+def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:
+    """Groups of trajectories whose differences rounding and tolerances explain, largest group first."""
+    limits = {EXACT: 0.0} | {label: allowed(scene, run) for label, run in trajectories.items()}
+    labels = comparison.labels
+    limit = np.array([limits[label] for label in labels])
+    bounds = limit[:, None] + limit[None, :]
+    near = comparison.max_difference <= bounds
+    groups: list[set[int]] = []
+    for i in range(len(labels)):
+        joined = [group for group in groups if any(near[i, j] for j in group)]
+        groups = [group for group in groups if group not in joined] + [{i}.union(*joined)]
+    found = []
+    for group in groups:
+        if len(group) < 2:
+            continue
+        members = sorted(group)
+        block = np.ix_(members, members)
+        found.append(
+            Same(
+                labels=tuple(labels[i] for i in members),
+                difference=float(np.max(comparison.max_difference[block])),
+                allowed=float(np.max(bounds[block])),
+            )
+        )
+    return sorted(found, key=lambda same: -len(same.labels))
