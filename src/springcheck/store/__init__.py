@@ -1,0 +1,59 @@
+"""The HDF5 store: trajectories, verdicts and studies of one scene in one file; alone imports h5py.
+
+Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `read`, `windows`, `strided`,
+`summary`, `read_tables`, `verdicts`, `comparison`.
+"""
+
+from springcheck.store.checking import Finding, check
+from springcheck.store.draft import Draft
+from springcheck.store.exporting import export
+from springcheck.store.files import room
+from springcheck.store.foreign import Foreign, read_foreign
+from springcheck.store.journal import Journal, open_new
+from springcheck.store.layout import size
+from springcheck.store.reading import (
+    Run,
+    Summary,
+    attributes,
+    comparison,
+    document,
+    read,
+    read_one,
+    read_tables,
+    scene_text,
+    sources,
+    strided,
+    summary,
+    verdicts,
+    windows,
+)
+from springcheck.store.tables import Comparison, Table
+
+__all__ = [
+    "Comparison",
+    "Draft",
+    "Finding",
+    "Foreign",
+    "Journal",
+    "Run",
+    "Summary",
+    "Table",
+    "attributes",
+    "check",
+    "comparison",
+    "document",
+    "export",
+    "open_new",
+    "read",
+    "read_foreign",
+    "read_one",
+    "read_tables",
+    "room",
+    "scene_text",
+    "size",
+    "sources",
+    "strided",
+    "summary",
+    "verdicts",
+    "windows",
+]

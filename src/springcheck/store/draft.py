@@ -1,0 +1,221 @@
+"""One trajectory on its way to the disk: any length in bounded memory.
+
+The arrays are laid out in an HDF5 file first and filled past libhdf5, at their offsets, by a few threads
+that hash what they write.  A run that stops early is laid out again at the length that it reached.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from springcheck.model import Floats, Scene
+from springcheck.store import files, layout, seal
+from springcheck.store.layout import Column, Scalar
+
+BUFFER = 1 << 22
+"""Bytes that one array collects before they are written."""
+
+
+class Draft:
+    """A streaming writer of one trajectory; a context that leaves nothing behind without `finish`."""
+
+    def __init__(self, path: Path, label: str, scene: Scene, *, sequence: int = 0) -> None:
+        """`path` is where the finished part goes; `sequence` is the label's place in the store."""
+        layout.check_label(label)
+        self.path, self.label, self.scene, self.sequence = path, label, scene, sequence
+        self.rows = 0
+        self._written = 0
+        self._temporary = path.with_name(path.name + ".new")
+        self._columns = layout.columns(label, scene, scene.frames)
+        self._hash = {name: hashlib.sha256() for name in self._columns}
+        widest = max(column.size for column in self._columns.values()) // scene.frames
+        length = max(1, min(scene.frames, BUFFER // widest))
+        self._buffer = {
+            name: np.empty((length, *column.shape[1:]), column.dtype)
+            for name, column in self._columns.items()
+        }
+        self._held, self._length = 0, length
+        self._offsets: dict[str, int] = {}
+        self._file: Any = None
+        self._threads: ThreadPoolExecutor | None = None
+
+    def append(self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None) -> None:
+        """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies.
+
+        What the scene does not keep is not looked at.  Raises StoreError when the disk is full.
+        """
+        given: dict[str, Floats | None] = {"time": t, "q": q, "p": p, "energy": energy}
+        f = len(t)
+        for name, values in given.items():
+            if name in self._columns:
+                expected = (f, *self._columns[name].shape[1:])
+                if values is None or values.shape != expected:
+                    found = None if values is None else values.shape
+                    raise ValueError(f"{name} of {self.label}: shape {found}, not {expected}")
+        if self.rows + f > self.scene.frames:
+            raise ValueError(f"{self.label}: more than the scene's {self.scene.frames} frames")
+        done = 0
+        while done < f:
+            count = min(f - done, self._length - self._held)
+            rows, into = slice(done, done + count), slice(self._held, self._held + count)
+            for name, values in given.items():
+                if name in self._columns and values is not None:
+                    self._buffer[name][into] = values[rows]
+            if "velocity" in self._columns:
+                np.divide(p[rows], self.scene.m, out=self._buffer["velocity"][into])
+            first = self.rows + done
+            self._buffer["step"][into] = np.arange(first, first + count) * self.scene.every
+            self._held += count
+            done += count
+            if self._held == self._length:
+                self._flush()
+        self.rows += f
+
+    def finish(self, attributes: Mapping[str, Scalar | None]) -> str:
+        """Complete the part and put it into the journal -> the digest of its numbers.
+
+        Once this returns, the trajectory outlives crashes of program and machine.  None is left out.
+        """
+        if self.rows == 0:
+            raise ValueError(f"{self.label}: a trajectory without frames")
+        with files.told(self.path.parent, "write into"):
+            if self._file is None:
+                self._create(self.rows)
+            self._flush()
+            self._close()
+            if self.rows < self._columns["time"].shape[0]:
+                self._shorten()
+            digest = self._complete(attributes)
+            files.put(self._temporary, self.path)
+        return digest
+
+    def _create(self, frames: int) -> None:
+        self._columns = layout.columns(self.label, self.scene, frames)
+        self._offsets = _lay_out(self._temporary, self.label, self.scene, frames, self._columns)
+        self._file = self._temporary.open("rb+", buffering=0)
+
+    def _flush(self) -> None:
+        if not self._held:
+            return
+        with files.told(self.path.parent, "write into"):
+            if self._file is None:
+                self._create(self.scene.frames)
+            first = self._written
+            filled = {name: buffer[: self._held] for name, buffer in self._buffer.items()}
+            if self._held == self._length < self.scene.frames:
+                if self._threads is None:
+                    self._threads = ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1))
+                list(self._threads.map(lambda name: self._write(name, filled[name], first), filled))
+            else:
+                for name, values in filled.items():
+                    self._write(name, values, first)
+        self._written += self._held
+        self._held = 0
+
+    def _write(self, name: str, values: np.ndarray, first: int) -> None:
+        self._hash[name].update(values.data)
+        row = values[0].nbytes
+        view = values.data.cast("B")
+        offset = self._offsets[name] + first * row
+        while view:
+            count = os.pwrite(self._file.fileno(), view, offset)
+            view, offset = view[count:], offset + count
+
+    def _shorten(self) -> None:
+        long, offsets = self._temporary.with_name(self._temporary.name + ".long"), self._offsets
+        self._temporary.replace(long)
+        try:
+            self._create(self.rows)
+            with long.open("rb") as source:
+                for name, column in self._columns.items():
+                    self._file.seek(self._offsets[name])
+                    for block in seal.blocks(source, offsets[name], column.size):
+                        self._file.write(block)
+            self._close()
+        finally:
+            long.unlink(missing_ok=True)
+
+    def _complete(self, attributes: Mapping[str, Scalar | None]) -> str:
+        digests = {name: total.hexdigest() for name, total in self._hash.items()}
+        digest = combined(digests, self._columns)
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        with h5py.File(self._temporary, "r+", libver=layout.LIBVER, locking=False) as file:
+            layout.begin(file, {"part": self.label})
+            parameters = file.create_group(f"parameters/{self.label}")
+            given = {name: value for name, value in attributes.items() if value is not None}
+            known: dict[str, Scalar] = {
+                "scene": self.scene.text,
+                "scene_name": self.scene.name,
+                "units": self.scene.units,
+                "kind": self.scene.kind,
+                "frames": self.rows,
+                "particles": self.scene.n,
+                "quantities": " ".join(n for n in ("q", "p", "energy") if n in self._columns),
+                "sequence": self.sequence,
+                "finished": now,
+                "sha256": digest,
+            }
+            layout.write_attributes(parameters, {**layout.machine(), **given, **known})
+            for name, column in self._columns.items():
+                layout.write_attributes(file[column.path], {"sha256": digests[name]})
+        extents = [
+            seal.Extent(name=column.path, offset=self._offsets[name], size=column.size, sha256=digests[name])
+            for name, column in self._columns.items()
+        ]
+        seal.attach(self._temporary, extents)
+        return digest
+
+    def _close(self) -> None:
+        if self._threads is not None:
+            self._threads.shutdown()
+            self._threads = None
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def __enter__(self) -> Draft:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close()
+        with contextlib.suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
+
+
+def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
+    """The digest of a trajectory: sha256 over the sha256 of time, q, p and energy, with their shapes.
+
+    Little-endian float64, nothing of clock or machine: equal exactly when two runs agree bit for bit.
+    """
+    lines = [
+        f"{name} {columns[name].shape} {digests[name]}"
+        for name in ("time", "q", "p", "energy")
+        if name in digests
+    ]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def _lay_out(
+    path: Path, label: str, scene: Scene, frames: int, columns: Mapping[str, Column]
+) -> dict[str, int]:
+    total = sum(column.size for column in columns.values())
+    files.room(path, total + layout.MARGIN)
+    path.unlink(missing_ok=True)
+    with h5py.File(path, "x", libver=layout.LIBVER, locking=False) as file:
+        offsets = layout.skeleton(file, label, scene, frames)
+    with path.open("rb+") as file:
+        files.reserve(file, file.seek(0, os.SEEK_END) + layout.MARGIN + len(scene.text.encode()))
+    return offsets

@@ -1,0 +1,186 @@
+"""The journal of a store that is being written: nothing that was reported is ever lost.
+
+Finished trajectories and tables are files of their own in ``<file>.parts/``, put there by os.replace and
+fsync.  `Journal.commit` writes a whole new collection of what the last one held and of the parts, checks
+the digests, puts it in place by os.replace, and only then removes the parts.  No file that holds reported
+numbers is ever changed.  Whoever is killed anywhere in this finds everything on starting again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import uuid
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from urllib.parse import quote
+
+from springcheck.errors import StoreError
+from springcheck.model import Scene, Trajectory, Verdict
+from springcheck.store import files, layout, merge, reading, tables
+from springcheck.store.draft import Draft
+from springcheck.store.layout import Scalar
+from springcheck.store.reading import Parts, parts_folder
+from springcheck.store.tables import Comparison, Table
+
+
+def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
+    """Start to write a store, or take up one that the same command left unfinished.
+
+    `command` says all that decides the results (scene text, methods, options): it is how a journal is
+    recognised.  Raises StoreError when the path exists and is no unfinished store of this command
+    (`force` starts over; the old file stays until the new one is complete), when another process is
+    writing it, and when the folder is missing or cannot be written.
+    """
+    path = Path(path)
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise StoreError(f"cannot write {path}: there is no folder {folder}")
+    if path.is_dir():
+        raise StoreError(f"cannot write {path}: it is a folder")
+    parts = parts_folder(path)
+    if path.exists() and not force and not parts.is_dir():
+        raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
+    with files.told(folder, "write into"):
+        parts.mkdir(exist_ok=True)
+        lock = files.Lock(parts / "lock")
+    try:
+        with files.told(parts, "write into"):
+            run = _claim(path, parts, command, force=force)
+    except BaseException:
+        _leave(parts)
+        lock.release()
+        raise
+    return Journal(path, run, lock)
+
+
+def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
+    """The run id of the journal that is taken up or started."""
+    known = reading.claim(parts)
+    if known is not None and not force:
+        if known["command"] == command:
+            for left in parts.glob("*.new*"):
+                left.unlink()
+            return known["run"]
+        raise StoreError(
+            f"{parts} holds finished work of another command: give that command again to complete it, "
+            "or --force to discard it"
+        )
+    if path.exists() and not force:
+        raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
+    for old in parts.iterdir():
+        if old.name != "lock":
+            old.unlink()
+    run = uuid.uuid4().hex
+    files.put_bytes(json.dumps({"run": run, "command": command}).encode(), parts / "command")
+    files.sync_folder(path.absolute().parent)
+    return run
+
+
+def _leave(parts: Path) -> None:
+    """Remove a journal that holds nothing but its lock."""
+    with contextlib.suppress(OSError):
+        if {entry.name for entry in parts.iterdir()} <= {"lock"}:
+            shutil.rmtree(parts)
+
+
+class Journal:
+    """The one writer of a store: drafts, tables, commits.  A context that gives its lock back."""
+
+    def __init__(self, path: Path, run: str, lock: files.Lock) -> None:
+        self.path, self.run = path, run
+        self.folder = parts_folder(path)
+        self._lock = lock
+        self._sequence = 0
+
+    def sources(self) -> dict[str, Path]:
+        """Label of each finished trajectory -> the file that holds it (part or collection)."""
+        return reading.sources(self.path, self.run)
+
+    def finished(self) -> tuple[str, ...]:
+        """Labels of the trajectories that are finished and need no second run."""
+        return tuple(self.sources())
+
+    def draft(self, label: str, scene: Scene) -> Draft:
+        """A writer of one trajectory (see `Draft`)."""
+        self._sequence = max(self._sequence, len(self.sources())) + 1
+        return Draft(self._part("run", label), label, scene, sequence=self._sequence)
+
+    def save(self, trajectory: Trajectory, scene: Scene) -> str:
+        """Store a trajectory that is at hand in full -> digest."""
+        with self.draft(trajectory.label, scene) as draft:
+            draft.append(trajectory.t, trajectory.q, trajectory.p, trajectory.energy)
+            return draft.finish(reading.attributes(trajectory))
+
+    def add(self, table: Table) -> None:
+        """Store one table; once this returns it outlives crashes."""
+        if table.name.split("/")[0] in layout.RESERVED:
+            raise ValueError(f"a table cannot be called {table.name!r}")
+        image = merge.image({"part": table.name}, [table])
+        with files.told(self.folder, "write into"):
+            files.put_bytes(image, self._part("table", table.name))
+
+    def tables(self) -> dict[str, Table]:
+        """The finished tables by name."""
+        return reading.read_tables(self.path, self.run)
+
+    def commit(
+        self,
+        scene: Scene | None = None,
+        *,
+        comparison: Comparison | None = None,
+        verdicts: Sequence[Verdict] = (),
+        documents: Mapping[str, str] | None = None,
+        attributes: Mapping[str, Scalar] | None = None,
+        final: bool = True,
+    ) -> None:
+        """Replace the collection by one that holds everything finished; `final` ends the journal.
+
+        Without `final` it is a checkpoint of a long study: fewer files in the journal, which goes on.
+        """
+        extra: list[Table] = []
+        if comparison is not None:
+            extra.append(tables.of_comparison(comparison))
+        if verdicts:
+            extra.append(tables.of_verdicts(verdicts))
+        root: dict[str, Scalar] = {"run": self.run, "complete": final, **(attributes or {})}
+        if scene is not None:
+            root |= {"scene": scene.text, "scene_name": scene.name, "units": scene.units}
+        found = Parts.of(self.path, self.run)
+        temporary = self.folder / "collection.new"
+        with files.told(self.path, "write"):
+            try:
+                merge.collection(temporary, found, root, extra, documents or {})
+                files.put(temporary, self.path)
+            finally:
+                temporary.unlink(missing_ok=True)
+            for part in found.parts:
+                part.unlink()
+            if final:
+                self._end()
+
+    def _end(self) -> None:
+        """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
+        (self.folder / "command").unlink()
+        shutil.rmtree(self.folder)
+
+    def _part(self, kind: str, name: str) -> Path:
+        return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
+
+    def close(self) -> None:
+        """Give the lock back; what is finished stays for the next one."""
+        if self.folder.is_dir():
+            with contextlib.suppress(OSError):
+                if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
+                    self._end()
+        self._lock.release()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,227 @@
+"""How trajectories lie in HDF5: H5MD 1.1 for molecular readers, NXdata attributes for silx and H5Web.
+
+::
+
+    /h5md                      version, author, creator, modules/units
+    /particles/<label>/        position and velocity (frames, n, 3), mass; scenes of particles only
+    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value}
+    /parameters/<label>        attributes: scene, method, versions, machine, outcome, digest
+    /comparison /verdicts      tables of one column per dataset
+    /plots                     NXentry of NXdata; root @default leads there
+
+The numbers are stored once, contiguous, as little-endian float64, and neither compressed nor chunked:
+trajectories are noise to gzip (validation/store_speed.py), and a contiguous array is written past
+libhdf5 at the speed of the disk.  /particles holds virtual datasets of three dimensions over them, whose
+y and z are a fill value, so it costs no bytes.  `time` and `step` are hard links to one array each.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import h5py
+import numpy as np
+
+from springcheck.errors import StoreError
+from springcheck.model import Scene
+
+Scalar: TypeAlias = str | float | int | bool
+
+FORMAT = "springcheck store 1"
+LIBVER = ("v110", "v110")
+"""Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
+
+MARGIN = 1 << 16
+"""Bytes taken up beyond the arrays, for groups and attributes."""
+CHUNK = 1 << 20
+"""Bytes of a chunk of an exported array."""
+
+RESERVED = ("h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "plots")
+_STRING = h5py.string_dtype("utf-8")
+
+_MD = {"q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u"}
+_SI = {"q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg"}
+_MD_ROTOR = {**_MD, "q": "rad", "p": "u nm2 ps-1", "velocity": "rad ps-1", "mass": "u nm2"}
+_SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass": "kg m2"}
+_SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
+_BARE = dict.fromkeys(_MD, "1")
+_UNITS: Mapping[tuple[str, str], Mapping[str, str]] = {
+    ("particles", "md"): _MD,
+    ("particles", "reduced"): _MD,
+    ("particles", "si"): _SI,
+    ("rotor", "md"): _MD_ROTOR,
+    ("rotor", "reduced"): _MD_ROTOR,
+    ("rotor", "si"): _SI_ROTOR,
+    ("circuit", "md"): _BARE,
+    ("circuit", "reduced"): _BARE,
+    ("circuit", "si"): _SI_CIRCUIT,
+}
+REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One array of a trajectory: HDF5 path, bytes per row, dtype."""
+
+    path: str
+    shape: tuple[int, ...]
+    dtype: str = "<f8"
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return int(np.prod(self.shape, dtype=object)) * np.dtype(self.dtype).itemsize
+
+
+def check_label(label: str) -> None:
+    """Raise StoreError for a label that cannot be the name of a group."""
+    if not label or "/" in label or label in {".", ".."} or "\0" in label:
+        raise StoreError(f"{label!r} cannot name a trajectory: no '/', '.', '..' and not empty")
+
+
+def units(scene: Scene) -> Mapping[str, str]:
+    """Unit strings of q, p, energy, velocity, time and mass."""
+    return _UNITS[scene.kind, scene.units]
+
+
+def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
+    """The arrays that a trajectory of this scene is made of, by short name."""
+    kept: list[str] = [name for name in ("q", "p", "energy") if name in scene.quantities]
+    if not kept:
+        raise StoreError(f"scene {scene.name!r} records nothing: ask for q, p or energy in [record]")
+    base = f"/observables/{label}"
+    wide: dict[str, tuple[int, ...]] = {"q": (frames, scene.n), "p": (frames, scene.n), "energy": (frames,)}
+    found: dict[str, Column] = {name: Column(path=f"{base}/{name}/value", shape=wide[name]) for name in kept}
+    if scene.kind == "particles" and "p" in kept and np.any(scene.m != 1):
+        found["velocity"] = Column(path=f"{base}/velocity/value", shape=wide["p"])
+    found["time"] = Column(path=f"{base}/{kept[0]}/time", shape=(frames,))
+    step = "<i4" if scene.steps < 2**31 else "<i8"
+    found["step"] = Column(path=f"{base}/{kept[0]}/step", shape=(frames,), dtype=step)
+    return found
+
+
+def size(scene: Scene) -> int:
+    """Bytes that one trajectory of a scene takes."""
+    return sum(column.size for column in columns("label", scene, scene.frames).values()) + 2**16
+
+
+def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
+    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them."""
+    for name, value in values.items():
+        if isinstance(value, str):
+            node.attrs.create(name, value.replace("\0", ""), dtype=_STRING)
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], str):
+            node.attrs.create(name, list(value), dtype=_STRING)
+        else:
+            node.attrs[name] = value
+
+
+def begin(file: Any, root: Mapping[str, Scalar]) -> None:
+    """The head of every file of ours: /h5md and what it is."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        ours = version("springcheck")
+    except PackageNotFoundError:
+        ours = "unknown"
+    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT, **root})
+    head = file.create_group("h5md")
+    head.attrs["version"] = np.array([1, 1], dtype=np.int32)
+    write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
+    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": ours})
+    head.create_group("modules/units").attrs["version"] = np.array([1, 0], dtype=np.int32)
+
+
+def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]:
+    """Create a trajectory's groups and arrays without their numbers -> offset of each array [B]."""
+    unit = units(scene)
+    found = columns(label, scene, frames)
+    base = file.create_group(f"observables/{label}")
+    if scene.units == "reduced":
+        write_attributes(base, {"units_are": REDUCED})
+    offsets = {name: _contiguous(file, column) for name, column in found.items()}
+    time, step = file[found["time"].path], file[found["step"].path]
+    write_attributes(time, {"unit": unit["time"], "units": unit["time"], "long_name": "t"})
+    for name in found:
+        if name in {"time", "step"}:
+            continue
+        element = file[f"observables/{label}/{name}"]
+        two = len(found[name].shape) == 2
+        axes = ["time", "."] if two else ["time"]
+        write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
+        write_attributes(
+            element["value"], {"unit": unit[name], "units": unit[name], "long_name": f"{name} of {label}"}
+        )
+        _link(element, time, step)
+    if scene.kind == "particles" and ("q" in found or "p" in found):
+        _particles(file, label, scene, found, frames)
+    return offsets
+
+
+def _contiguous(file: Any, column: Column) -> int:
+    group, name = column.path.rsplit("/", 1)
+    file.require_group(group)
+    how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    how.set_layout(h5py.h5d.CONTIGUOUS)
+    how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    kind = h5py.h5t.py_create(np.dtype(column.dtype))
+    space = h5py.h5s.create_simple(column.shape)
+    made = h5py.h5d.create(file[group].id, name.encode(), kind, space, how)
+    return int(made.get_offset())
+
+
+def _link(element: Any, time: Any, step: Any) -> None:
+    if "time" not in element:
+        element["time"], element["step"] = time, step
+
+
+def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column], frames: int) -> None:
+    unit = units(scene)
+    group = file.create_group(f"particles/{label}")
+    box = group.create_group("box")
+    box.attrs["dimension"] = 3
+    write_attributes(box, {"boundary": ["none"] * 3})
+    time, step = file[found["time"].path], file[found["step"].path]
+    for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
+        if source not in found:
+            continue
+        element = group.create_group(name)
+        view = h5py.VirtualLayout((frames, scene.n, 3), "<f8")
+        view[:, :, 0] = h5py.VirtualSource(".", found[source].path, found[source].shape, "<f8")
+        element.create_virtual_dataset("value", view, fillvalue=0.0)
+        text = unit["q"] if name == "position" else unit["velocity"]
+        write_attributes(element["value"], {"unit": text, "units": text})
+        _link(element, time, step)
+    group["mass"] = scene.m.astype("<f8")
+    write_attributes(group["mass"], {"unit": unit["mass"], "units": unit["mass"]})
+
+
+def machine() -> dict[str, Scalar]:
+    """What ran the program."""
+    return {
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "cores": os.cpu_count() or 0,
+        "system": platform.platform(),
+        "host": platform.node(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "hdf5": h5py.version.hdf5_version,
+    }
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"

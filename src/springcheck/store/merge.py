@@ -1,0 +1,163 @@
+"""A collection made of parts: copied object by object, checked against its digests, sealed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from springcheck.errors import StoreError
+from springcheck.store import files, layout, seal, tables
+from springcheck.store.layout import Scalar
+from springcheck.store.reading import Parts
+from springcheck.store.tables import Table
+
+_TREES = ("particles", "observables", "parameters")
+_INCOMING = "incoming"
+
+
+def collection(
+    path: Path,
+    found: Parts,
+    root: Mapping[str, Scalar],
+    extra: Sequence[Table],
+    documents: Mapping[str, str],
+) -> None:
+    """Write a sealed file of everything in `found`, of the tables in `extra` and of the documents."""
+    sources = found.parts + ([found.collection] if found.collection else [])
+    total = sum(source.stat().st_size for source in sources)
+    text = sum(len(document.encode()) for document in documents.values())
+    margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
+    files.room(path, total + margin)
+    path.unlink(missing_ok=True)
+    with h5py.File(path, "x", libver=layout.LIBVER, locking=False):
+        pass
+    with path.open("rb+") as file:
+        files.reserve(file, total + margin)
+    with h5py.File(path, "r+", libver=layout.LIBVER, locking=False) as file:
+        layout.begin(file, root)
+        for source in sources:
+            with h5py.File(source, "r", locking="best-effort") as part:
+                _take(file, part)
+        for table in extra:
+            tables.write(file, table)
+        for name, document in documents.items():
+            file.require_group("documents").create_dataset(
+                name, data=document, dtype=h5py.string_dtype("utf-8")
+            )
+        _plots(file)
+        extents = _extents(file)
+        _check_tables(file, path)
+    with path.open("rb") as file:
+        for extent in extents:
+            if seal.digest(file, extent.offset, extent.size) != extent.sha256:
+                raise StoreError(f"{extent.name} was damaged on its way into {path}: check disk and memory")
+    seal.attach(path, extents)
+
+
+def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
+    """A small sealed file of tables, as bytes."""
+    with h5py.File("image", "w", driver="core", backing_store=False, libver=layout.LIBVER) as file:
+        layout.begin(file, root)
+        for table in content:
+            tables.write(file, table)
+        file.flush()
+        body: bytes = file.id.get_file_image()
+    return seal.sealed(body)
+
+
+def _bytes(table: Table) -> int:
+    return sum(np.asarray(column).size * 64 for column in table.columns.values())
+
+
+def _take(file: Any, part: Any) -> None:
+    """Copy all trajectories and tables of a part that the file does not have yet.
+
+    One H5Ocopy of the whole part keeps the hard links of time and step; moving links costs nothing.
+    """
+    h5py.h5o.copy(part.id, b".", file.id, _INCOMING.encode())
+    incoming = file[_INCOMING]
+    for tree in _TREES:
+        for label in incoming.get(tree, ()):
+            target = f"{tree}/{label}"
+            if target not in file:
+                file.require_group(tree)
+                file.move(f"{_INCOMING}/{target}", target)
+    for name in list(tables.names(incoming)):
+        if name not in file:
+            if "/" in name:
+                file.require_group(name.rsplit("/", 1)[0])
+            file.move(f"{_INCOMING}/{name}", name)
+    del file[_INCOMING]
+
+
+def _extents(file: Any) -> list[seal.Extent]:
+    """Every recorded array, from its place in the file and the digest it carries."""
+    found: dict[int, seal.Extent] = {}
+    for label, elements in file.get("observables", {}).items():
+        for name, element in elements.items():
+            for kind in ("value", "time", "step"):
+                array = element[kind]
+                offset = array.id.get_offset()
+                found[offset] = found.get(offset) or seal.Extent(
+                    name=f"/observables/{label}/{name}/{kind}",
+                    offset=offset,
+                    size=array.size * array.dtype.itemsize,
+                    sha256=array.attrs["sha256"],
+                )
+    return list(found.values())
+
+
+def _check_tables(file: Any, path: Path) -> None:
+    for name in tables.names(file):
+        if tables.digest(file[name]) != file[name].attrs["sha256"]:
+            raise StoreError(f"table {name} was damaged on its way into {path}: check disk and memory")
+
+
+def _plots(file: Any) -> None:
+    """/plots: the first particle's q (or p), the energies, of all runs of the most common length."""
+    observables = file.get("observables", {})
+    plots = file.create_group("plots")
+    layout.write_attributes(plots, {"NX_class": "NXentry"})
+    made = [name for name in ("q", "p", "energy") if _plot(file, observables, plots, name)]
+    if made:
+        layout.write_attributes(plots, {"default": made[0]})
+        layout.write_attributes(file, {"default": "plots"})
+        return
+    drawn = [name for name in tables.names(file) if "signal" in file[name].attrs]
+    if drawn:
+        plots[drawn[0].replace("/", " ")] = h5py.SoftLink(f"/{drawn[0]}")
+        layout.write_attributes(plots, {"default": drawn[0].replace("/", " ")})
+        layout.write_attributes(file, {"default": "plots"})
+
+
+def _plot(file: Any, observables: Any, plots: Any, name: str) -> bool:
+    kept = {label: group[name] for label, group in observables.items() if name in group}
+    if not kept:
+        return False
+    order = sorted(kept, key=lambda label: file[f"parameters/{label}"].attrs.get("sequence", 0))
+    frames = max(len(kept[label]["value"]) for label in order)
+    curves = [label for label in order if len(kept[label]["value"]) == frames]
+    group = plots.create_group(name)
+    first = kept[curves[0]]
+    title = {"q": "q of the first particle", "p": "p of the first particle", "energy": "total energy"}[name]
+    layout.write_attributes(
+        group, {"NX_class": "NXdata", "signal": curves[0], "axes": ["time"], "title": title}
+    )
+    if len(curves) > 1:
+        layout.write_attributes(group, {"auxiliary_signals": curves[1:]})
+    group["time"] = h5py.SoftLink(f"{first.name}/time")
+    for label in curves:
+        value = kept[label]["value"]
+        if value.ndim == 1:
+            group[label] = h5py.SoftLink(value.name)
+            continue
+        view = h5py.VirtualLayout((frames,), "<f8")
+        view[:] = h5py.VirtualSource(".", value.name, value.shape, "<f8")[:, 0]
+        group.create_virtual_dataset(label, view)
+        unit = value.attrs["unit"]
+        layout.write_attributes(group[label], {"units": unit, "long_name": f"{name} of {label}"})
+    return True

@@ -1,0 +1,137 @@
+"""The seal at the end of every file of ours: every byte is accounted for, and checked without libhdf5.
+
+A file is HDF5 (libhdf5 ignores what follows its end), then a line of JSON, then a line of fixed length.
+The JSON lists the recorded arrays, which lie contiguous in the file, as name, offset, length and sha256,
+and the sha256 of all other bytes: groups, attributes, small tables.  So a reader knows within
+milliseconds that the structure of a file of many gigabytes is as it was written, before libhdf5 follows
+any address in it, and which array a flipped byte lies in.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+BLOCK = 1 << 22
+_FOOT = b"springcheck seal 1 %016d\n"
+_FOOT_SIZE = len(_FOOT % 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extent:
+    """One recorded array in a file: offset and size [B], sha256 of its bytes in hexadecimal."""
+
+    name: str
+    offset: int
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seal:
+    """What the bytes of a file were when it was written.  `end` is where HDF5 ends [B]."""
+
+    end: int
+    extents: tuple[Extent, ...]
+    rest: str
+
+
+def digest(file: BinaryIO, start: int, size: int) -> str:
+    """sha256 of a range of bytes, in bounded memory."""
+    total = hashlib.sha256()
+    for block in blocks(file, start, size):
+        total.update(block)
+    return total.hexdigest()
+
+
+def blocks(file: BinaryIO, start: int, size: int) -> Iterator[bytes]:
+    """The bytes of a range, block by block; stops early where the file ends."""
+    file.seek(start)
+    while size > 0:
+        block = file.read(min(BLOCK, size))
+        if not block:
+            return
+        size -= len(block)
+        yield block
+
+
+def gaps(extents: Iterable[Extent], end: int) -> Iterator[tuple[int, int]]:
+    """Offset and size of everything between the arrays."""
+    position = 0
+    for extent in sorted(extents, key=lambda extent: extent.offset):
+        if extent.offset > position:
+            yield position, extent.offset - position
+        position = max(position, extent.offset + extent.size)
+    if end > position:
+        yield position, end - position
+
+
+def rest(file: BinaryIO, extents: Iterable[Extent], end: int) -> str:
+    """sha256 of all bytes outside the arrays."""
+    total = hashlib.sha256()
+    for start, size in gaps(extents, end):
+        for block in blocks(file, start, size):
+            total.update(block)
+    return total.hexdigest()
+
+
+def attach(path: Path, extents: Iterable[Extent]) -> None:
+    """Seal a complete HDF5 file."""
+    kept = tuple(extents)
+    with path.open("rb+") as file:
+        end = file.seek(0, 2)
+        seal = Seal(end=end, extents=kept, rest=rest(file, kept, end))
+        file.seek(end)
+        file.write(encoded(seal))
+
+
+def sealed(body: bytes) -> bytes:
+    """A file without arrays, with its seal."""
+    return body + encoded(Seal(end=len(body), extents=(), rest=hashlib.sha256(body).hexdigest()))
+
+
+def encoded(seal: Seal) -> bytes:
+    """The two lines at the end of a file."""
+    line = b"\n" + json.dumps(asdict(seal), separators=(",", ":")).encode() + b"\n"
+    return line + _FOOT % len(line)
+
+
+def find(path: Path) -> Seal | None:
+    """The seal of a file; None where there is none that can be read.  OSError where the file cannot."""
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        if size < _FOOT_SIZE:
+            return None
+        file.seek(size - _FOOT_SIZE)
+        foot = file.read()
+        try:
+            length = int(foot[-17:])
+            if foot != _FOOT % length or not 0 < length <= size - _FOOT_SIZE:
+                return None
+            file.seek(size - _FOOT_SIZE - length)
+            found = json.loads(file.read(length))
+            extents = tuple(Extent(**extent) for extent in found["extents"])
+            seal = Seal(end=found["end"], extents=extents, rest=found["rest"])
+            if seal.end != size - _FOOT_SIZE - length or encoded(seal)[:-_FOOT_SIZE] != b"\n" + (
+                json.dumps(found, separators=(",", ":")).encode() + b"\n"
+            ):
+                return None
+        except (ValueError, KeyError, TypeError, OverflowError):
+            return None
+        return seal
+
+
+def is_whole(path: Path, seal: Seal) -> bool:
+    """Whether everything but the arrays is as it was sealed.  Milliseconds, however long the arrays."""
+    with path.open("rb") as file:
+        return rest(file, seal.extents, seal.end) == seal.rest
+
+
+def broken(path: Path, seal: Seal) -> list[str]:
+    """Names of the arrays whose bytes have changed since the file was sealed."""
+    with path.open("rb") as file:
+        return [e.name for e in seal.extents if digest(file, e.offset, e.size) != e.sha256]
