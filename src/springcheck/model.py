@@ -217,6 +217,17 @@ class Trajectory:
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """Largest difference of each pair of trajectories over all frames, (l, l), symmetric.
+
+    In units of the start (`mechanics.Norm`); NaN where one of the two runs did not complete.
+    """
+
+    labels: tuple[str, ...]
+    max_difference: Floats
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """One number against one bound.  `passed` is None where the check does not apply."""

@@ -104,7 +104,9 @@ def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
     axes = figure.add_subplot()
     truth = _truth(scene, groups)
     if truth is not None:
-        axes.plot(truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion")
+        axes.plot(
+            truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion"
+        )
     _overlay(axes, groups, lambda run: (run.q[:, 0], run.p[:, 0]))
     axes.plot(*[[float(x[0])] for x in (scene.q, scene.p)], "k+", markersize=10, label="start")
     axes.set_xlabel(f"{_q(scene)}{q_unit}")

@@ -18,12 +18,12 @@ from types import TracebackType
 from urllib.parse import quote
 
 from springcheck.errors import StoreError
-from springcheck.model import Scene, Trajectory, Verdict
+from springcheck.model import Comparison, Scene, Trajectory, Verdict
 from springcheck.store import files, layout, merge, reading, tables
 from springcheck.store.draft import Draft
 from springcheck.store.layout import Scalar
 from springcheck.store.reading import Parts, parts_folder
-from springcheck.store.tables import Comparison, Table
+from springcheck.store.tables import Table
 
 
 def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:

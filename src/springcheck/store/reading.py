@@ -15,10 +15,10 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.model import Arithmetic, Floats, Outcome, Timing, Trajectory, Verdict
+from springcheck.model import Arithmetic, Comparison, Floats, Outcome, Timing, Trajectory, Verdict
 from springcheck.store import files, seal, tables
 from springcheck.store.layout import Scalar
-from springcheck.store.tables import Comparison, Table
+from springcheck.store.tables import Table
 
 MAPPED = 1 << 26
 """Arrays larger than this [B] are mapped into memory, not read: their pages come when they are used."""
@@ -132,7 +132,9 @@ def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
         "force_roundoff": a.force,
         "force_quantum": a.quantum,
         "force_overflow": a.overflow,
+        "parameter_precision": a.parameters,
         "rebuilds_velocity": trajectory.rebuilds_velocity,
+        "off_axis": trajectory.off_axis,
         **origin,
     }
 
@@ -178,8 +180,10 @@ def _trajectory(
             force=float(known.get("force_roundoff", default.force)),
             quantum=float(known.get("force_quantum", default.quantum)),
             overflow=float(known.get("force_overflow", default.overflow)),
+            parameters=cast(Any, known.get("parameter_precision", default.parameters)),
         ),
         rebuilds_velocity=bool(known.get("rebuilds_velocity", False)),
+        off_axis=float(known["off_axis"]) if "off_axis" in known else None,
         origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
     )
 
