@@ -67,13 +67,24 @@ def stored_scene(path: Path) -> Scene:
 def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
     """The store as text."""
     summary = found.summary
-    root = summary.root
     out: report.Lines = [report.plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     if not summary.complete:
         out.append(report.plain("unfinished: the command that writes it has not ended", "bold red"))
-    for name in ("scene_name", "units", "created", "springcheck", "processor", "cores", "platform", "python"):
-        if name in root:
-            out.append(report.plain(f"  {name.replace('_name', '')}: {root[name]}"))
+    if summary.runs:
+        known = summary.runs[0].parameters
+        out.append(report.plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"))
+        out.append(
+            report.plain(
+                f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
+                f"{known.get('cores')} cores, {known.get('system')}"
+            )
+        )
+        out.append(
+            report.plain(
+                f"  python {known.get('python')}, numpy {known.get('numpy')}, "
+                f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
+            )
+        )
     out.append(_runs(summary))
     for name in summary.tables:
         out.append(report.plain(f"table {name}"))
@@ -86,7 +97,7 @@ def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
     if found.comparison is not None:
         out += [
             report.plain(),
-            report.plain("Largest difference from the first of each line, in units of the start:"),
+            report.plain("Largest differences, in units of the start:"),
         ]
         out.append(_comparison(found.comparison))
     if found.frames is not None:
@@ -111,19 +122,19 @@ def _runs(summary: store.Summary) -> Table:
             str(run.n),
             report.plain(str(known.get("outcome", ""))),
             report.plain(versions),
-            report.plain(str(known.get("digest", ""))[:12]),
+            report.plain(str(known.get("sha256", ""))[:12]),
         )
     return table
 
 
 def _comparison(comparison: Comparison) -> Table:
     table = report.grid()
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for i in range(len(comparison.labels)):
         table.add_column(str(i), justify="right")
     for i, label in enumerate(comparison.labels):
         cells = [_short(x) for x in comparison.max_difference[i]]
-        table.add_row(report.plain(f"{i} {label}"), *cells)
+        table.add_row(report.plain(f"{i} {label}"), *cells[: i + 1])
     return table
 
 
@@ -132,7 +143,7 @@ def _short(x: float) -> str:
         return "-"
     if x == 0:
         return "0"
-    return f"{x:.0e}".replace("e-0", "e-").replace("e+0", "e+")
+    return f"{x:.0e}".replace("e-0", "e-").replace("e+00", "").replace("e+0", "e")
 
 
 def _frames(run: Trajectory, stride: int) -> Table:
