@@ -154,7 +154,9 @@ def one_spring(c: ctypes.CDLL | None) -> bool:
             numbers = [ctypes.c_double(x) for x in (H, m, k, inverse)]
             getattr(c, name)(ctypes.c_long(STEPS), *numbers, doubles(state))
 
-        jobs = {"unrecorded": bare, "recorded": record} | ({"C": bare_c} if c else {})
+        jobs: dict[str, Callable[[], None]] = {"unrecorded": bare, "recorded": record}
+        if c:
+            jobs["C"] = bare_c
         found = in_turn(jobs, 5)
         head(f"own:{method}, one spring", "ns a step")
         line("unrecorded", found["unrecorded"], STEPS)

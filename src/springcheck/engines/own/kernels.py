@@ -5,11 +5,12 @@ they overflow); compiled, they are arrays.  So no kernel may contain what rounds
 there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
 
 Every kernel takes `(every, h, *constants, q, p, qs, ps)`, fills row after row of qs and ps (f, n) with
-the state `every` steps later, and returns the last state.  There are three layouts:
+the state `every` steps later, and returns the last state.  There are four layouts:
 
 one     a single particle on one spring at rest in 0; its state stays in two registers
 many    particles side by side, each on one wall spring: n systems in one
 joined  any terms; forces are summed over the terms in the order of `forces`, then over each term's list
+chain   springs between neighbours, for implicit Euler: its equations are tridiagonal then
 
 To add a term to `joined`: write its loop, add it to `HELPERS` and `forces`, and name its fields in
 `simulation.FIELDS`.
@@ -28,6 +29,12 @@ Terms: TypeAlias = Any
 """One tuple of rows for each kind of term, in the order of `simulation.FIELDS`."""
 State: TypeAlias = Any
 Kernel: TypeAlias = Callable[..., State]
+
+FLAGS = {"error_model": "numpy"}
+"""How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
+would contract and reorder.  They stand in this file because numba takes saved code for its own as long
+as this file has not changed, whatever the flags.
+"""
 
 BLOCK = 512
 """Particles of `many` that are carried through all steps before the next ones: 5 rows of 4 KiB stay in
@@ -224,6 +231,44 @@ def joined_implicit_euler(
     return q, p
 
 
+def chain_implicit_euler(
+    every: int,
+    h: float,
+    m: Row,
+    terms: Terms,
+    f: Row,
+    lower: Row,
+    inverse: Row,
+    upper: Row,
+    q: Row,
+    p: Row,
+    qs: Rows,
+    ps: Rows,
+) -> State:
+    """Implicit Euler of neighbours: (1 + h**2 K / m) p' = p + h F(q) by its LU factors, then drift.
+
+    `lower` are the multipliers of the rows before, `inverse` 1 over the pivots, `upper` the elements to
+    the right of the diagonal.
+    """
+    for row in range(len(qs)):
+        for _ in range(every):
+            forces(terms, q, p, f)
+            x = 0.0
+            for i in range(len(m)):
+                x = (p[i] + f[i] * h) - lower[i] * x
+                f[i] = x
+            x = 0.0
+            for i in range(len(m) - 1, -1, -1):
+                x = (f[i] - upper[i] * x) * inverse[i]
+                p[i] = x
+            for i in range(len(m)):
+                q[i] = q[i] + (p[i] / m[i]) * h
+        for i in range(len(m)):
+            qs[row, i] = q[i]
+            ps[row, i] = p[i]
+    return q, p
+
+
 HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, forces)
 """What kernels call, each after what it calls itself."""
 
@@ -242,3 +287,4 @@ JOINED: dict[str, Kernel] = {
     "semi-implicit-euler": joined_semi_implicit_euler,
     "implicit-euler": joined_implicit_euler,
 }
+CHAIN: dict[str, Kernel] = {"implicit-euler": chain_implicit_euler}
