@@ -47,7 +47,7 @@ def _write(path: Path, file: Any, group: Any, label: str, total: int) -> None:
     with path.open("rb+") as raw:
         files.reserve(raw, 2 * total + layout.MARGIN)
     with h5py.File(path, "r+", libver=layout.LIBVER, locking=False) as out:
-        layout.begin(out, {})
+        layout.begin(out)
         target = out.create_group("particles/trajectory")
         file.copy(group["box"], target, "box")
         first: Any = None

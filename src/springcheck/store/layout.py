@@ -120,7 +120,7 @@ def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
             node.attrs[name] = value
 
 
-def begin(file: Any, root: Mapping[str, Scalar]) -> None:
+def begin(file: Any) -> None:
     """The head of every file of ours: /h5md and what it is."""
     from importlib.metadata import PackageNotFoundError, version
 
@@ -128,7 +128,7 @@ def begin(file: Any, root: Mapping[str, Scalar]) -> None:
         ours = version("springcheck")
     except PackageNotFoundError:
         ours = "unknown"
-    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT, **root})
+    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
