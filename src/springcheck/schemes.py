@@ -410,7 +410,10 @@ class Rotation:
 
 
 def rotation(matrices: Extended) -> Rotation:
-    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2)."""
+    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2).
+
+    Where the determinant is not positive a step turns area over and has neither.
+    """
     a, b = matrices[:, 0, 0], matrices[:, 0, 1]
     c, d = matrices[:, 1, 0], matrices[:, 1, 1]
     determinant = a * d - b * c
@@ -420,7 +423,8 @@ def rotation(matrices: Extended) -> Rotation:
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    growth = np.where(minus < 0, np.arctanh(np.minimum(root / np.maximum(np.abs(half_trace), root), 1)), 0)
+    inside = (minus < 0) & (root < np.abs(half_trace))
+    growth = np.arctanh(np.where(inside, root / np.where(inside, np.abs(half_trace), 1), 0))
     return Rotation(
         determinant=determinant,
         angle=angle,
