@@ -7,6 +7,9 @@ where the spring is at rest: a bond of rest length 0 works through q = 0 and cos
 `VerletIntegrator` is a leapfrog: the velocity that it stores belongs to t - h/2, and it takes the one
 that it is handed for that.  Handed v0 it is the kick-drift Euler ("leapfrog" here).  Handed
 v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("verlet" here).
+
+OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every
+scheme here turns into its own -h under that reflection, because the force does not depend on p.
 """
 
 from __future__ import annotations
@@ -62,15 +65,18 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     """Build system, integrator and context.  MethodError: the platform is not here."""
     origins = _origins(scene, method)
     system, positions = _system(scene, origins)
-    integrator = _integrator(method.name, step)
+    integrator = _integrator(method.name, abs(step))
     context = _context(system, integrator, label)
     force = mechanics.force(scene.terms)
     early = 0.5 * step if method.name == "verlet" else 0.0
+    m = np.copysign(scene.m, step)
     velocities = np.zeros_like(positions)
-    velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / scene.m
+    velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
     context.setPositions(positions)
     context.setVelocities(velocities)
-    return _Context(scene=scene, origins=origins, context=context, integrator=integrator, half_kick=early)
+    return _Context(
+        scene=scene, m=m, origins=origins, context=context, integrator=integrator, half_kick=early
+    )
 
 
 def _origins(scene: Scene, method: Method) -> Floats:
@@ -182,6 +188,7 @@ class _Context:
         self,
         *,
         scene: Scene,
+        m: Floats,
         origins: Floats,
         context: mm.Context,
         integrator: mm.Integrator,
@@ -191,7 +198,7 @@ class _Context:
         self.off_axis = 0.0
         self._context = context
         self._integrator = integrator
-        self._m = scene.m
+        self._m = m
         self._origins = origins if np.any(origins) else None
         self._force = mechanics.force(scene.terms)
         self._half_kick = half_kick
