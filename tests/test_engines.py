@@ -135,7 +135,10 @@ def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
         scenes.load_scene("chain"),
         terms=(
             mechanics.Spring(
-                a=np.array([0, 1, 0]), b=np.array([1, 2, 2]), k=np.full(3, 1.7), rest=np.array([1.0, 1.0, 9.0])
+                a=np.array([0, 1, 0]),
+                b=np.array([1, 2, 2]),
+                k=np.full(3, 1.7),
+                rest=np.array([1.0, 1.0, 9.0]),
             ),
         ),
     )

@@ -104,10 +104,10 @@ def run(
     """
     path = Path(path)
     labels, left = choose(scene, methods)
-    store.room(path, store.size(scene) * len(labels))
     command = "\n".join(["run", *map(str, labels), scene.text])
     with store.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
+        store.room(path, store.size(scene) * (len(labels) - len(resumed)))
         records: dict[str, simulate.Record] = {}
         for label in labels:
             if str(label) in resumed:
