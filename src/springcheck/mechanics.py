@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,11 +17,27 @@ import numpy as np
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
 
 
+@lru_cache(maxsize=64)
+def _kind(index: bytes) -> str:
+    """Whether an index array counts 0, 1, 2 ..., names particles once each, or repeats some."""
+    numbers = np.frombuffer(index, dtype=np.int64)
+    if np.array_equal(numbers, np.arange(len(numbers))):
+        return "counting"
+    return "distinct" if len(np.unique(numbers)) == len(numbers) else "repeated"
+
+
+def gather(q: Reals, index: Integers) -> Reals:
+    """Values (..., s) of q (..., n) at index (s,); q itself where that is all of it."""
+    everything = len(index) == q.shape[-1] and _kind(index.tobytes()) == "counting"
+    return q if everything else np.asarray(q[..., index])
+
+
 def scatter(out: Reals, index: Integers, values: Reals) -> None:
     """Add values (..., s) to out (..., n) at index (s,), repeated indices included."""
-    if len(index) == out.shape[-1] and np.array_equal(index, np.arange(len(index))):
+    kind = _kind(index.tobytes())
+    if kind == "counting" and len(index) == out.shape[-1]:
         out += values
-    elif len(np.unique(index)) == len(index):
+    elif kind != "repeated":
         out[..., index] += values
     else:
         where: Any = (..., index)
@@ -38,18 +55,18 @@ class WallSpring:
     at: Floats
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
     def size(self, dq: Reals) -> Reals:
-        u = dq[..., self.i]
+        u = gather(dq, self.i)
         return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        scatter(out, self.i, -self.k * (q[..., self.i] - self.at))
+        scatter(out, self.i, -self.k * (gather(q, self.i) - self.at))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        scatter(out, self.i, np.abs(self.k) * (np.abs(q[..., self.i]) + np.abs(self.at)))
+        scatter(out, self.i, np.abs(self.k) * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
     def add_stiffness(self, q: Reals, out: Reals) -> None:
         np.add.at(out, (self.i, self.i), self.k)
@@ -67,20 +84,20 @@ class Spring:
     rest: Floats
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.b] - q[..., self.a] - self.rest
+        u = gather(q, self.b) - gather(q, self.a) - self.rest
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
     def size(self, dq: Reals) -> Reals:
-        u = dq[..., self.b] - dq[..., self.a]
+        u = gather(dq, self.b) - gather(dq, self.a)
         return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        tension = self.k * (q[..., self.b] - q[..., self.a] - self.rest)
+        tension = self.k * (gather(q, self.b) - gather(q, self.a) - self.rest)
         scatter(out, self.a, tension)
         scatter(out, self.b, -tension)
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        size = np.abs(q[..., self.b]) + np.abs(q[..., self.a]) + np.abs(self.rest)
+        size = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
         scatter(out, self.a, np.abs(self.k) * size)
         scatter(out, self.b, np.abs(self.k) * size)
 
@@ -102,20 +119,20 @@ class Quartic:
     at: Floats
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         return np.asarray(0.25 * np.sum(self.b * (u * u) * (u * u), axis=-1))
 
     def size(self, dq: Reals) -> Reals:
         return np.zeros(dq.shape[:-1], dtype=dq.dtype)
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         scatter(out, self.i, -self.b * (u * u * u))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
         # a relative error of u counts threefold in u**3
-        u = np.abs(q[..., self.i] - self.at)
-        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(q[..., self.i]) + np.abs(self.at)))
+        u = np.abs(gather(q, self.i) - self.at)
+        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
     def add_stiffness(self, q: Reals, out: Reals) -> None:
         u = q[self.i] - self.at
