@@ -166,3 +166,24 @@ def test_the_command_works_as_a_program(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "own:implicit-euler" in done.stdout
     assert done.stderr == ""
+
+
+def test_a_stored_run_is_repeated_bit_for_bit(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    main(["run", "spring-uneven", *OWN, "--quiet"])
+    assert main(["run", "--from", "spring-uneven.h5"]) == 0
+    assert capsys.readouterr().out.count("equal bit for bit") == 3
+    from springcheck.engines.own import simulation
+
+    start = simulation.start
+
+    def wrong(scene, method, label, step):  # type: ignore[no-untyped-def]
+        return start(scene, method, label, step * (1 + 1e-14))
+
+    monkeypatch.setattr(simulation, "start", wrong)
+    assert main(["run", "--from", "spring-uneven.h5", "--method", "own:euler", "--json"]) == 1
+    (repeat,) = document(capsys)["repeats"]
+    assert repeat["equal"] is False
+    assert 1e-16 < repeat["difference"] < 1e-11
+    assert {path.name for path in Path().iterdir()} == {"spring-uneven.h5"}

@@ -54,8 +54,13 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="run a scene by every method, compare, store, judge")
-    run.add_argument("scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file")
+    run.add_argument(
+        "scene", metavar="SCENE", nargs="?", help="a shipped scene's name, or the path of a scene file"
+    )
     _scene_options(run)
+    run.add_argument(
+        "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
+    )
     run.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
     run.set_defaults(command=_run)
 
@@ -135,6 +140,12 @@ def _document(data: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from springcheck import report, scenes, session
 
+    if (options.scene is None) == (options.source is None):
+        raise SpringcheckError(
+            "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
+        )
+    if options.source is not None:
+        return _repeat(options)
     scene = scenes.load_scene(options.scene)
     path = Path(options.output or f"{scene.name}.h5")
     with _progress(options) as started:
@@ -149,8 +160,16 @@ def _run(options: argparse.Namespace) -> int:
     return found.status
 
 
-SLOW = 2.0
-"""Seconds before a progress bar appears: shorter work needs none."""
+def _repeat(options: argparse.Namespace) -> int:
+    from springcheck import report, session
+
+    with _progress(options) as started:
+        found = session.repeat(Path(options.source), methods=options.method, started=started)
+    if options.json:
+        _document(session.repeat_document(found))
+    else:
+        _show([report.repeat_line(one) for one in found], quiet=options.quiet)
+    return 0 if all(one.equal for one in found) else 1
 
 
 @contextmanager

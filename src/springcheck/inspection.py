@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from springcheck import report, scenes, session, store
+from springcheck import report, session, store
 from springcheck.errors import SpringcheckError
 from springcheck.model import Comparison, Scene, Trajectory, Verdict
 
@@ -44,7 +44,7 @@ def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
 
 def drawable(path: Path) -> tuple[Scene, dict[str, Trajectory], list[str]]:
     """Scene and trajectories of a store to draw, and what was left out of them."""
-    scene = stored_scene(path)
+    scene = session.stored_scene(path)
     runs: dict[str, Trajectory] = {}
     notes = []
     for run in store.summary(path).runs:
@@ -54,14 +54,6 @@ def drawable(path: Path) -> tuple[Scene, dict[str, Trajectory], list[str]]:
     if not runs:
         raise SpringcheckError(f"{path}: holds no trajectory to draw")
     return scene, runs, notes
-
-
-def stored_scene(path: Path) -> Scene:
-    """The scene of a store, parsed from the text that it keeps."""
-    summary = store.summary(path)
-    return scenes.parse(
-        store.scene_text(path), name=str(summary.root.get("scene_name", path.stem)), where=f"{path} (scene)"
-    )
 
 
 def lines(found: Found, *, verdicts: bool = False) -> report.Lines:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
-from springcheck.session import LeftOut, Report, Run
+from springcheck.session import LeftOut, Repeat, Report, Run
 
 Lines = list[Table | Text]
 
@@ -163,6 +163,16 @@ def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
         word, style = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}[v.passed]
         table.add_row(plain(v.method), plain(v.check), plain(word, style), plain(verdict_line(v), style))
     return table
+
+
+def repeat_line(one: Repeat) -> Text:
+    """One line for a repeated trajectory."""
+    if one.equal:
+        return plain(f"{one.method}: equal bit for bit")
+    why = f"; {', '.join(one.changed)}" if one.changed else ""
+    return plain(
+        f"{one.method}: NOT equal, differs by up to {one.difference:.1e} of the start{why}", "bold red"
+    )
 
 
 def left_out(left: Sequence[LeftOut]) -> Lines:

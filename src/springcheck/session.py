@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import checks, compare, engines, exact, mechanics, simulate, store
+from springcheck import checks, compare, engines, exact, mechanics, scenes, simulate, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Comparison, Floats, Label, Scene, Timing, Trajectory, Verdict
 
@@ -220,6 +223,78 @@ def _line(piece: Trajectory, tally: _Tally) -> Run:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeat:
+    """A stored trajectory beside its repetition."""
+
+    method: str
+    equal: bool
+    """Bit for bit, by the digests."""
+    difference: float
+    """Largest, in units of the start; NaN where the two do not have the same frames."""
+    changed: tuple[str, ...]
+    """Versions that are not what they were, as ``numpy 2.0.1 -> 2.4.6``."""
+
+
+def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None = None) -> list[Repeat]:
+    """Run every trajectory of a store again, and say whether the numbers are the same bit for bit.
+
+    `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
+    """
+    stored = {run.label: run for run in store.summary(path).runs}
+    chosen = [label for label in stored if not methods or any(fnmatchcase(label, m) for m in methods)]
+    if not chosen:
+        raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(stored)}")
+    scene = stored_scene(path)
+    found = []
+    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=".springcheck-") as folder:
+        again = Path(folder) / "again.h5"
+        with store.open_new(again, "repeat") as journal:
+            for name in chosen:
+                before = stored[name].parameters
+                label = engines.parse(name)
+                kept = ("q", "p", "energy") if "energy" in stored[name].quantities else ("q", "p")
+                mine = replace(scene, quantities=kept)
+                progress = started(label, scene.steps) if started else None
+                with journal.draft(name, mine) as draft:
+                    record = simulate.play(mine, label, draft.append, progress=progress)
+                    empty = np.empty(0)
+                    digest = draft.finish(
+                        store.attributes(simulate.trajectory(record, empty, empty, empty, None))
+                    )
+                source = journal.sources()[name]
+                found.append(
+                    Repeat(
+                        method=name,
+                        equal=digest == before["sha256"],
+                        difference=_difference(scene, path, source, name),
+                        changed=tuple(
+                            f"{key} {before.get('origin.' + key)} -> {value}"
+                            for key, value in record.origin.items()
+                            if before.get("origin." + key) != value
+                        ),
+                    )
+                )
+    return found
+
+
+def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
+    norm = mechanics.norm(scene)
+    worst = 0.0
+    rows = max(2, PIECE // scene.n)
+    for a, b in zip_longest(store.windows(one, label, rows), store.windows(other, label, rows)):
+        if a is None or b is None or len(a.t) != len(b.t):
+            return float("nan")
+        worst = max(worst, float(np.max(norm(a.q - b.q, a.p - b.p))))
+    return worst
+
+
+def stored_scene(path: Path) -> Scene:
+    """The scene of a store, parsed from the text that it keeps."""
+    name = str(store.summary(path).root.get("scene_name", path.stem))
+    return scenes.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
+
+
 def document(report: Report) -> dict[str, Any]:
     """The report as plain data for JSON; what is not a finite number is None."""
     return {
@@ -249,6 +324,21 @@ def document(report: Report) -> dict[str, Any]:
             {"labels": list(same.labels), "difference": same.difference, "allowed": number(same.allowed)}
             for same in report.same
         ],
+    }
+
+
+def repeat_document(found: Sequence[Repeat]) -> dict[str, Any]:
+    """Repetitions as plain data for JSON."""
+    return {
+        "repeats": [
+            {
+                "method": one.method,
+                "equal": one.equal,
+                "difference": number(one.difference),
+                "changed": list(one.changed),
+            }
+            for one in found
+        ]
     }
 
 
