@@ -29,6 +29,9 @@ def run_report(report: Report) -> Lines:
     out += [verdict_matrix(report.verdicts)]
     out += failures(report.verdicts)
     out += left_out(report.left_out)
+    if report.judged_frames < report.scene.frames:
+        share = f"{report.judged_frames} of {report.scene.frames} frames"
+        out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
     out += [plain(), summary(report)]
     return out
 

@@ -16,8 +16,13 @@ from springcheck import checks, compare, engines, exact, mechanics, scenes, simu
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Comparison, Floats, Label, Scene, Timing, Trajectory, Verdict
 
-PIECE = 1 << 17
+PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
+
+MOST_PIECES = 16
+"""Pieces of a long run that are judged: the first, the last, and some between at equal distances.  Judging
+takes 8 us a frame, a hundred times as long as making it; a slip between two pieces shows in the closed form
+of every piece after it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +61,8 @@ class Report:
     verdicts: tuple[Verdict, ...]
     comparison: Comparison
     same: tuple[compare.Same, ...]
+    judged_frames: int
+    """Frames of each run that were judged: all of them, unless the run is very long."""
     resumed: tuple[str, ...] = ()
 
     @property
@@ -141,11 +148,16 @@ def judge(
 ) -> Report:
     """The report on stored trajectories, read in pieces of bounded size."""
     rows = max(2, PIECE // scene.n)
+    pieces_in_all = -(-(scene.frames - 1) // rows)
+    stride = max(1, -(-pieces_in_all // MOST_PIECES))
+    judged_frames = 0
     verdicts: dict[str, list[list[Verdict]]] = {name: [] for name in sources}
     tallies = {name: _Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last: dict[str, Trajectory] = {}
-    for pieces in _together({name: store.windows(source, name, rows) for name, source in sources.items()}):
+    streams = {name: store.windows(source, name, rows, stride) for name, source in sources.items()}
+    for pieces in _together(streams):
+        judged_frames += max(len(piece.t) for piece in pieces.values())
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece))
             tallies[name].add(piece)
@@ -164,6 +176,7 @@ def judge(
         verdicts=tuple(v for name in sources for v in checks.worst(verdicts[name])),
         comparison=comparison,
         same=tuple(compare.same_motions(scene, last, comparison)),
+        judged_frames=min(judged_frames, scene.frames),
         resumed=tuple(name for name in resumed if name in sources),
     )
 
@@ -314,6 +327,7 @@ def document(report: Report) -> dict[str, Any]:
             }
             for run in report.runs
         ],
+        "judged_frames": report.judged_frames,
         "left_out": [{"method": left.method, "reason": left.reason} for left in report.left_out],
         "verdicts": [verdict_document(verdict) for verdict in report.verdicts],
         "comparison": {

@@ -234,14 +234,18 @@ def read_one(path: str | Path, label: str) -> Trajectory:
         return _trajectory(label, known, arrays)
 
 
-def windows(path: str | Path, label: str, rows: int = PIECE) -> Iterator[Trajectory]:
-    """Pieces of a trajectory, at most `rows` + 1 frames each, the first of them the last one's last."""
+def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
+    """Pieces of a trajectory, at most `rows` + 1 frames each, the first of them the last one's last.
+
+    With a stride only every stride-th piece is read, and the last.
+    """
     source = source_of(Path(path), label)
     with opened(source) as file:
         known = parameters(file, label)
         datasets = _datasets(file, label)
         frames = len(datasets["time"])
-        for start in range(0, max(1, frames - 1), rows):
+        starts = range(0, max(1, frames - 1), rows)
+        for start in sorted({*starts[::stride], starts[-1]}):
             yield _trajectory(label, known, _rows(datasets, slice(start, start + rows + 1)))
 
 
