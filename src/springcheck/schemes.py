@@ -19,7 +19,8 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.model import Extended, Floats, Force, Integers, Reals
+from springcheck import mechanics
+from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene
 
 Coefficient: TypeAlias = Fraction | str
 Stage: TypeAlias = tuple[Literal["kick", "drift", "pull", "friction", "slow", "fast"], Coefficient]
@@ -469,6 +470,30 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     )
     out[:, 0, :], out[:, 1, :] = q.T, p.T
     return out
+
+
+def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
+    """One-step matrix (2n, 2n) on (q - q*, p - p*) of a linear scene, q* and p* a state that stays.
+
+    Found by stepping the unit vectors and taking off what the state 0 becomes; it serves scenes whose
+    modes a scheme mixes.
+    """
+    n = scene.n
+    z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
+    slow, fast = mechanics.split(scene.terms)
+    q, p = step(
+        scheme,
+        z[:, :n],
+        z[:, n:],
+        h=h,
+        m=scene.m.astype(np.longdouble),
+        force=mechanics.force(scene.terms),
+        stiffness=mechanics.stiffness(scene, scene.q) if scheme.implicit else None,
+        rate=mechanics.rates(scene),
+        parts=(mechanics.force(slow), mechanics.force(fast)),
+    )
+    after = np.concatenate([q, p], axis=1)
+    return np.asarray((after[1:] - after[0]).T, np.longdouble)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
