@@ -136,12 +136,11 @@ def test_every_method_that_serves_a_stiff_scene_passes_every_check(name: str, ne
     for label in engines.match(scene.include):
         if engines.refusal(scene, label):
             continue
-        need(str(label))
-        try:
-            run = simulate.run(scene, label)
-        except MethodError as error:
-            assert "one friction rate" in str(error)
+        if name == "detest-b1" and label.method == "langevin-middle":
+            # two friction rates: refused, as another test demands
             continue
+        need(str(label))
+        run = simulate.run(scene, label)
         failed = [v for v in checks.judge(scene, run) if v.passed is False]
         assert not failed, f"{label}: {failed}"
         judged += 1
