@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
 
@@ -60,18 +61,18 @@ class WallSpring:
         u = gather(q, self.i) - self.at
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        u = gather(dq, self.i)
-        return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.k * (gather(q, self.i) - self.at))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, np.abs(self.k) * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        np.add.at(out, (self.i, self.i), self.k)
+    def curvature(self, q: Reals) -> Reals:
+        return self.k
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.abs(self.k)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,10 +92,6 @@ class Spring:
         u = gather(q, self.b) - gather(q, self.a) - self.rest
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        u = gather(dq, self.b) - gather(dq, self.a)
-        return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         tension = self.k * (gather(q, self.b) - gather(q, self.a) - self.rest)
         scatter(out, self.a, tension)
@@ -105,11 +102,12 @@ class Spring:
         scatter(out, self.a, np.abs(self.k) * size)
         scatter(out, self.b, np.abs(self.k) * size)
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        np.add.at(out, (self.a, self.a), self.k)
-        np.add.at(out, (self.b, self.b), self.k)
-        np.add.at(out, (self.a, self.b), -self.k)
-        np.add.at(out, (self.b, self.a), -self.k)
+    def curvature(self, q: Reals) -> Reals:
+        return self.k
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.abs(self.k)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,9 +124,6 @@ class Quartic:
         u = gather(q, self.i) - self.at
         return np.asarray(0.25 * np.sum(self.b * (u * u) * (u * u), axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         u = gather(q, self.i) - self.at
         scatter(out, self.i, -self.b * (u * u * u))
@@ -138,9 +133,97 @@ class Quartic:
         u = np.abs(gather(q, self.i) - self.at)
         scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        u = q[self.i] - self.at
-        np.add.at(out, (self.i, self.i), 3 * self.b * u * u)
+    def curvature(self, q: Reals) -> Reals:
+        u = gather(q, self.i) - self.at
+        return np.asarray(3 * self.b * u * u)
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.zeros_like(self.b)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cosine:
+    """Pendulums: V = depth (1 - cos((q - at)/length)).  depth, m g l, [M L2/T2]; length and at [L].
+
+    An angle and its angular momentum take length 1.
+    """
+
+    key: ClassVar[str] = "cosine"
+    bodies: ClassVar[int] = 1
+    i: Integers
+    depth: Floats
+    length: Floats
+    at: Floats
+
+    def energy(self, q: Reals) -> Reals:
+        # 1 - cos without its cancellation at small angles
+        half = np.sin((gather(q, self.i) - self.at) / (2 * self.length))
+        return np.asarray(2 * np.sum(self.depth * half * half, axis=-1))
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        angle = (gather(q, self.i) - self.at) / self.length
+        scatter(out, self.i, -(self.depth / self.length) * np.sin(angle))
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+        # the sine's own rounding, and that of its argument, which turns round and round
+        size = 1 + (np.abs(gather(q, self.i)) + np.abs(self.at)) / self.length
+        scatter(out, self.i, np.abs(self.depth) / self.length * size)
+
+    def curvature(self, q: Reals) -> Reals:
+        angle = (gather(q, self.i) - self.at) / self.length
+        return np.asarray(self.depth / self.length**2 * np.cos(angle))
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.asarray(np.abs(self.depth) / self.length**2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Morse:
+    """Bonds between particles a and b: V = depth (1 - exp(-steepness (q[b] - q[a] - rest)))**2.
+
+    depth [M L2/T2], steepness [1/L], rest [L].  P. M. Morse, Phys. Rev. 34 (1929) 57.
+    """
+
+    key: ClassVar[str] = "morse"
+    bodies: ClassVar[int] = 2
+    a: Integers
+    b: Integers
+    depth: Floats
+    steepness: Floats
+    rest: Floats
+
+    def _gap(self, q: Reals) -> Reals:
+        """1 - exp(-steepness u), without its cancellation at small u."""
+        u = gather(q, self.b) - gather(q, self.a) - self.rest
+        return np.asarray(-np.expm1(-self.steepness * u))
+
+    def energy(self, q: Reals) -> Reals:
+        gap = self._gap(q)
+        return np.asarray(np.sum(self.depth * gap * gap, axis=-1))
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        gap = self._gap(q)
+        tension = (2 * self.depth * self.steepness) * (1 - gap) * gap
+        scatter(out, self.a, tension)
+        scatter(out, self.b, -tension)
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+        # an error of u counts in both factors, x (1 - x) of x = exp(-steepness u)
+        x = 1 - self._gap(q)
+        u = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
+        size = 2 * self.depth * self.steepness * x * (1 + x) * (1 + 2 * np.abs(self.steepness) * u)
+        scatter(out, self.a, np.abs(size))
+        scatter(out, self.b, np.abs(size))
+
+    def curvature(self, q: Reals) -> Reals:
+        x = 1 - self._gap(q)
+        return np.asarray(2 * self.depth * self.steepness**2 * x * (2 * x - 1))
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.asarray(2 * np.abs(self.depth) * self.steepness**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -156,21 +239,62 @@ class Damping:
     def energy(self, q: Reals) -> Reals:
         return np.zeros(q.shape[:-1], dtype=q.dtype)
 
-    def size(self, dq: Reals) -> Reals:
-        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.c * (p[..., self.i] / self.m))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, np.abs(self.c) * (np.abs(p[..., self.i]) / self.m))
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        """Friction has no energy to differentiate."""
+    def curvature(self, q: Reals) -> Reals:
+        return np.zeros_like(self.c)
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.zeros_like(self.c)
 
 
-TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Damping)
+TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Cosine, Morse, Damping)
 LINEAR = frozenset({"wall-spring", "spring", "damping"})
+
+
+def particles(term: Term) -> tuple[Integers, ...]:
+    """The particles on which a term acts: (i,), or both ends (a, b) of its bonds."""
+    return tuple(getattr(term, name) for name in (("i",) if term.bodies == 1 else ("a", "b")))
+
+
+def acting(scene: Scene) -> dict[str, NDArray[np.bool_]]:
+    """For each kind of term in the scene, on which particles it acts (n,)."""
+    out: dict[str, NDArray[np.bool_]] = {}
+    for term in scene.terms:
+        for end in particles(term):
+            out.setdefault(term.key, np.zeros(scene.n, dtype=bool))[end] = True
+    return out
+
+
+def part(scene: Scene, chosen: Integers) -> Scene:
+    """These particles (s,) alone, renumbered, with the terms that act on nothing else."""
+    number = np.full(scene.n, -1)
+    number[chosen] = np.arange(len(chosen))
+
+    def cut(term: Any) -> Any:
+        here = np.all([number[end] >= 0 for end in particles(term)], axis=0)
+        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        rows = {name: x[here] for name, x in values.items() if isinstance(x, np.ndarray)}
+        ends = {name: number[row] for name, row in rows.items() if name in ("i", "a", "b") and _is_index(row)}
+        return replace(term, **rows | ends)
+
+    terms = tuple(cut(term) for term in scene.terms)
+    return replace(
+        scene,
+        m=scene.m[chosen],
+        q=scene.q[chosen],
+        p=scene.p[chosen],
+        terms=tuple(term for term in terms if len(particles(term)[0])),
+    )
+
+
+def _is_index(values: NDArray[Any]) -> bool:
+    return bool(np.issubdtype(values.dtype, np.integer))
 
 
 def is_linear(scene: Scene) -> bool:
@@ -270,21 +394,24 @@ def magnitude(terms: Iterable[Term]) -> Force:
 def stiffness(scene: Scene, q: Reals) -> Extended:
     """Second derivatives of the potential energy at q (n,) -> (n, n) [M/T2], extended precision."""
     out = np.zeros((scene.n, scene.n), dtype=np.longdouble)
+    wide = np.asarray(q, dtype=np.longdouble)
     for term in scene.terms:
-        term.add_stiffness(np.asarray(q, dtype=np.longdouble), out)
+        ends, k = particles(term), term.curvature(wide)
+        for end in ends:
+            np.add.at(out, (end, end), k)
+        if len(ends) == 2:
+            np.add.at(out, ends, -k)
+            np.add.at(out, ends[::-1], -k)
     return out
 
 
 def own_stiffness(scene: Scene, q: Reals) -> Extended:
-    """Diagonal of `stiffness` (n,), for scenes of many particles that nothing joins."""
+    """Diagonal of `stiffness` (n,), all of it where nothing joins two particles."""
     out = np.zeros(scene.n, dtype=np.longdouble)
     wide = np.asarray(q, dtype=np.longdouble)
     for term in scene.terms:
-        if isinstance(term, WallSpring):
-            np.add.at(out, term.i, term.k.astype(np.longdouble))
-        elif isinstance(term, Quartic):
-            u = wide[term.i] - term.at
-            np.add.at(out, term.i, 3 * term.b * u * u)
+        for end in particles(term):
+            np.add.at(out, end, term.curvature(wide))
     return out
 
 
@@ -313,13 +440,14 @@ def free_groups(scene: Scene) -> tuple[Integers, ...]:
 
     held = np.zeros(scene.n, dtype=bool)
     for term in scene.terms:
-        if isinstance(term, WallSpring):
-            held[term.i[term.k != 0]] = True
+        if term.bodies == 1:
+            held[particles(term)[0][term.rigidity > 0]] = True
     if np.all(held):
         return ()
     for term in scene.terms:
-        if isinstance(term, Spring):
-            for a, b in zip(term.a.tolist(), term.b.tolist(), strict=True):
+        if term.bodies == 2:
+            a_all, b_all = particles(term)
+            for a, b in zip(a_all.tolist(), b_all.tolist(), strict=True):
                 parent[root(a)] = root(b)
     roots = np.array([root(i) for i in range(scene.n)])
     loose = np.setdiff1d(roots, roots[held])
@@ -353,7 +481,9 @@ class Norm:
 def _size(scene: Scene, groups: tuple[Integers, ...], duration: float, dq: Reals, dp: Reals) -> Reals:
     total = kinetic_energy(scene, dp)
     for term in scene.terms:
-        total = total + term.size(dq)
+        ends = particles(term)
+        du = gather(dq, ends[-1]) - gather(dq, ends[0]) if len(ends) == 2 else gather(dq, ends[0])
+        total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
     for group in groups:
         m = scene.m[group]
         centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)

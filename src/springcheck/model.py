@@ -54,10 +54,6 @@ class Term(Protocol):
         """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
         ...
 
-    def size(self, dq: Reals) -> Reals:
-        """|k| du**2 / 2 of differences dq (..., n) -> (...) [M L2/T2], k the stiffness at rest."""
-        ...
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         """Add the force at (q, p), each (..., n), to out (..., n) [M L/T2]."""
         ...
@@ -66,8 +62,13 @@ class Term(Protocol):
         """Add the sum of the absolute values of everything that add_force adds or subtracts."""
         ...
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        """Add the second derivatives of the energy at q (n,) to out (n, n) [M/T2]."""
+    def curvature(self, q: Reals) -> Reals:
+        """Second derivative of each energy by the elongation of its spring, at q (n,) -> (s,) [M/T2]."""
+        ...
+
+    @property
+    def rigidity(self) -> Floats:
+        """Its absolute value at the term's own rest (s,) [M/T2]: what errors of position are weighed by."""
         ...
 
 
