@@ -1,8 +1,9 @@
 """Terms of a scene, and forces and energies made of them: pure functions of any width of float.
 
 A term is a frozen class of parameter arrays.  Its formula is written once and serves double and
-extended precision, one state and a whole trajectory alike.  To add a term: write its class here, put
-it into `TERMS`, and name its key in the methods of the engines that serve it.
+extended precision, one state and a whole trajectory alike.  To add a term: write its class here with
+the columns of its table in a scene file, put it into `TERMS`, and name its key in the methods of the
+engines that serve it.
 """
 
 from __future__ import annotations
@@ -45,12 +46,23 @@ def scatter(out: Reals, index: Integers, values: Reals) -> None:
         np.add.at(out, where, values)
 
 
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A parameter of a term: its name in a scene file, the field that takes it, and what it may be."""
+
+    name: str
+    field: str
+    default: float | None = None
+    positive: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WallSpring:
     """Springs from particles i to fixed points: V = k/2 (q - at)**2.  k [M/T2], at [L]."""
 
     key: ClassVar[str] = "wall-spring"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = ()
     i: Integers
     k: Floats
     at: Floats
@@ -81,6 +93,7 @@ class Spring:
 
     key: ClassVar[str] = "spring"
     bodies: ClassVar[int] = 2
+    columns: ClassVar[tuple[Column, ...]] = ()
     a: Integers
     b: Integers
     k: Floats
@@ -116,6 +129,7 @@ class Quartic:
 
     key: ClassVar[str] = "quartic"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = (Column("coefficient", "b"), Column("at", "at", 0.0))
     i: Integers
     b: Floats
     at: Floats
@@ -151,6 +165,11 @@ class Cosine:
 
     key: ClassVar[str] = "cosine"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("depth", "depth"),
+        Column("length", "length", 1.0, positive=True),
+        Column("at", "at", 0.0),
+    )
     i: Integers
     depth: Floats
     length: Floats
@@ -188,6 +207,11 @@ class Morse:
 
     key: ClassVar[str] = "morse"
     bodies: ClassVar[int] = 2
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("depth", "depth", positive=True),
+        Column("steepness", "steepness", positive=True),
+        Column("rest", "rest"),
+    )
     a: Integers
     b: Integers
     depth: Floats
@@ -232,6 +256,7 @@ class Damping:
 
     key: ClassVar[str] = "damping"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = ()
     i: Integers
     c: Floats
     m: Floats

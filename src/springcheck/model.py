@@ -47,7 +47,7 @@ class Term(Protocol):
 
     @property
     def bodies(self) -> int:
-        """1 where it acts on single particles, 2 where it joins pairs."""
+        """1 where it acts on single particles `i`, 2 where it joins pairs `a`, `b`."""
         ...
 
     def energy(self, q: Reals) -> Reals:

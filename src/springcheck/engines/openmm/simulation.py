@@ -19,6 +19,8 @@ Friction does, and goes forwards only.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import openmm as mm
 
@@ -44,6 +46,12 @@ _PRECISIONS = {
 """Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
 "mixed" keeps positions as a float and a float of correction, together 48 bits."""
 
+
+EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
+    "quartic": ("0.25*b*(x-at)^4", ("b",)),
+    "cosine": ("depth*(1-cos((x-at)/length))", ("depth", "length")),
+}
+"""One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`."""
 
 SHIFTED = frozenset({"verlet", "langevin-middle"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
@@ -167,9 +175,51 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for bonds in (slow, fast):
         if bonds.getNumBonds():
             system.addForce(bonds)
+    for term in scene.terms:
+        if term.key in EXTERNAL:
+            system.addForce(_external(term, origins))
+        elif isinstance(term, mechanics.Morse):
+            _stays_right_way_round(scene, term)
+            system.addForce(_morse(term, origins))
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
+
+
+def _external(term: Any, origins: Floats) -> mm.CustomExternalForce:
+    """A one-body term as its energy in the coordinate x."""
+    energy, names = EXTERNAL[term.key]
+    force = mm.CustomExternalForce(energy)
+    for name in (*names, "at"):
+        force.addPerParticleParameter(name)
+    columns = [getattr(term, name) for name in names] + [term.at - origins[term.i]]
+    for i, values in zip(term.i.tolist(), np.transpose(columns).tolist(), strict=True):
+        force.addParticle(i, values)
+    return force
+
+
+def _morse(term: mechanics.Morse, origins: Floats) -> mm.CustomBondForce:
+    force = mm.CustomBondForce("depth*(1-exp(-steepness*(r-rest)))^2")
+    for name in ("depth", "steepness", "rest"):
+        force.addPerBondParameter(name)
+    rest = term.rest - (origins[term.b] - origins[term.a])
+    for a, b, *values in zip(
+        term.a.tolist(), term.b.tolist(), term.depth.tolist(), term.steepness.tolist(), rest.tolist(),
+        strict=True,
+    ):  # fmt: skip
+        force.addBond(a, b, values)
+    return force
+
+
+def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
+    """MethodError where a Morse bond could reach length 0: OpenMM's knows its length, not its sign."""
+    energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
+    barrier = term.depth * np.expm1(term.steepness * term.rest) ** 2
+    if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
+        raise MethodError(
+            f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
+            "its second end must lie to the right of the first, a rest length apart that its energy cannot close"
+        )
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
