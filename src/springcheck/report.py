@@ -23,6 +23,7 @@ def plain(text: str = "", style: str = "") -> Text:
 def run_report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [headline(report), plain(), runs_table(report.runs)]
+    out.append(plain("error: farthest from the true motion; energy: (H - H0)/H0 where largest", "dim"))
     out += [plain(f"  {run.method}: {run.message}") for run in report.runs if run.message]
     out += same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
@@ -88,9 +89,8 @@ def same_motions(report: Report) -> Lines:
     for same in report.same:
         names = " = ".join("true motion" if label == "exact" else label for label in same.labels)
         out.append(plain(f"  {names}"))
-        out.append(
-            plain(f"    differ by at most {same.difference:.1e} of the start ({same.allowed:.1e} allowed)")
-        )
+        far = f"differ by at most {same.difference:.1e} of the start ({same.allowed:.1e} allowed)"
+        out.append(plain(f"    {far if same.difference else 'equal bit for bit'}"))
     return out
 
 
