@@ -1,0 +1,10 @@
+"""Which scheme made these states?  Read from the states alone, ours or anyone's.
+
+Pairs of states one interval apart give the map between them by least squares.  Of its four entries one
+fixes (h w)**2, and a scheme with a number of steps per frame predicts the others; the covariance of the
+fit is the yardstick.  What single steps leave over names the arithmetic.
+"""
+
+from springcheck.identify.report import Identification, identify
+
+__all__ = ["Identification", "identify"]

@@ -1,0 +1,118 @@
+"""The map between recorded states, by least squares, and how well the states determine it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.identify.record import Record
+from springcheck.model import Extended, Floats
+
+ROUNDING = 2.0**-53
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Map:
+    """The map z -> B z of one oscillator's states z = ((q - centre)/size_q, v T/size_v), of size 1 each.
+
+    `covariance` (4, 4) belongs to the entries B11, B12, B21, B22; `residual` (2,) is the root mean square
+    of what B leaves over of each component.
+    """
+
+    entries: Extended
+    covariance: Floats
+    residual: Floats
+    size: Extended
+    centre: Extended
+    z: Extended
+    conditioned: bool
+    """Whether the states span the plane beyond their noise."""
+
+    @property
+    def unscaled(self) -> Extended:
+        """The map on (q, v T), both lengths."""
+        return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
+
+
+def _least_squares(columns: Extended, right: Extended) -> Extended:
+    """Solution x of columns x = right by normal equations in extended precision, refined twice.
+
+    With columns of size 1 the condition of the normal equations is far below 1/eps of extended precision
+    unless the states are degenerate, which is found out apart.
+    """
+    gram = columns.T @ columns
+    inverse = np.linalg.pinv(gram.astype(np.float64)).astype(np.longdouble)
+    x = inverse @ (columns.T @ right)
+    for _ in range(3):
+        x = x + inverse @ (columns.T @ (right - columns @ x))
+    return np.asarray(x)
+
+
+def fit(record: Record, j: int) -> Map:
+    """The map of oscillator j.  A constant part (an equilibrium away from 0) is taken in where it shows."""
+    z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
+    size = np.sqrt(np.mean((z - np.mean(z, axis=0)) ** 2, axis=0))
+    about = np.sqrt(np.mean(z**2, axis=0))
+    size = np.where(about < 2 * size, about, size)
+    z = z / size
+    pairs = len(z) - 1
+    before, after = z[:-1], z[1:]
+    x = _least_squares(before, after)
+    rss = np.sum((after - before @ x) ** 2, axis=0)
+    centre = np.zeros(2, dtype=np.longdouble)
+    floor = pairs * (4 * ROUNDING * np.max(np.abs(z), axis=0)) ** 2
+    if np.any(rss > floor) and pairs > FEWEST_PAIRS:
+        wide = np.concatenate([before, np.ones((pairs, 1), dtype=np.longdouble)], axis=1)
+        y = _least_squares(wide, after)
+        left = np.sum((after - wide @ y) ** 2, axis=0)
+        # one number more per row removes chi-squared of 1 by chance; 50 is seven standard errors
+        if np.any(rss - left > 50 * np.maximum(left / (pairs - 3), floor / pairs)):
+            inverse = np.linalg.inv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
+            centre = inverse @ y[2]
+            for _ in range(3):
+                centre = centre + inverse @ (y[2] - centre + y[:2].T @ centre)
+            x, rss = y[:2], left
+    entries = x.T
+    z = z - centre
+    before, after = z[:-1], z[1:]
+    spread = before.astype(np.float64)
+    gram = spread.T @ spread
+    variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), (ROUNDING / 2) ** 2)
+    smallest = float(np.linalg.eigvalsh(gram / pairs)[0])
+    conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
+    inverse = np.linalg.pinv(gram)
+    covariance = np.kron(np.diag(variance), inverse)
+    quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
+    covariance += _storage_covariance(z, entries, quanta / size.astype(np.float64), inverse)
+    return Map(
+        entries=entries,
+        covariance=covariance,
+        residual=np.sqrt(rss.astype(np.float64) / pairs),
+        size=size,
+        centre=centre * size,
+        z=z,
+        conditioned=conditioned,
+    )
+
+
+FEWEST_PAIRS = 5
+
+
+def _storage_covariance(z: Extended, entries: Extended, quanta: Floats, inverse: Floats) -> Floats:
+    """Covariance (4, 4) of the entries from the rounding of each recorded number, uniform within a quantum.
+
+    A rounded state stands in two pairs, once as the later and once as the earlier one; the two
+    influences partly cancel, so they are summed before they are squared.
+    """
+    states, b = z.astype(np.float64), entries.astype(np.float64)
+    later = np.zeros_like(states)
+    later[1:] = states[:-1]
+    earlier = states.copy()
+    earlier[-1] = 0
+    # influence[m, j, i, a]: of the error of component j of state m on entry (i, a)
+    influence = np.eye(2)[None, :, :, None] * later[:, None, None, :]
+    influence = influence - b.T[None, :, :, None] * earlier[:, None, None, :]
+    influence = (influence @ inverse).reshape(len(states), 2, 4)
+    weighted = (influence * (quanta / np.sqrt(12.0))[:, :, None]).reshape(-1, 4)
+    return np.asarray(weighted.T @ weighted)

@@ -1,0 +1,261 @@
+"""Known schemes held against the entries of a map: one unknown, (h w)**2, and the others are predictions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.special import chdtri
+
+from springcheck.identify.fit import ROUNDING, Map
+from springcheck.model import Extended, Floats
+from springcheck.schemes import SCHEMES, Scheme, matrix, rotation, roundings
+
+CHANCE = 1e-7
+"""Probability with which a right scheme may be refused: five standard errors."""
+
+STRIDES = 12, 100
+"""Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
+
+ONE_STEP = tuple(s for s in SCHEMES.values() if s.one_step or s.flow)
+OWN_FRICTION = tuple(s for s in ONE_STEP if any(kind == "friction" for kind, _ in s.stages))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Match:
+    """A scheme with `stride` steps to a frame against one map; a = (h w)**2, friction is gamma h."""
+
+    scheme: str
+    stride: int
+    turns: int
+    """Whole turns of the phase between two frames, which the frames do not show."""
+    a: float
+    a_error: float
+    friction: float
+    log_mass: float
+    chi2: float
+    freedom: int
+    predicted: tuple[float, ...]
+    """The four entries, in the frame of the map."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the entries agree within their uncertainty."""
+        return self.chi2 <= float(chdtri(self.freedom, CHANCE))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Terms:
+    """How a map is to be matched: what is unknown, and how finely the arithmetic resolves coefficients."""
+
+    damped: bool = False
+    mass_unknown: bool = False
+    rounding: float = ROUNDING
+    jitter: float = 0.0
+    log_stiffness: float | None = None
+    """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
+
+
+def unit_matrix(scheme: Scheme, a: Extended, friction: Extended) -> Extended:
+    """One-step matrices (c, 2, 2) on (q, v h) for (h w)**2 = a and gamma h = friction, each (c,)."""
+    return matrix(scheme, h=1.0, m=np.ones(1, dtype=np.longdouble), k=a, c=friction)
+
+
+def power(matrices: Extended, strides: Floats) -> Extended:
+    """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant."""
+    found = rotation(matrices)
+    s = np.asarray(strides, dtype=np.longdouble)
+    root = np.sqrt(np.abs(found.determinant))
+    turning = found.angle > 0
+    angle = np.where(turning, found.angle, 0)
+    growth = np.where(turning, 0, found.growth)
+    even_s, even_1 = (np.where(turning, np.cos(angle * x), np.cosh(growth * x)) for x in (s, 1))
+    odd_1 = np.where(turning, np.sin(angle), np.sinh(growth))
+    odd_s = np.where(turning, np.sin(angle * s), np.sinh(growth * s))
+    flat = odd_1 == 0
+    odd = np.where(flat, s, odd_s / np.where(flat, 1, odd_1))
+    # real eigenvalues of the sign of the trace: factor the sign out, take it to the power s
+    sign = np.where(turning, 1, found.sign)
+    normal = matrices * (sign / root)[:, None, None]
+    eye = np.eye(2, dtype=np.longdouble)
+    out = even_s[:, None, None] * eye + odd[:, None, None] * (normal - even_1[:, None, None] * eye)
+    return np.asarray(out * (root**s * np.where(np.mod(s, 2) == 0, 1, sign))[:, None, None])
+
+
+def frame(
+    scheme: Scheme, a: Extended, friction: Extended, log_mass: Extended, s: Floats, size: Extended
+) -> Extended:
+    """Predicted maps (c, 2, 2) over s steps on (q, v T) in units of `size`, T = s h."""
+    out = power(unit_matrix(scheme, a, friction), s)
+    up = np.asarray(np.exp(-log_mass) / s * size[1] / size[0])
+    out[:, 0, 1] = out[:, 0, 1] * up
+    out[:, 1, 0] = out[:, 1, 0] / up
+    return out
+
+
+@cache
+def _phases(name: str) -> tuple[Floats, Floats]:
+    """h w (ascending) and the phase of one step, over the range in which the phase grows."""
+    scheme = SCHEMES[name]
+    top = min(scheme.limit, 60.0) if scheme.limit > 0 else 4.0
+    # the phase bends like a square root at a limit of stability, so points crowd there
+    x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
+    x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
+    if scheme.flow:
+        return x, x
+    found = rotation(unit_matrix(scheme, np.square(x.astype(np.longdouble)), np.zeros(1, np.longdouble)))
+    phase = np.asarray(found.angle, dtype=np.float64)
+    falls = np.flatnonzero(np.diff(phase) <= 0)
+    end = int(falls[0]) + 1 if len(falls) else len(x)
+    return x[:end], phase[:end]
+
+
+def _starts(scheme: Scheme, entries: Extended, strides: range) -> tuple[Floats, Floats, Floats]:
+    """First guesses: strides, whole turns, and h w, from the phase between frames."""
+    phase = float(rotation(entries[None]).angle[0])
+    if entries[0, 1] < 0:
+        phase = -phase
+    x, phases = _phases(scheme.name)
+    if scheme.flow:
+        turns = np.arange(0 if phase > 0 else 1, 8, dtype=np.float64)
+        return np.ones_like(turns), turns, phase + 2 * np.pi * turns
+    s = np.repeat(np.array(strides, dtype=np.float64), [r // 2 + 1 for r in strides])
+    turns = np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
+    target = (phase + 2 * np.pi * turns) / s
+    inside = (target > 0) & (target < phases[-1])
+    return s[inside], turns[inside], np.interp(target[inside], phases, x)
+
+
+def _real_starts(scheme: Scheme, found: Map) -> tuple[Floats, Floats, Floats]:
+    """First guesses of a where nothing turns (an inverted spring, or a step beyond the limit)."""
+    grid = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
+    zero = np.zeros(1, dtype=np.longdouble)
+    strides: list[float] = []
+    values: list[float] = []
+    for s in (1,) if scheme.flow else (1, 2, 3, 4):
+        s_all = np.full(len(grid), float(s))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            miss = frame(scheme, grid.astype(np.longdouble), zero, zero, s_all, found.size) - found.entries
+            off = np.asarray(np.sum(miss**2, axis=(1, 2)), dtype=np.float64)
+        off = np.where(np.isfinite(off), off, np.inf)
+        low = np.flatnonzero((off[1:-1] <= off[:-2]) & (off[1:-1] <= off[2:]) & (off[1:-1] < 1)) + 1
+        strides += [float(s)] * len(low)
+        values += grid[low].tolist()
+    return np.array(strides), np.zeros(len(strides)), np.array(values)
+
+
+def match(scheme: Scheme, found: Map, terms: Terms, strides: range) -> list[Match]:
+    """The scheme fitted to a map at these strides, every whole number of unseen turns included."""
+    turning = float(rotation(found.entries[None]).angle[0]) > 0
+    if turning:
+        s, turns, x = _starts(scheme, found.entries, strides)
+        a = np.square(x.astype(np.longdouble))
+    else:
+        s, turns, values = _real_starts(scheme, found)
+        a = values.astype(np.longdouble)
+    if not len(s):
+        return []
+    zero = np.zeros(len(s), dtype=np.longdouble)
+    unknowns = [a, zero, zero]
+    free = [0]
+    if terms.damped:
+        own = rotation(unit_matrix(scheme, a, zero)).determinant
+        all_steps = rotation(found.entries[None]).determinant[0]
+        if not all_steps > 0:
+            return []
+        unknowns[1] = np.log(np.abs(own)) - np.log(all_steps) / s
+        free.append(1)
+    if terms.mass_unknown and terms.log_stiffness is None:
+        guess = frame(scheme, a, unknowns[1], zero, s, found.size)
+        up = np.abs(guess[:, 0, 1] / found.entries[0, 1])
+        down = np.abs(found.entries[1, 0] / guess[:, 1, 0])
+        unknowns[2] = np.log(up * down) / 2
+        free.append(2)
+    return _refine(scheme, found, terms, s, turns, unknowns, free)
+
+
+def _refine(
+    scheme: Scheme,
+    found: Map,
+    terms: Terms,
+    s: Floats,
+    turns: Floats,
+    unknowns: list[Extended],
+    free: list[int],
+) -> list[Match]:
+    """Gauss-Newton on the four entries, weighted by their covariance; all first guesses at once."""
+    observed = found.entries.reshape(4)
+    weights = _weights(scheme, found, terms, s)
+
+    def entries_at(values: Extended) -> Extended:
+        log_mass = values[:, 2]
+        if terms.log_stiffness is not None:
+            log_mass = terms.log_stiffness - 2 * np.log(s) - np.log(np.abs(values[:, 0]))
+        return frame(scheme, values[:, 0], values[:, 1], log_mass, s, found.size).reshape(-1, 4)
+
+    values = np.stack(unknowns, axis=1)
+    kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
+    chi2, errors = np.full(len(s), np.inf), np.zeros(len(s))
+    with np.errstate(all="ignore"):
+        for _ in range(8):
+            predicted = entries_at(values)
+            miss = np.asarray(observed - predicted, dtype=np.float64)
+            now = np.einsum("ci,cij,cj->c", miss, weights, miss)
+            better = now < chi2
+            if not np.any(better):
+                break
+            slopes = np.empty((len(s), 4, len(free)))
+            for column, i in enumerate(free):
+                # a difference quotient: its error slows the iteration, it does not move the end
+                delta = 1e-5 * np.abs(values[:, 0]) if i == 0 else np.full(len(s), np.longdouble(1e-6))
+                shift = np.zeros_like(values)
+                shift[:, i] = delta
+                rise = entries_at(values + shift) - entries_at(values - shift)
+                slopes[:, :, column] = (rise / (2 * delta[:, None])).astype(np.float64)
+            inverse = _inverse(np.einsum("cia,cij,cjb->cab", slopes, weights, slopes))
+            kept[better], entries[better], chi2[better] = values[better], predicted[better], now[better]
+            errors[better] = np.sqrt(inverse[better, 0, 0])
+            change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", inverse, slopes, weights, miss))
+            limit = 0.5 * np.abs(values[:, 0].astype(np.float64))
+            change[:, 0] = np.clip(change[:, 0], -limit, limit)
+            values = values.copy()
+            values[:, free] += change
+    return [
+        Match(
+            scheme=scheme.name,
+            stride=int(s[i]),
+            turns=int(turns[i]),
+            a=float(kept[i, 0]),
+            a_error=float(errors[i]),
+            friction=float(kept[i, 1]),
+            log_mass=float(kept[i, 2]),
+            chi2=float(chi2[i]),
+            freedom=4 - len(free),
+            predicted=tuple(float(x) for x in entries[i]),
+        )
+        for i in np.flatnonzero(np.isfinite(chi2))
+    ]
+
+
+def _inverse(normal: Floats) -> Floats:
+    """Inverses of positive matrices (c, i, i) whose diagonals differ by many powers of ten."""
+    scale = np.sqrt(np.einsum("caa->ca", normal))
+    scale = np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)
+    even = np.nan_to_num(normal / scale[:, :, None] / scale[:, None, :], posinf=0, neginf=0)
+    return np.asarray(np.linalg.pinv(even, hermitian=True) / scale[:, :, None] / scale[:, None, :])
+
+
+def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats) -> Floats:
+    """Inverse covariances (c, 4, 4): of the fit, of coefficients rounded once, of the interval.
+
+    The rounding of h k or h/m is the same in every step, so no number of pairs averages it away: an entry
+    of the map over s steps is uncertain by the roundings of its path times s, whatever the fit says.
+    """
+    b = np.abs(found.entries.astype(np.float64))
+    largest = max(1.0, float(np.max(b)))
+    path = 1 if scheme.flow else roundings(scheme)
+    coherent = terms.rounding * path * s * largest
+    clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
+    total = found.covariance + clock + coherent[:, None, None] ** 2 * np.eye(4)
+    return _inverse(total)
