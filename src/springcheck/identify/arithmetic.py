@@ -104,7 +104,7 @@ def _stored(record: Record, found: Map, match: Match, quanta: Floats) -> str:
     texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
     if texts:
         return texts[0] if len(set(texts)) == 1 else " and ".join(dict.fromkeys(texts))
-    missing = _orbit(found, match) / quanta
+    missing = _orbit(found, match, 1 / np.maximum(quanta, 2.0**-60)) / np.maximum(quanta, 2.0**-60)
     frames = len(missing)
     # rounding to nearest: root mean square 1/sqrt(12), largest 1/2; a fit of few numbers shifts both
     within = np.max(np.abs(missing)) <= 0.5 + 3 / np.sqrt(frames)
@@ -113,8 +113,11 @@ def _stored(record: Record, found: Map, match: Match, quanta: Floats) -> str:
     return "single"
 
 
-def _orbit(found: Map, match: Match) -> Floats:
-    """What the orbit of the scheme closest to all states leaves over (f, 2); free are start, a, friction."""
+def _orbit(found: Map, match: Match, weights: Floats) -> Floats:
+    """What the orbit of the scheme closest to all states leaves over (f, 2); free are start, a, friction.
+
+    `weights` (f, 2) are the reciprocals of what each number is uncertain by.
+    """
     frames = len(found.z)
     scheme = SCHEMES[match.scheme]
     values = np.array([match.a, match.friction], dtype=np.longdouble)
@@ -141,8 +144,10 @@ def _orbit(found: Map, match: Match) -> Floats:
             delta = np.zeros(2, dtype=np.longdouble)
             delta[i] = 1e-7 * abs(values[0])
             columns.append((((powers(values + delta) - powers(values - delta)) @ start) / (2 * delta[i])).ravel())
-        slopes = np.stack(columns, axis=1).astype(np.float64)
-        change = np.linalg.lstsq(slopes, missing.ravel().astype(np.float64), rcond=None)[0]
+        slopes = np.stack(columns, axis=1).astype(np.float64) * weights.reshape(-1, 1)
+        scale = np.sqrt(np.mean(slopes**2, axis=0))
+        right = missing.ravel().astype(np.float64) * weights.ravel()
+        change = np.linalg.lstsq(slopes / scale, right, rcond=None)[0] / scale
         start = start + change[:2]
         values[free] += change[2:]
     return np.asarray(found.z - powers(values) @ start, dtype=np.float64)

@@ -11,6 +11,9 @@ from springcheck.model import Extended, Floats
 
 ROUNDING = 2.0**-53
 
+FEWEST_PAIRS = 5
+"""More pairs than these are needed before a constant part is looked for."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Map:
@@ -26,6 +29,8 @@ class Map:
     size: Extended
     centre: Extended
     z: Extended
+    weight: Floats
+    """Weight (f - 1,) of each pair of states."""
     conditioned: bool
     """Whether the states span the plane beyond their noise."""
 
@@ -49,21 +54,42 @@ def _least_squares(columns: Extended, right: Extended) -> Extended:
     return np.asarray(x)
 
 
+def _sizes(z: Extended) -> Extended:
+    """Sizes (2,) of the two components over one turn, also where the motion grows or decays."""
+    size = np.sqrt(np.mean(z**2, axis=0))
+    size = np.where(size == 0, 1, size)
+    for _ in range(3):
+        norm = np.sum((z / size) ** 2, axis=1, keepdims=True)
+        share = np.mean(z**2 / np.where(norm == 0, 1, norm), axis=0)
+        size = np.where(share == 0, size, np.sqrt(share))
+    return np.asarray(size * np.sqrt(np.mean(np.sum((z / size) ** 2, axis=1)) / 2))
+
+
 def fit(record: Record, j: int) -> Map:
-    """The map of oscillator j.  A constant part (an equilibrium away from 0) is taken in where it shows."""
+    """The map of oscillator j.  A constant part (an equilibrium away from 0) is taken in where it shows.
+
+    Rounding is relative to a state's size, or to what the file resolves: pairs count by the inverse of it,
+    so that a motion over many powers of ten is not judged by its largest states alone.
+    """
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
-    size = np.sqrt(np.mean((z - np.mean(z, axis=0)) ** 2, axis=0))
-    about = np.sqrt(np.mean(z**2, axis=0))
-    size = np.where(about < 2 * size, about, size)
+    size = _sizes(z - np.mean(z, axis=0))
+    size = np.minimum(size, _sizes(z)) if np.all(_sizes(z) < 2 * size) else size
     z = z / size
+    quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
+    quanta = quanta / size.astype(np.float64)
     pairs = len(z) - 1
-    before, after = z[:-1], z[1:]
+    noise = np.sqrt(np.sum((ROUNDING * z.astype(np.float64)) ** 2 + quanta**2 / 12, axis=1))[:-1]
+    weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
+    about = z[:-1] - np.mean(z, axis=0) if np.any(np.abs(np.mean(z, axis=0)) > 1) else z[:-1]
+    weight = weight * np.sqrt(2 * pairs / float(np.sum((weight[:, None] * about) ** 2)))
+    w = weight[:, None].astype(np.longdouble)
+    before, after = w * z[:-1], w * z[1:]
     x = _least_squares(before, after)
     rss = np.sum((after - before @ x) ** 2, axis=0)
     centre = np.zeros(2, dtype=np.longdouble)
-    floor = pairs * (4 * ROUNDING * np.max(np.abs(z), axis=0)) ** 2
+    floor = float(np.sum((4 * ROUNDING * before) ** 2))
     if np.any(rss > floor) and pairs > FEWEST_PAIRS:
-        wide = np.concatenate([before, np.ones((pairs, 1), dtype=np.longdouble)], axis=1)
+        wide = np.concatenate([before, w], axis=1)
         y = _least_squares(wide, after)
         left = np.sum((after - wide @ y) ** 2, axis=0)
         # one number more per row removes chi-squared of 1 by chance; 50 is seven standard errors
@@ -73,43 +99,41 @@ def fit(record: Record, j: int) -> Map:
             for _ in range(3):
                 centre = centre + inverse @ (y[2] - centre + y[:2].T @ centre)
             x, rss = y[:2], left
-    entries = x.T
     z = z - centre
-    before, after = z[:-1], z[1:]
-    spread = before.astype(np.float64)
+    spread = (w * z[:-1]).astype(np.float64)
     gram = spread.T @ spread
-    variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), (ROUNDING / 2) ** 2)
+    least = ROUNDING / 2 * float(np.sqrt(np.mean(np.sum(before**2, axis=1))))
+    variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), least**2)
     smallest = float(np.linalg.eigvalsh(gram / pairs)[0])
     conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
     inverse = np.linalg.pinv(gram)
     covariance = np.kron(np.diag(variance), inverse)
-    quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
-    covariance += _storage_covariance(z, entries, quanta / size.astype(np.float64), inverse)
+    if {record.q_storage.name, record.v_storage.name} != {"double"}:
+        covariance += _storage_covariance(z, x.T, quanta, weight, inverse)
     return Map(
-        entries=entries,
+        entries=x.T,
         covariance=covariance,
         residual=np.sqrt(rss.astype(np.float64) / pairs),
         size=size,
         centre=centre * size,
         z=z,
+        weight=weight,
         conditioned=conditioned,
     )
 
 
-FEWEST_PAIRS = 5
-
-
-def _storage_covariance(z: Extended, entries: Extended, quanta: Floats, inverse: Floats) -> Floats:
+def _storage_covariance(
+    z: Extended, entries: Extended, quanta: Floats, weight: Floats, inverse: Floats
+) -> Floats:
     """Covariance (4, 4) of the entries from the rounding of each recorded number, uniform within a quantum.
 
     A rounded state stands in two pairs, once as the later and once as the earlier one; the two
     influences partly cancel, so they are summed before they are squared.
     """
     states, b = z.astype(np.float64), entries.astype(np.float64)
-    later = np.zeros_like(states)
-    later[1:] = states[:-1]
-    earlier = states.copy()
-    earlier[-1] = 0
+    later, earlier = np.zeros_like(states), np.zeros_like(states)
+    later[1:] = weight[:, None] ** 2 * states[:-1]
+    earlier[:-1] = weight[:, None] ** 2 * states[:-1]
     # influence[m, j, i, a]: of the error of component j of state m on entry (i, a)
     influence = np.eye(2)[None, :, :, None] * later[:, None, None, :]
     influence = influence - b.T[None, :, :, None] * earlier[:, None, None, :]

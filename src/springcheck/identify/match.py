@@ -95,20 +95,21 @@ def frame(
 
 
 @cache
-def _phases(name: str) -> tuple[Floats, Floats]:
-    """h w (ascending) and the phase of one step, over the range in which the phase grows."""
+def _phases(name: str) -> tuple[tuple[Floats, Floats], ...]:
+    """(phase of one step ascending, h w) over each range of h w in which the phase grows or falls."""
     scheme = SCHEMES[name]
     top = min(scheme.limit, 60.0) if scheme.limit > 0 else 4.0
     # the phase bends like a square root at a limit of stability, so points crowd there
     x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
     x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
-    if scheme.flow:
-        return x, x
-    found = rotation(unit_matrix(scheme, np.square(x.astype(np.longdouble)), np.zeros(1, np.longdouble)))
-    phase = np.asarray(found.angle, dtype=np.float64)
-    falls = np.flatnonzero(np.diff(phase) <= 0)
-    end = int(falls[0]) + 1 if len(falls) else len(x)
-    return x[:end], phase[:end]
+    matrices = unit_matrix(scheme, np.square(x.astype(np.longdouble)), np.zeros(1, np.longdouble))
+    found = rotation(matrices)
+    side = np.where(matrices[:, 0, 1] < 0, -1, 1)
+    phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
+    rising = np.diff(phase) > 0
+    ends = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(x) - 1]
+    parts = [(phase[a : b + 1], x[a : b + 1]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return tuple((y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts)
 
 
 def _starts(scheme: Scheme, entries: Extended, strides: range) -> tuple[Floats, Floats, Floats]:
@@ -116,15 +117,24 @@ def _starts(scheme: Scheme, entries: Extended, strides: range) -> tuple[Floats, 
     phase = float(rotation(entries[None]).angle[0])
     if entries[0, 1] < 0:
         phase = -phase
-    x, phases = _phases(scheme.name)
     if scheme.flow:
         turns = np.arange(0 if phase > 0 else 1, 8, dtype=np.float64)
         return np.ones_like(turns), turns, phase + 2 * np.pi * turns
     s = np.repeat(np.array(strides, dtype=np.float64), [r // 2 + 1 for r in strides])
     turns = np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
     target = (phase + 2 * np.pi * turns) / s
-    inside = (target > 0) & (target < phases[-1])
-    return s[inside], turns[inside], np.interp(target[inside], phases, x)
+    parts: list[tuple[Floats, Floats, Floats]] = []
+    for phases, x in _phases(scheme.name):
+        # the first range begins at the first tabulated step; a phase below it is as good as proportional
+        low = 0.0 if phases is _phases(scheme.name)[0][0] else phases[0]
+        inside = (target > low) & (target < phases[-1])
+        value = np.interp(target[inside], phases, x) * np.minimum(target[inside] / phases[0], 1)
+        parts.append((s[inside], turns[inside], value))
+    return (
+        np.concatenate([part[0] for part in parts]),
+        np.concatenate([part[1] for part in parts]),
+        np.concatenate([part[2] for part in parts]),
+    )
 
 
 def _real_starts(scheme: Scheme, found: Map) -> tuple[Floats, Floats, Floats]:
@@ -198,13 +208,11 @@ def _refine(
     kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
     chi2, errors = np.full(len(s), np.inf), np.zeros(len(s))
     with np.errstate(all="ignore"):
-        for _ in range(8):
+        for _ in range(20):
             predicted = entries_at(values)
             miss = np.asarray(observed - predicted, dtype=np.float64)
             now = np.einsum("ci,cij,cj->c", miss, weights, miss)
             better = now < chi2
-            if not np.any(better):
-                break
             slopes = np.empty((len(s), 4, len(free)))
             for column, i in enumerate(free):
                 # a difference quotient: its error slows the iteration, it does not move the end
@@ -217,6 +225,8 @@ def _refine(
             kept[better], entries[better], chi2[better] = values[better], predicted[better], now[better]
             errors[better] = np.sqrt(inverse[better, 0, 0])
             change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", inverse, slopes, weights, miss))
+            if np.all(np.abs(change[:, 0]) <= 1e-17 * np.abs(values[:, 0])):
+                break
             limit = 0.5 * np.abs(values[:, 0].astype(np.float64))
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
             values = values.copy()

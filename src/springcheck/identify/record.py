@@ -80,9 +80,13 @@ def storage(x: Floats) -> Storage:
     found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
     if decimals is not None:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
+    # text that is finer than the numbers around it says nothing: every number has such a decimal form
+    values = np.array(sample)
+    binary = Storage(name="single" if single else "double").quantum(values)
+    found = [text for text in found if np.all(text.quantum(values) >= 2 * binary)]
     if found:
         # both can hold the numbers; the coarser of the two leaves less to chance
-        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(np.array(sample))))))
+        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(values)))))
     return Storage(name="single") if single else Storage()
 
 

@@ -100,6 +100,10 @@ class Joint:
         return all(part.accepted for part in self.parts)
 
     @property
+    def chi2(self) -> float:
+        return sum(part.chi2 for part in self.parts)
+
+    @property
     def plainness(self) -> tuple[int, int, int]:
         """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
         return (
@@ -273,6 +277,9 @@ def _find(
                 joints = _search(maps, terms, strides)
                 accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
                 if accepted:
+                    # what is 25 worse in chi-squared than the best, five standard errors, is excluded too
+                    best = min(x.chi2 for x in accepted)
+                    accepted = [x for x in accepted if x.chi2 <= best + 25]
                     return accepted, accepted[0], terms
                 tried += joints if not damped and strides is not many else []
     return tried, None, base
