@@ -5,6 +5,7 @@ fixes (h w)**2, and a scheme with a number of steps per frame predicts the other
 fit is the yardstick.  What single steps leave over names the arithmetic.
 """
 
-from springcheck.identify.report import Identification, identify
+from springcheck.identify.report import NONE, Identification, identify
+from springcheck.identify.stepper import identify_stepper, load_stepper
 
-__all__ = ["Identification", "identify"]
+__all__ = ["NONE", "Identification", "identify", "identify_stepper", "load_stepper"]

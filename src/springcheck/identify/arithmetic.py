@@ -55,6 +55,9 @@ def defect(record: Record, j: int, found: Map, match: Match) -> Defect:
     missing = np.abs(z[1:] - z[:-1] @ b.T).astype(np.float64)
     # sums of absolute values: what a rounding of either term is relative to
     size = np.abs(z[:-1]) @ np.abs(b).T + np.abs(z[1:]) + 2 * np.abs(centre)
+    if match.stride > 1:
+        # states between two frames lie on the same orbit: either component may be as large as the whole
+        size = size + np.sqrt(np.sum(z[:-1] ** 2, axis=1) + np.sum(z[1:] ** 2, axis=1))[:, None]
     size = size.astype(np.float64)
     # a velocity that is a difference of positions over the step carries their rounding, eps q / h
     ratio = float(found.size[0] / found.size[1]) * match.stride

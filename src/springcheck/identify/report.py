@@ -339,12 +339,17 @@ def _known(
     stated_fits: bool,
     notes: list[str],
 ) -> Identification:
-    defects = [
-        arithmetic.defect(record, j, found, part) for j, found, part in zip(moving, maps, chosen.parts, strict=True)
-    ]
-    worst = max(defects, key=lambda d: (not d.precision, d.precision != "double", d.ulp))
-    if not worst.precision:
+    defects: list[arithmetic.Defect] = []
+    for joint in dict.fromkeys([chosen, *accepted]):
+        defects = [
+            arithmetic.defect(record, j, x, part) for j, x, part in zip(moving, maps, joint.parts, strict=True)
+        ]
+        if all(d.precision for d in defects):
+            chosen = joint
+            break
+    else:
         return _unknown(record, moving, maps, terms, accepted, notes)
+    worst = max(defects, key=lambda d: (d.precision != "double", d.ulp))
     notes = [*notes, *dict.fromkeys(d.note for d in defects if d.note)]
     omega, found_stiffness, friction = _numbers(record, moving, chosen)
     determinant, symplectic = _determinants(maps, chosen.stride)
