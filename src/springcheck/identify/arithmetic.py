@@ -15,6 +15,9 @@ from springcheck.schemes import SCHEMES, roundings
 QUANTUM = 2.0**-32
 """Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point."""
 
+COARSEST = 1e-5
+"""Relative error of a force up to which it can be rounding; beyond, the force is another one."""
+
 STOERMER = {
     "semi-implicit-euler": (1, 0),
     "semi-implicit-euler-drift-kick": (0, 1),
@@ -58,6 +61,10 @@ def defect(record: Record, j: int, found: Map, match: Match) -> Defect:
     if match.stride > 1:
         # states between two frames lie on the same orbit: either component may be as large as the whole
         size = size + np.sqrt(np.sum(z[:-1] ** 2, axis=1) + np.sum(z[1:] ** 2, axis=1))[:, None]
+    if scheme.flow:
+        # a solution is evaluated at times, and their rounding turns the phase
+        orbit = np.sqrt(np.max(np.sum(z**2, axis=1)))
+        size = size + orbit * np.sqrt(abs(match.a)) * record.clock / 2.0**-52
     size = size.astype(np.float64)
     # a velocity that is a difference of positions over the step carries their rounding, eps q / h
     ratio = float(found.size[0] / found.size[1]) * match.stride
@@ -175,24 +182,20 @@ def _coarse_force(record: Record, j: int, found: Map, match: Match, ulp: float) 
     mass = 1.0 if record.mass is None else float(record.mass[j])
     force = mass * (after - before) / h
     noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
-    off = force / QUANTUM
-    # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
-    if noise < 0.05 * QUANTUM and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
-        return Defect(
-            ulp=ulp,
-            precision="fixed-point force",
-            note="every force is a whole multiple of 2**-32: a 64-bit fixed-point sum",
-        )
     stiffness = match.a * mass / float(h) ** 2
     relative = float(np.sqrt(np.mean((force + stiffness * q[1:-1]) ** 2) / np.mean((stiffness * q[1:-1]) ** 2)))
-    if 2.0**-28 <= relative <= 2.0**-21:
-        return Defect(
-            ulp=ulp,
-            precision="mixed",
-            note=f"states are double, forces single: they are off by {relative:.1e} of their size",
-        )
+    if relative > COARSEST:
+        return Defect(ulp=ulp, precision="")
+    values = force.astype(np.float64)
+    for name, quantum, note in (
+        ("mixed", np.spacing(np.abs(values).astype(np.float32)).astype(np.float64), "single-precision numbers"),
+        ("fixed-point force", np.full(len(values), QUANTUM), "whole multiples of 2**-32, a 64-bit fixed-point sum"),
+    ):
+        # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
+        off = force / quantum
+        if noise < 0.05 * float(np.median(quantum)) and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
+            return Defect(ulp=ulp, precision=name, note=f"states are double, and forces are {note}")
+    name = "mixed" if 2.0**-28 <= relative <= 2.0**-21 else "coarse force"
     return Defect(
-        ulp=ulp,
-        precision="coarse force",
-        note=f"states are double, but forces are off by {relative:.1e} of their size",
+        ulp=ulp, precision=name, note=f"states are double, but forces are off by {relative:.1e} of their size"
     )

@@ -18,6 +18,9 @@ CHANCE = 1e-7
 STRIDES = 12, 100
 """Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
 
+NEAR = 0.02
+"""Distance of entries, of size 1, within which a first guess is worth refining."""
+
 ONE_STEP = tuple(s for s in SCHEMES.values() if s.one_step or s.flow)
 OWN_FRICTION = tuple(s for s in ONE_STEP if any(kind == "friction" for kind, _ in s.stages))
 
@@ -176,6 +179,12 @@ def match(scheme: Scheme, found: Map, terms: Terms, strides: range) -> list[Matc
             return []
         unknowns[1] = np.log(np.abs(own)) - np.log(all_steps) / s
         free.append(1)
+        # friction shrinks areas; what grows beyond the scheme's own growth is no friction
+        damped = unknowns[1] > 0
+        if not np.any(damped):
+            return []
+        s, turns, unknowns, zero = s[damped], turns[damped], [x[damped] for x in unknowns], zero[damped]
+        a = a[damped]
     if terms.mass_unknown and terms.log_stiffness is None:
         guess = frame(scheme, a, unknowns[1], zero, s, found.size)
         up = np.abs(guess[:, 0, 1] / found.entries[0, 1])
@@ -198,39 +207,55 @@ def _refine(
     observed = found.entries.reshape(4)
     weights = _weights(scheme, found, terms, s)
 
-    def entries_at(values: Extended) -> Extended:
-        log_mass = values[:, 2]
-        if terms.log_stiffness is not None:
-            log_mass = terms.log_stiffness - 2 * np.log(s) - np.log(np.abs(values[:, 0]))
-        return frame(scheme, values[:, 0], values[:, 1], log_mass, s, found.size).reshape(-1, 4)
+    def log_masses(values: Extended, strides: Floats) -> Extended:
+        if terms.log_stiffness is None:
+            return values[:, 2]
+        return np.asarray(terms.log_stiffness - 2 * np.log(strides) - np.log(np.abs(values[:, 0])))
+
+    def entries_at(values: Extended, strides: Floats) -> Extended:
+        masses = log_masses(values, strides)
+        return frame(scheme, values[:, 0], values[:, 1], masses, strides, found.size).reshape(-1, 4)
 
     values = np.stack(unknowns, axis=1)
     kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
-    chi2, errors = np.full(len(s), np.inf), np.zeros(len(s))
+    chi2, errors, stalled = np.full(len(s), np.inf), np.zeros(len(s)), np.zeros(len(s), dtype=int)
+    alive = np.arange(len(s))
     with np.errstate(all="ignore"):
-        for _ in range(20):
-            predicted = entries_at(values)
+        for turn in range(20):
+            now_s, now_weights, now_values = s[alive], weights[alive], values[alive]
+            predicted = entries_at(now_values, now_s)
             miss = np.asarray(observed - predicted, dtype=np.float64)
-            now = np.einsum("ci,cij,cj->c", miss, weights, miss)
-            better = now < chi2
-            slopes = np.empty((len(s), 4, len(free)))
+            if turn == 0 and not terms.damped and not terms.mass_unknown:
+                # a first guess from the phase is good to 1e-3 where the scheme is right
+                near = np.max(np.abs(miss), axis=1) <= NEAR * max(1.0, float(np.max(np.abs(observed))))
+                keep = near | (np.max(np.abs(miss), axis=1) <= 10 * np.sqrt(found.covariance.max()))
+                keep[np.argmin(np.max(np.abs(miss), axis=1))] = True
+                alive, predicted, miss = alive[keep], predicted[keep], miss[keep]
+                now_s, now_weights, now_values = now_s[keep], now_weights[keep], now_values[keep]
+            now = np.einsum("ci,cij,cj->c", miss, now_weights, miss)
+            slopes = np.empty((len(alive), 4, len(free)))
             for column, i in enumerate(free):
                 # a difference quotient: its error slows the iteration, it does not move the end
-                delta = 1e-5 * np.abs(values[:, 0]) if i == 0 else np.full(len(s), np.longdouble(1e-6))
-                shift = np.zeros_like(values)
+                delta = np.abs(now_values[:, 0]) * 1e-5 if i == 0 else np.full(len(alive), np.longdouble(1e-6))
+                shift = np.zeros_like(now_values)
                 shift[:, i] = delta
-                rise = entries_at(values + shift) - entries_at(values - shift)
+                rise = entries_at(now_values + shift, now_s) - entries_at(now_values - shift, now_s)
                 slopes[:, :, column] = (rise / (2 * delta[:, None])).astype(np.float64)
-            inverse = _inverse(np.einsum("cia,cij,cjb->cab", slopes, weights, slopes))
-            kept[better], entries[better], chi2[better] = values[better], predicted[better], now[better]
-            errors[better] = np.sqrt(inverse[better, 0, 0])
-            change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", inverse, slopes, weights, miss))
-            if np.all(np.abs(change[:, 0]) <= 1e-17 * np.abs(values[:, 0])):
-                break
-            limit = 0.5 * np.abs(values[:, 0].astype(np.float64))
+            inverse = _inverse(np.einsum("cia,cij,cjb->cab", slopes, now_weights, slopes))
+            better = now < chi2[alive]
+            stalled[alive] = np.where(now < 0.9 * chi2[alive], 0, stalled[alive] + 1)
+            new = alive[better]
+            kept[new], entries[new], chi2[new] = now_values[better], predicted[better], now[better]
+            errors[new] = np.sqrt(inverse[better, 0, 0])
+            change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", inverse, slopes, now_weights, miss))
+            limit = 0.5 * np.abs(now_values[:, 0].astype(np.float64))
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
-            values = values.copy()
-            values[:, free] += change
+            values[np.ix_(alive, free)] += change
+            alive = alive[(stalled[alive] < 2) & (np.abs(change[:, 0]) > 1e-17 * np.abs(now_values[:, 0]))]
+            if not len(alive):
+                break
+    masses = log_masses(kept, s)
+    physical = kept[:, 1] > 0 if terms.damped else np.ones(len(s), dtype=bool)
     return [
         Match(
             scheme=scheme.name,
@@ -239,12 +264,12 @@ def _refine(
             a=float(kept[i, 0]),
             a_error=float(errors[i]),
             friction=float(kept[i, 1]),
-            log_mass=float(kept[i, 2]),
+            log_mass=float(masses[i]),
             chi2=float(chi2[i]),
             freedom=4 - len(free),
             predicted=tuple(float(x) for x in entries[i]),
         )
-        for i in np.flatnonzero(np.isfinite(chi2))
+        for i in np.flatnonzero(np.isfinite(chi2) & physical)
     ]
 
 

@@ -49,6 +49,8 @@ class Record:
     interval: np.longdouble
     jitter: float
     """Relative uncertainty of the interval, from the rounding of the recorded times."""
+    clock: float
+    """Rounding of the recorded times, in intervals."""
     q: Extended
     v: Extended
     q_quantum: Floats
@@ -90,8 +92,8 @@ def storage(x: Floats) -> Storage:
     return Storage(name="single") if single else Storage()
 
 
-def _interval(t: Floats) -> tuple[np.longdouble, float]:
-    """The constant interval of times t (f,), and its relative uncertainty."""
+def _interval(t: Floats) -> tuple[np.longdouble, float, float]:
+    """The constant interval of times t (f,), its relative uncertainty, and the rounding of t in intervals."""
     wide = t.astype(np.longdouble)
     interval = (wide[-1] - wide[0]) / (len(t) - 1)
     if interval == 0:
@@ -106,7 +108,7 @@ def _interval(t: Floats) -> tuple[np.longdouble, float]:
             f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
             "give a part of the trajectory with one interval"
         )
-    return interval, quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53
+    return interval, quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53, quantum / abs(float(interval))
 
 
 def _states(x: ArrayLike, name: str, frames: int) -> Floats:
@@ -148,7 +150,7 @@ def read(
             raise IdentificationError(
                 f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
             )
-    interval, jitter = _interval(times)
+    interval, jitter, clock = _interval(times)
     masses = _masses(mass, positions.shape[1])
     if p is not None and v is not None and masses is None:
         weight = np.sum(given[1] ** 2, axis=0)
@@ -171,6 +173,7 @@ def read(
     return Record(
         interval=interval,
         jitter=jitter,
+        clock=clock,
         q=positions.astype(np.longdouble),
         v=moving.astype(np.longdouble) / unit,
         q_quantum=q_storage.quantum(positions),

@@ -240,7 +240,7 @@ def identify(
         agreeing = [x for x in found_all if not _disagreements(record, moving, x, stated)]
         found_all = agreeing or found_all
         chosen = found_all[0]
-    if chosen is None or stride == -1 or (stride is not None and chosen.stride != stride):
+    if chosen is None or stride == -1 or (stride is not None and chosen.stride != stride and chosen.scheme != "exact"):
         if stride is not None and stride > 0:
             notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
         stated_fits = stride is None
@@ -430,7 +430,7 @@ def _unknown(
         )
         notes = [*notes, f"nearest is {nearest}; measured less predicted entries on (q, v T): {entries}"]
     residual = max(float(np.max(found.residual)) for found in maps)
-    notes = [*notes, *_causes(record, moving, maps, residual)]
+    notes = [*notes, *_causes(maps, terms, residual)]
     return Identification(
         scheme=NONE,
         aliases=(),
@@ -452,7 +452,26 @@ def _unknown(
     )
 
 
-def _causes(record: Record, moving: list[int], maps: list[Map], residual: float) -> list[str]:
+def _other_units(maps: list[Map], terms: list[Terms]) -> list[str]:
+    """Whether a scheme fits once velocities may have any scale: wrong masses, wrong units, dq/dt = p."""
+    if terms[0].mass_unknown:
+        return []
+    free = [replace(what, mass_unknown=True, damped=False, rounding=ROUNDING) for what in terms]
+    fitting = [x for x in _search(maps, free, range(1, 4)) if x.accepted]
+    if not fitting:
+        return []
+    best = min(fitting, key=lambda x: x.plainness)
+    # a scale that is nearly 1 is no change of units but the misfit itself
+    if max(abs(part.log_mass) for part in best.parts) < 1e-3:
+        return []
+    factor = ", ".join(f"{math.exp(-part.log_mass):.3g}" for part in best.parts)
+    return [
+        f"{best} would fit if velocities were about {factor} times as large: "
+        "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
+    ]
+
+
+def _causes(maps: list[Map], terms: list[Terms], residual: float) -> list[str]:
     """Why no matrix explains the states, where that shows."""
     z = [found.z.astype(np.float64) for found in maps]
     out = []
@@ -474,6 +493,7 @@ def _causes(record: Record, moving: list[int], maps: list[Map], residual: float)
                     "give normal modes, which are independent"
                 )
                 break
+    out = out or _other_units(maps, terms)
     if not out and residual > 64 * ROUNDING:
         out.append(
             f"one map leaves {residual:.1e} of the state unexplained in every step, which no known arithmetic or "
