@@ -18,7 +18,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify import identify
-from springcheck.identify.report import aliases
+from springcheck.identify.search import aliases
 from springcheck.model import Floats
 from springcheck.schemes import SCHEMES, step
 
@@ -37,7 +37,7 @@ def motion(name: str, rng: np.random.Generator) -> tuple[Floats, Floats, Floats,
     q = rng.normal(size=1) * 10 ** rng.uniform(-1, 2)
     p = rng.normal(size=1) * m * x / h * np.abs(q)
     if scheme.flow:
-        t = np.arange(FRAMES) * h
+        t = np.asarray(np.arange(FRAMES) * h, dtype=np.float64)
         w = np.sqrt(k.astype(np.longdouble) / m)
         c, s = np.cos(w * t[:, None]), np.sin(w * t[:, None])
         return t, (q * c + p / (m * w) * s).astype(float), (p * c - m * w * q * s).astype(float), m, k, 1
@@ -45,15 +45,16 @@ def motion(name: str, rng: np.random.Generator) -> tuple[Floats, Floats, Floats,
     states = [(q, p)]
     for _ in range(FRAMES - 1):
         for _ in range(stride):
-            q, p = step(
+            new = step(
                 scheme, q, p, h=h, m=m, force=lambda q, p: -k * q, stiffness=np.diag(k), friction=FRICTION / h
             )
+            q, p = (np.asarray(x, dtype=np.float64) for x in new)
         # a scheme that grows without bound leaves the range of single precision, and the file ends
         if not max(abs(q[0]), abs(p[0])) < 1e30:
             break
         states.append((q, p))
     qs, ps = (np.array([state[i] for state in states]) for i in (0, 1))
-    return np.arange(len(states)) * (stride * h), qs, ps, m, k, stride
+    return np.asarray(np.arange(len(states)) * (stride * h), dtype=np.float64), qs, ps, m, k, stride
 
 
 def written(x: Floats, form: str) -> Floats:

@@ -1,9 +1,10 @@
 """The mathematics of the methods: one-step maps as data, and what follows from them exactly.
 
 A scheme is either a splitting (a sequence of kicks ``p += c h F(q)``, drifts ``q += d h p/m`` and
-frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or decimal strings of 40 digits where they are
-irrational.  `step` carries out a scheme in the width of the numbers it is given; everything else
-(matrix, determinant, frequency, shadow energy, stability) is derived from that one definition.
+frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or
+decimal strings of 40 digits where they are irrational.  `step` carries out a scheme in the width of the
+numbers it is given; everything else (matrix, determinant, frequency, shadow energy, stability) is
+derived from that one definition.
 
 Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
 the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
@@ -386,7 +387,7 @@ def magnitude_step(
 
 
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: a force 4, a kick 2, a drift or a friction 3, in and out 4."""
+    """Roundings on the longest path through one step: a force 4, a kick 2, others 3, in and out 4."""
     if scheme.stages:
         return 4 + sum(6 if kind == "kick" else 3 for kind, _ in scheme.stages)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

@@ -5,7 +5,8 @@ fixes (h w)**2, and a scheme with a number of steps per frame predicts the other
 fit is the yardstick.  What single steps leave over names the arithmetic.
 """
 
-from springcheck.identify.report import NONE, Identification, identify
+from springcheck.identify.report import identify
+from springcheck.identify.result import NONE, Identification
 from springcheck.identify.stepper import identify_stepper, load_stepper
 
 __all__ = ["NONE", "Identification", "identify", "identify_stepper", "load_stepper"]

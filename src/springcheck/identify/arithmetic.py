@@ -153,7 +153,9 @@ def _orbit(found: Map, match: Match, weights: Floats) -> Floats:
         for i in free:
             delta = np.zeros(2, dtype=np.longdouble)
             delta[i] = 1e-7 * abs(values[0])
-            columns.append((((powers(values + delta) - powers(values - delta)) @ start) / (2 * delta[i])).ravel())
+            columns.append(
+                (((powers(values + delta) - powers(values - delta)) @ start) / (2 * delta[i])).ravel()
+            )
         slopes = np.stack(columns, axis=1).astype(np.float64) * weights.reshape(-1, 1)
         scale = np.sqrt(np.mean(slopes**2, axis=0))
         right = missing.ravel().astype(np.float64) * weights.ravel()
@@ -183,13 +185,23 @@ def _coarse_force(record: Record, j: int, found: Map, match: Match, ulp: float) 
     force = mass * (after - before) / h
     noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
     stiffness = match.a * mass / float(h) ** 2
-    relative = float(np.sqrt(np.mean((force + stiffness * q[1:-1]) ** 2) / np.mean((stiffness * q[1:-1]) ** 2)))
+    relative = float(
+        np.sqrt(np.mean((force + stiffness * q[1:-1]) ** 2) / np.mean((stiffness * q[1:-1]) ** 2))
+    )
     if relative > COARSEST:
         return Defect(ulp=ulp, precision="")
     values = force.astype(np.float64)
     for name, quantum, note in (
-        ("mixed", np.spacing(np.abs(values).astype(np.float32)).astype(np.float64), "single-precision numbers"),
-        ("fixed-point force", np.full(len(values), QUANTUM), "whole multiples of 2**-32, a 64-bit fixed-point sum"),
+        (
+            "mixed",
+            np.spacing(np.abs(values).astype(np.float32)).astype(np.float64),
+            "single-precision numbers",
+        ),
+        (
+            "fixed-point force",
+            np.full(len(values), QUANTUM),
+            "whole multiples of 2**-32, a 64-bit fixed-point sum",
+        ),
     ):
         # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
         off = force / quantum

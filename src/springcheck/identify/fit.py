@@ -81,7 +81,9 @@ def fit(record: Record, j: int) -> Map:
     noise = np.sqrt(np.sum((ROUNDING * z.astype(np.float64)) ** 2 + quanta**2 / 12, axis=1))[:-1]
     weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
     about = z[:-1] - np.mean(z, axis=0) if np.any(np.abs(np.mean(z, axis=0)) > 1) else z[:-1]
-    weight = weight * np.sqrt(2 * pairs / float(np.sum((weight[:, None] * about) ** 2)))
+    weight = np.asarray(
+        weight * np.sqrt(2 * pairs / float(np.sum((weight[:, None] * about) ** 2))), dtype=np.float64
+    )
     w = weight[:, None].astype(np.longdouble)
     before, after = w * z[:-1], w * z[1:]
     x = _least_squares(before, after)
@@ -94,10 +96,10 @@ def fit(record: Record, j: int) -> Map:
         left = np.sum((after - wide @ y) ** 2, axis=0)
         # one number more per row removes chi-squared of 1 by chance; 50 is seven standard errors
         if np.any(rss - left > 50 * np.maximum(left / (pairs - 3), floor / pairs)):
-            inverse = np.linalg.inv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
-            centre = inverse @ y[2]
+            back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
+            centre = back @ y[2]
             for _ in range(3):
-                centre = centre + inverse @ (y[2] - centre + y[:2].T @ centre)
+                centre = centre + back @ (y[2] - centre + y[:2].T @ centre)
             x, rss = y[:2], left
     z = z - centre
     spread = (w * z[:-1]).astype(np.float64)
@@ -106,10 +108,10 @@ def fit(record: Record, j: int) -> Map:
     variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), least**2)
     smallest = float(np.linalg.eigvalsh(gram / pairs)[0])
     conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
-    inverse = np.linalg.pinv(gram)
-    covariance = np.kron(np.diag(variance), inverse)
+    inverse = np.asarray(np.linalg.pinv(gram), dtype=np.float64)
+    covariance: Floats = np.kron(np.diag(variance), inverse).astype(np.float64)
     if {record.q_storage.name, record.v_storage.name} != {"double"}:
-        covariance += _storage_covariance(z, x.T, quanta, weight, inverse)
+        covariance = covariance + _storage_covariance(z, x.T, quanta, weight, inverse)
     return Map(
         entries=x.T,
         covariance=covariance,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import chdtri
@@ -111,7 +112,7 @@ def _phases(name: str) -> tuple[tuple[Floats, Floats], ...]:
     phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
     rising = np.diff(phase) > 0
     ends = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(x) - 1]
-    parts = [(phase[a : b + 1], x[a : b + 1]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    parts = [(phase[a : b + 1], x[a : b + 1]) for a, b in pairwise(ends)]
     return tuple((y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts)
 
 
@@ -236,7 +237,9 @@ def _refine(
             slopes = np.empty((len(alive), 4, len(free)))
             for column, i in enumerate(free):
                 # a difference quotient: its error slows the iteration, it does not move the end
-                delta = np.abs(now_values[:, 0]) * 1e-5 if i == 0 else np.full(len(alive), np.longdouble(1e-6))
+                delta = (
+                    np.abs(now_values[:, 0]) * 1e-5 if i == 0 else np.full(len(alive), np.longdouble(1e-6))
+                )
                 shift = np.zeros_like(now_values)
                 shift[:, i] = delta
                 rise = entries_at(now_values + shift, now_s) - entries_at(now_values - shift, now_s)
@@ -250,7 +253,7 @@ def _refine(
             change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", inverse, slopes, now_weights, miss))
             limit = 0.5 * np.abs(now_values[:, 0].astype(np.float64))
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
-            values[np.ix_(alive, free)] += change
+            values[alive[:, None], free] += change
             alive = alive[(stalled[alive] < 2) & (np.abs(change[:, 0]) > 1e-17 * np.abs(now_values[:, 0]))]
             if not len(alive):
                 break

@@ -140,9 +140,13 @@ def read(
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
     if len(times) < FEWEST:
-        raise IdentificationError(f"{len(times)} states are too few to read a map from; give {FEWEST} or more")
+        raise IdentificationError(
+            f"{len(times)} states are too few to read a map from; give {FEWEST} or more"
+        )
     if p is None and v is None:
-        raise IdentificationError("positions alone do not show the scheme; give momenta or velocities as well")
+        raise IdentificationError(
+            "positions alone do not show the scheme; give momenta or velocities as well"
+        )
     positions = _states(q, "q", len(times))
     given = [_states(x, name, len(times)) for name, x in (("p", p), ("v", v)) if x is not None]
     for x in given:

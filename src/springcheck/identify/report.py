@@ -1,24 +1,22 @@
-"""Which scheme made these states: the search, what is said of it, and the document that carries it."""
+"""Which scheme made these states: reading them, searching, and saying what was found."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from functools import cache
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
+from springcheck.identify.causes import causes
 from springcheck.identify.fit import ROUNDING, Map, fit
-from springcheck.identify.match import ONE_STEP, OWN_FRICTION, STRIDES, Match, Terms, match, unit_matrix
+from springcheck.identify.match import Terms
 from springcheck.identify.record import Record, read
+from springcheck.identify.result import NONE, Identification
+from springcheck.identify.search import Joint, aliases, difference, disagreements, find, numbers, search
 from springcheck.model import Floats
-from springcheck.schemes import SCHEMES, roundings
-
-NONE = "none (adaptive or unknown)"
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
@@ -33,144 +31,12 @@ LEAPFROG = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Identification:
-    """What the states say.  Rows of numbers hold one for each oscillator that moves.
-
-    `fits` is true where a known scheme explains every step to the rounding of a known arithmetic, and what
-    was stated (mass, stiffness, step) agrees with it.
-    """
-
-    scheme: str
-    aliases: tuple[str, ...]
-    """Other names of the same map: on a spring nothing can tell them apart."""
-    candidates: tuple[str, ...]
-    """Schemes that this trajectory does not exclude, "name" or "name, s steps a frame"."""
-    step: float
-    """[T]; negative where time runs backwards."""
-    stride: int
-    """Steps from frame to frame."""
-    omega: tuple[float, ...]
-    """True angular frequency sqrt(k/m), not that of the discrete motion; NaN for an inverted spring [1/T]."""
-    stiffness: tuple[float, ...] | None
-    """[M/T2]; None where no mass is known."""
-    friction: tuple[float, ...]
-    """Rate c/m [1/T]."""
-    velocity_offset: float
-    """Time of the velocities after that of the positions, in steps."""
-    determinant: tuple[float, ...]
-    """Of the measured map, for one step."""
-    symplectic_defect: float
-    """Largest |M^T J M - J| of the measured map between frames."""
-    defect_ulp: float
-    """Largest departure of one recorded step from the scheme's, in units of 2**-52 of the terms' sizes."""
-    precision: str
-    fits: bool
-    nearest: str
-    """The scheme itself, or where none fits the one whose entries are closest."""
-    difference: tuple[float, ...]
-    """Measured less predicted entries M11, M12, M21, M22 between frames, of the first oscillator, (q, v T)."""
-    notes: tuple[str, ...]
-
-    def document(self) -> dict[str, Any]:
-        """For JSON: numbers for one oscillator, lists for several, null for what is not known."""
-
-        def plain(x: Any) -> Any:
-            if isinstance(x, float):
-                return x if math.isfinite(x) else None
-            return [plain(y) for y in x] if isinstance(x, tuple) else x
-
-        out = {name: plain(x) for name, x in asdict(self).items()}
-        for name in ("omega", "stiffness", "friction", "determinant"):
-            if out[name] is not None and len(out[name]) == 1:
-                out[name] = out[name][0]
-        return out
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Joint:
-    """One scheme and stride for all oscillators together."""
-
-    scheme: str
-    stride: int
-    parts: tuple[Match, ...]
-
-    @property
-    def accepted(self) -> bool:
-        return all(part.accepted for part in self.parts)
-
-    @property
-    def chi2(self) -> float:
-        return sum(part.chi2 for part in self.parts)
-
-    @property
-    def plainness(self) -> tuple[int, int, int]:
-        """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
-        return (
-            max(part.turns for part in self.parts),
-            self.stride,
-            -1 if self.scheme == "exact" else list(SCHEMES).index(self.scheme),
-        )
-
-    def __str__(self) -> str:
-        steps = "" if self.stride == 1 else f", {self.stride} steps a frame"
-        return self.scheme + steps
-
-
-@cache
-def aliases(name: str) -> tuple[str, ...]:
-    """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
-    a = np.array([0.3, 1.1, 2.9], dtype=np.longdouble)
-    friction = np.array([0, 0.2, 0.5], dtype=np.longdouble)
-    own = unit_matrix(SCHEMES[name], a, friction)
-    return tuple(
-        scheme.name
-        for scheme in ONE_STEP
-        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, friction) - own)) < 1e-15
-    )
-
-
-@cache
-def distinct() -> tuple[str, ...]:
-    """One name of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
-    out: list[str] = []
-    for scheme in ONE_STEP:
-        if not set(aliases(scheme.name)) & set(out):
-            out.append(scheme.name)
-    return tuple(out)
-
-
-def _search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
-    """Every scheme and stride against every oscillator; what fails one is not tried on the next."""
-    without = {scheme.name for scheme in OWN_FRICTION}
-    names = [name for name in distinct() if terms[0].damped or name not in without]
-    keys: dict[tuple[str, int], list[Match]] = {}
-    for i, (found, what) in enumerate(zip(maps, terms, strict=True)):
-        best: dict[tuple[str, int], Match] = {}
-        for name in names:
-            wanted = sorted({key[1] for key in keys if key[0] == name}) if i else []
-            if i and not wanted:
-                continue
-            within = range(wanted[0], wanted[-1] + 1) if i else strides
-            for m in match(SCHEMES[name], found, what, within):
-                key = name, m.stride
-                old = best.get(key)
-                if old is None or (not m.accepted, m.turns, m.chi2) < (not old.accepted, old.turns, old.chi2):
-                    best[key] = m
-        merged = {
-            key: [*keys.get(key, []), m] for key, m in best.items() if not i or (key in keys and len(keys[key]) == i)
-        }
-        passing = {key: ms for key, ms in merged.items() if all(m.accepted for m in ms)}
-        keys = passing if passing and i + 1 < len(maps) else merged
-    return [Joint(scheme=k[0], stride=k[1], parts=tuple(ms)) for k, ms in keys.items() if len(ms) == len(maps)]
-
-
 def _moving(record: Record) -> tuple[list[int], list[str]]:
     """Oscillators that move, and a note on those that do not."""
     spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
     moving = np.flatnonzero(spread > 0).tolist()
     if not moving:
-        raise IdentificationError("nothing moves: at rest every scheme does the same; give a start away from rest")
+        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
     still = len(spread) - len(moving)
     return moving, [f"{still} of {len(spread)} oscillators are at rest and left out"] if still else []
 
@@ -226,8 +92,14 @@ def identify(
     for j, found in zip(moving, maps, strict=True):
         pull, error = abs(float(found.entries[1, 0])), math.sqrt(found.covariance[2, 2])
         if pull < 6 * error:
-            raise IdentificationError(f"no force acts on oscillator {j}: every scheme moves it in a straight line")
-    stated = None if stiffness is None else np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
+            raise IdentificationError(
+                f"no force acts on oscillator {j}: every scheme moves it in a straight line"
+            )
+    stated = (
+        None
+        if stiffness is None
+        else np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
+    )
     stride = _stated_stride(record, step, notes)
     base = [_terms(record, j, stated) for j in moving]
     if record.momenta and stated is None:
@@ -235,12 +107,16 @@ def identify(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
             "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
         )
-    found_all, chosen, terms = _find(record, maps, base, stride)
+    found_all, chosen, terms = find(record, maps, base, stride)
     if chosen is not None and stated is not None:
-        agreeing = [x for x in found_all if not _disagreements(record, moving, x, stated)]
+        agreeing = [x for x in found_all if not disagreements(record, moving, x, stated)]
         found_all = agreeing or found_all
         chosen = found_all[0]
-    if chosen is None or stride == -1 or (stride is not None and chosen.stride != stride and chosen.scheme != "exact"):
+    if (
+        chosen is None
+        or stride == -1
+        or (stride is not None and chosen.stride != stride and chosen.scheme != "exact")
+    ):
         if stride is not None and stride > 0:
             notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
         stated_fits = stride is None
@@ -258,74 +134,10 @@ def _terms(record: Record, j: int, stated: Floats | None) -> Terms:
     return Terms(mass_unknown=record.momenta, jitter=record.jitter, log_stiffness=log_stiffness)
 
 
-def _find(
-    record: Record, maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], Joint | None, list[Terms]]:
-    """All accepted schemes, and the plainest; without friction first, and with it where nothing fits.
-
-    Coefficients are taken as rounded in double precision first.  Where the states are coarser than that
-    the arithmetic may have been so too, and a second round allows coefficients of single precision.
-    """
-    coarse = max(float(np.max(found.residual)) for found in maps) > 2.0**-40
-    tried: list[Joint] = []
-    first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
-    few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
-    for damped, ranges in ((False, [*first, few]), (True, [*first, few]), (False, [many])):
-        for rounding in (ROUNDING, 2.0**-24) if coarse else (ROUNDING,):
-            terms = [replace(what, damped=damped, rounding=rounding) for what in base]
-            for strides in ranges:
-                joints = _search(maps, terms, strides)
-                accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
-                if accepted:
-                    # what is 25 worse in chi-squared than the best, five standard errors, is excluded too
-                    best = min(x.chi2 for x in accepted)
-                    accepted = [x for x in accepted if x.chi2 <= best + 25]
-                    return accepted, accepted[0], terms
-                tried += joints if not damped and strides is not many else []
-    return tried, None, base
-
-
-def _numbers(
-    record: Record, moving: list[int], chosen: Joint
-) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
-    """Frequency, stiffness and friction rate of each oscillator."""
-    h = float(record.interval) / chosen.stride
-    omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
-    friction = tuple(m.friction / h for m in chosen.parts)
-    stiffness: tuple[float, ...] | None = None
-    if record.mass is not None:
-        stiffness = tuple(float(record.mass[j]) * m.a / h**2 for j, m in zip(moving, chosen.parts, strict=True))
-    elif record.momenta:
-        stiffness = tuple(math.exp(m.log_mass) * m.a / h**2 for m in chosen.parts)
-    return omega, stiffness, friction
-
-
-def _disagreements(record: Record, moving: list[int], joint: Joint, stated: Floats) -> list[str]:
-    """Where the stiffness that the states show is not the stated one, beyond six standard errors and rounding."""
-    _, stiffness, _ = _numbers(record, moving, joint)
-    path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
-    out = []
-    for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
-        error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
-        off = k / float(stated[j]) - 1 if stated[j] else math.inf
-        if not abs(off) <= error:
-            out.append(
-                f"the stated stiffness {stated[j]:.9g} does not fit: the states show {k:.9g} "
-                f"(relative difference {off:+.2e}, known to {error:.0e})"
-            )
-    return out
-
-
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
     between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
     each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
     return each, max(abs(d - 1) for d in between)
-
-
-def _difference(found: Map, part: Match) -> tuple[float, ...]:
-    off = found.entries.reshape(4) - np.array(part.predicted, dtype=np.longdouble)
-    ratio = float(found.size[0] / found.size[1])
-    return tuple(float(x) * y for x, y in zip(off, (1, ratio, 1 / ratio, 1), strict=True))
 
 
 def _known(
@@ -342,7 +154,8 @@ def _known(
     defects: list[arithmetic.Defect] = []
     for joint in dict.fromkeys([chosen, *accepted]):
         defects = [
-            arithmetic.defect(record, j, x, part) for j, x, part in zip(moving, maps, joint.parts, strict=True)
+            arithmetic.defect(record, j, x, part)
+            for j, x, part in zip(moving, maps, joint.parts, strict=True)
         ]
         if all(d.precision for d in defects):
             chosen = joint
@@ -351,13 +164,13 @@ def _known(
         return _unknown(record, moving, maps, terms, accepted, notes)
     worst = max(defects, key=lambda d: (d.precision != "double", d.ulp))
     notes = [*notes, *dict.fromkeys(d.note for d in defects if d.note)]
-    omega, found_stiffness, friction = _numbers(record, moving, chosen)
+    omega, found_stiffness, friction = numbers(record, moving, chosen)
     determinant, symplectic = _determinants(maps, chosen.stride)
     h = float(record.interval) / chosen.stride
     if stated is not None:
-        disagreements = _disagreements(record, moving, chosen, stated)
-        stated_fits = stated_fits and not disagreements
-        notes += disagreements
+        against = disagreements(record, moving, chosen, stated)
+        stated_fits = stated_fits and not against
+        notes += against
     notes += _remarks(accepted, chosen, friction)
     first = chosen.parts[0]
     return Identification(
@@ -376,7 +189,7 @@ def _known(
         precision=worst.precision,
         fits=stated_fits,
         nearest=chosen.scheme,
-        difference=_difference(maps[0], first),
+        difference=difference(maps[0], first),
         notes=tuple(notes),
     )
 
@@ -388,7 +201,9 @@ def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) 
     if any(part.friction for part in chosen.parts):
         out.append(f"the motion is damped at a rate c/m of {', '.join(f'{x:.6g}' for x in friction)}")
     if max(part.turns for part in chosen.parts):
-        out.append("the motion makes whole turns between two frames: the frequency is not the one that they show")
+        out.append(
+            "the motion makes whole turns between two frames: the frequency is not the one that they show"
+        )
     if any(part.a < 0 for part in chosen.parts):
         out.append("the spring is inverted: its stiffness is negative")
     others = [f"{x}{_apart(x, chosen)}" for x in accepted if x is not chosen]
@@ -406,31 +221,37 @@ def _apart(other: Joint, chosen: Joint) -> str:
 
 
 def _unknown(
-    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], tried: list[Joint], notes: list[str]
+    record: Record,
+    moving: list[int],
+    maps: list[Map],
+    terms: list[Terms],
+    tried: list[Joint],
+    notes: list[str],
 ) -> Identification:
     """No scheme: the nearest, what differs, and what else may be the matter."""
 
     def distance(joint: Joint) -> float:
-        return max(max(map(abs, _difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
+        return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
     if not tried:
-        tried = _search(maps, [replace(what, damped=False) for what in terms], range(1, 2))
+        tried = search(maps, [replace(what, damped=False) for what in terms], range(1, 2))
     determinant, symplectic = _determinants(maps, 1)
-    nearest, difference = "", (math.nan,) * 4
+    nearest = ""
+    off: tuple[float, ...] = (math.nan,) * 4
     omega: tuple[float, ...] = tuple(math.nan for _ in moving)
     stiffness = None
     if tried:
         least = min(distance(x) for x in tried)
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
-        nearest, difference = str(close), _difference(maps[0], close.parts[0])
-        omega, stiffness, _ = _numbers(record, moving, close)
+        nearest, off = str(close), difference(maps[0], close.parts[0])
+        omega, stiffness, _ = numbers(record, moving, close)
         entries = ", ".join(
-            f"{name} {x:+.1e}" for name, x in zip(("M11", "M12", "M21", "M22"), difference, strict=True)
+            f"{name} {x:+.1e}" for name, x in zip(("M11", "M12", "M21", "M22"), off, strict=True)
         )
         notes = [*notes, f"nearest is {nearest}; measured less predicted entries on (q, v T): {entries}"]
     residual = max(float(np.max(found.residual)) for found in maps)
-    notes = [*notes, *_causes(maps, terms, residual)]
+    notes = [*notes, *causes(maps, terms, residual)]
     return Identification(
         scheme=NONE,
         aliases=(),
@@ -447,66 +268,6 @@ def _unknown(
         precision="unknown",
         fits=False,
         nearest=nearest,
-        difference=difference,
+        difference=off,
         notes=tuple(notes),
     )
-
-
-def _other_units(maps: list[Map], terms: list[Terms]) -> list[str]:
-    """Whether a scheme fits once velocities may have any scale: wrong masses, wrong units, dq/dt = p."""
-    if terms[0].mass_unknown:
-        return []
-    free = [replace(what, mass_unknown=True, damped=False, rounding=ROUNDING) for what in terms]
-    fitting = [x for x in _search(maps, free, range(1, 4)) if x.accepted]
-    if not fitting:
-        return []
-    best = min(fitting, key=lambda x: x.plainness)
-    # a scale that is nearly 1 is no change of units but the misfit itself
-    if max(abs(part.log_mass) for part in best.parts) < 1e-3:
-        return []
-    factor = ", ".join(f"{math.exp(-part.log_mass):.3g}" for part in best.parts)
-    return [
-        f"{best} would fit if velocities were about {factor} times as large: "
-        "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
-    ]
-
-
-def _causes(maps: list[Map], terms: list[Terms], residual: float) -> list[str]:
-    """Why no matrix explains the states, where that shows."""
-    z = [found.z.astype(np.float64) for found in maps]
-    out = []
-    for found, states in zip(maps, z, strict=True):
-        q, v = states[:-1].T
-        missing = (found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)
-        if len(q) > 20:
-            powers = [q**i * v**k for i in range(4) for k in range(4) if 0 < i + k <= 3]
-            if _left(np.stack(powers, axis=1), missing) < 0.1:
-                out.append("the motion is anharmonic: the force is not linear in the position, so no matrix fits it")
-                break
-    if len(maps) > 1 and len(z[0]) > 4 * len(maps) + 10:
-        everything = np.concatenate([states[:-1] for states in z], axis=1)
-        for found in maps:
-            missing = (found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)
-            if residual > 1e-12 and _left(everything, missing) < 0.01:
-                out.append(
-                    "the oscillators are coupled: each follows from the states of all; "
-                    "give normal modes, which are independent"
-                )
-                break
-    out = out or _other_units(maps, terms)
-    if not out and residual > 64 * ROUNDING:
-        out.append(
-            f"one map leaves {residual:.1e} of the state unexplained in every step, which no known arithmetic or "
-            "number format does: an adaptive solver, noise, or a force that changes"
-        )
-    if not out:
-        out.append("one map explains the states to rounding, but it is none of the known schemes'")
-    return out
-
-
-def _left(columns: Floats, missing: Floats) -> float:
-    """Share of the residual that these columns leave over."""
-    fitted = columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
-    total = float(np.sqrt(np.mean(missing**2)))
-    share = len(missing) / max(len(missing) - columns.shape[1], 1)
-    return float(np.sqrt(np.mean((missing - fitted) ** 2) * share)) / total if total else 1.0

@@ -13,7 +13,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError
-from springcheck.identify.report import NONE, Identification, identify
+from springcheck.identify.report import identify
+from springcheck.identify.result import NONE, Identification
 from springcheck.model import Floats
 from springcheck.schemes import SCHEMES
 
@@ -43,21 +44,27 @@ def load_stepper(spec: str) -> Stepper:
             raise MethodError(f"no module {module_name!r} in {here} or among the installed ones") from error
         raise MethodError(f"module {module_name!r} needs {missing!r}, which is not installed") from error
     except Exception as error:
-        raise MethodError(f"module {module_name!r} cannot be imported: {type(error).__name__}: {error}") from error
+        raise MethodError(
+            f"module {module_name!r} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
     finally:
         sys.path.remove(here)
     found: Any = module
     for part in name.split("."):
         if not hasattr(found, part):
             known = [x for x in vars(module) if callable(getattr(module, x)) and not x.startswith("_")]
-            raise MethodError(f"module {module_name!r} has no {name!r}; it has {', '.join(known) or 'no functions'}")
+            raise MethodError(
+                f"module {module_name!r} has no {name!r}; it has {', '.join(known) or 'no functions'}"
+            )
         found = getattr(found, part)
     if not callable(found):
         raise MethodError(f"{spec!r} is a {type(found).__name__}, not a function")
     return found  # type: ignore[no-any-return]
 
 
-def _one(step: Stepper, q: float, p: float, h: float, force: Callable[..., Any], mass: float) -> tuple[float, float]:
+def _one(
+    step: Stepper, q: float, p: float, h: float, force: Callable[..., Any], mass: float
+) -> tuple[float, float]:
     """One step of the student's; numbers first, arrays of one particle where it wants to index them."""
     try:
         try:
@@ -65,8 +72,10 @@ def _one(step: Stepper, q: float, p: float, h: float, force: Callable[..., Any],
         except (TypeError, IndexError, AttributeError):
             out = step(np.array([q]), np.array([p]), h, force, np.array([mass]))
         new_q, new_p = out
-        q, p = (float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
-                for x in (new_q, new_p))
+        q, p = (
+            float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
+            for x in (new_q, new_p)
+        )
     except Exception as error:
         raise MethodError(
             f"the stepper failed at q={q:.6g}, p={p:.6g}, h={h:.6g}: {type(error).__name__}: {error}; "
@@ -84,7 +93,7 @@ def _run(
     for _ in range(frames - 1):
         states.append(_one(step, *states[-1], h, force, m))
     q, p = np.array(states).T
-    return h * np.arange(frames), q, p
+    return np.asarray(h * np.arange(frames), dtype=np.float64), q, p
 
 
 def _spring(k: float) -> Callable[..., Any]:
@@ -112,29 +121,29 @@ def identify_stepper(step: Stepper) -> Identification:
     fits = all(x.fits for x in results) and len(schemes) == 1
     notes = list(dict.fromkeys(note for x in results for note in x.notes)) if fits else list(found.notes)
     if len(schemes) > 1:
-        named = "; ".join(f"{x.scheme} at m={m}, k={k}, h={h}" for x, (m, k, h) in zip(results, SPRINGS, strict=True))
+        named = "; ".join(
+            f"{x.scheme} at m={m}, k={k}, h={h}" for x, (m, k, h) in zip(results, SPRINGS, strict=True)
+        )
         notes.append(f"the stepper looks like different schemes on different springs: {named}")
     if not fits:
         notes += _mass_use(step)
     backward = _backwards(step, found) if found.scheme != NONE else ""
     fits = fits and not backward
     notes += [backward] if backward else []
-    slope, error = _order(step)
+    slope, deviation = _order(step)
     if math.isnan(slope):
         notes.append("its error on a quartic well does not fall as a power of the step: no order is seen")
         fits = False
     else:
-        notes.append(f"order {slope:.2f} +- {error:.2f} on a quartic well")
+        notes.append(f"order {slope:.2f} +- {deviation:.2f} on a quartic well")
         order = SCHEMES[found.scheme].order if found.scheme in SCHEMES else 0
-        if order and slope < order - max(5 * error, 0.25):
+        if order and slope < order - max(5 * deviation, 0.25):
             notes.append(
                 f"on a spring it is {found.scheme}, of order {order}, but not on forces that are not linear: "
                 "look for a force that is evaluated at the wrong place"
             )
             fits = False
-    return replace(
-        found, fits=fits, notes=tuple(notes), defect_ulp=max(x.defect_ulp for x in results)
-    )
+    return replace(found, fits=fits, notes=tuple(notes), defect_ulp=max(x.defect_ulp for x in results))
 
 
 def _mass_use(step: Stepper) -> list[str]:
@@ -172,7 +181,12 @@ def _order(step: Stepper) -> tuple[float, float]:
 
     m, b, q0, p0, duration = WELL
     true = solve_ivp(
-        lambda t, z: [z[1] / m, -b * z[0] ** 3], (0, duration), [q0, p0], method="DOP853", rtol=1e-13, atol=1e-14
+        lambda t, z: [z[1] / m, -b * z[0] ** 3],
+        (0, duration),
+        [q0, p0],
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-14,
     ).y[:, -1]
     steps, errors = [], []
     for count in (16, 24, 36, 54, 80, 120, 180, 270, 400, 600):
