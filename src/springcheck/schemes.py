@@ -1,9 +1,10 @@
 """The mathematics of the methods: one-step maps as data, and what follows from them exactly.
 
-A scheme is either a splitting (a sequence of kicks ``p += c h F(q)`` and drifts ``q += d h p/m``) or a
-Runge-Kutta tableau.  Coefficients are exact: fractions, or decimal strings of 40 digits where they are
-irrational.  `step` carries out a scheme in the width of the numbers it is given; everything else
-(matrix, determinant, frequency, shadow energy, stability) is derived from that one definition.
+A scheme is either a splitting (a sequence of kicks ``p += c h F(q)``, drifts ``q += d h p/m`` and
+frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or
+decimal strings of 40 digits where they are irrational.  `step` carries out a scheme in the width of the
+numbers it is given; everything else (matrix, determinant, frequency, shadow energy, stability) is
+derived from that one definition.
 
 Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
 the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
@@ -22,7 +23,7 @@ import numpy as np
 from springcheck.model import Extended, Floats, Force, Integers, Reals
 
 Coefficient: TypeAlias = Fraction | str
-Stage: TypeAlias = tuple[Literal["kick", "drift"], Coefficient]
+Stage: TypeAlias = tuple[Literal["kick", "drift", "friction"], Coefficient]
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -32,7 +33,8 @@ class Scheme:
     """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
 
     `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.
-    A scheme with neither stages nor tableau has no one-step map: an adaptive solver.
+    A scheme with neither stages nor tableau has no step: an adaptive solver, or the exact flow (`flow`),
+    which has a matrix on linear scenes and nothing else.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Scheme:
     stages: tuple[Stage, ...] = ()
     a: tuple[tuple[Fraction, ...], ...] = ()
     b: tuple[Fraction, ...] = ()
+    flow: bool = False
     source: str = ""
 
     @property
@@ -52,7 +55,7 @@ class Scheme:
 
     @property
     def one_step(self) -> bool:
-        """Whether the scheme is a map from one state to the next."""
+        """Whether `step` can carry the scheme out."""
         return bool(self.stages or self.b)
 
 
@@ -214,6 +217,24 @@ _ALL = (
         source="Yoshida 1990",
     ),
     Scheme(
+        name="langevin-middle",
+        title="Langevin middle at T = 0: kick, half drift, friction, half drift",
+        order=1,
+        limit=2.0,
+        symplectic=True,
+        stages=(("kick", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
+        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; OpenMM's LangevinMiddleIntegrator",
+    ),
+    Scheme(
+        name="exact",
+        title="exact flow",
+        order=0,
+        limit=np.inf,
+        symplectic=True,
+        flow=True,
+        source="the solution of the equation of motion",
+    ),
+    Scheme(
         name="adams",
         title="CVODE Adams-Moulton, orders 1-12",
         order=0,
@@ -247,9 +268,19 @@ def _sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
 
 
 def step(
-    scheme: Scheme, q: Reals, p: Reals, *, h: Any, m: Reals, force: Force, stiffness: Reals | None = None
+    scheme: Scheme,
+    q: Reals,
+    p: Reals,
+    *,
+    h: Any,
+    m: Reals,
+    force: Force,
+    stiffness: Reals | None = None,
+    friction: Any = 0.0,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
+
+    `friction` is the rate gamma [1/T] of the scheme's own friction stages; schemes without any ignore it.
 
     Implicit schemes need `stiffness`, the second derivatives of the potential, (n, n) or (..., n, n);
     double precision is enough, because it only steers an iteration whose residual has the full width.
@@ -261,9 +292,13 @@ def step(
             ch = number(c, width) * h
             if kind == "kick":
                 p = p + ch * force(q, p)
-            else:
+            elif kind == "drift":
                 q = q + ch * (p / m)
+            else:
+                p = p * np.exp(-ch * np.asarray(friction, dtype=width))
         return q, p
+    if not scheme.b:
+        raise ValueError(f"{scheme.name} has no step that a force alone defines")
     forces: list[Reals] = []
     velocities: list[Reals] = []
     for row in scheme.a:
@@ -324,7 +359,7 @@ def magnitude_step(
         for kind, c in stages:
             if kind == "kick":
                 p = p + c * h * magnitude(q, p)
-            else:
+            elif kind == "drift":
                 q = q + c * h * p / m
         return q, p
     rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
@@ -352,7 +387,7 @@ def magnitude_step(
 
 
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4."""
+    """Roundings on the longest path through one step: a force 4, a kick 2, others 3, in and out 4."""
     if scheme.stages:
         return 4 + sum(6 if kind == "kick" else 3 for kind, _ in scheme.stages)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)
@@ -361,38 +396,63 @@ def roundings(scheme: Scheme) -> int:
 def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
-    Found by stepping the two unit vectors, so the scheme is written down once.
+    Friction [M/T] is part of the force, -c p/m, unless the scheme has friction stages of its own; their
+    rate is c/m.  Found by stepping the two unit vectors, so the scheme is written down once; an implicit
+    one solves its stages, which are linear, and the exact flow is the exponential.
     """
-    m, k = np.atleast_1d(np.asarray(m, np.longdouble)), np.atleast_1d(np.asarray(k, np.longdouble))
-    m, k = np.broadcast_arrays(m, k)
-    friction = np.asarray(c, np.longdouble)
+    m, k, c = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    if scheme.implicit or scheme.flow:
+        generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
+        generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
+        return _exponential(generator, h) if scheme.flow else _linear_step(scheme, generator, h)
+    own = any(kind == "friction" for kind, _ in scheme.stages)
 
     def force(q: Reals, p: Reals) -> Reals:
-        return np.asarray(-k * q - friction * (p / m))
+        return np.asarray(-k * q if own else -k * q - c * (p / m))
 
     out = np.empty((len(m), 2, 2), dtype=np.longdouble)
-    if scheme.implicit:
-        for j in range(len(m)):
-            mj, kj = m[j : j + 1], k[j : j + 1]
-
-            def pull(q: Reals, p: Reals, kj: Reals = kj) -> Reals:
-                return np.asarray(-kj * q)
-
-            columns = step(
-                scheme,
-                np.eye(2, dtype=np.longdouble)[0][:, None],
-                np.eye(2, dtype=np.longdouble)[1][:, None],
-                h=h,
-                m=mj,
-                force=pull,
-                stiffness=kj[:, None],
-            )
-            out[j, 0], out[j, 1] = columns[0][:, 0], columns[1][:, 0]
-        return out
     ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
-    q, p = step(scheme, np.stack([ones, zeros]), np.stack([zeros, ones]), h=h, m=m, force=force)
+    q, p = step(
+        scheme, np.stack([ones, zeros]), np.stack([zeros, ones]), h=h, m=m, force=force, friction=c / m
+    )
     out[:, 0, :], out[:, 1, :] = q.T, p.T
     return out
+
+
+def _exponential(generator: Extended, h: float) -> Extended:
+    """exp(h L) of 2 x 2 matrices L (n, 2, 2), of any damping: with L = N - g I, N**2 is a multiple of I."""
+    eye = np.eye(2, dtype=np.longdouble)
+    t = np.longdouble(h)
+    g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
+    traceless = generator + g[:, None, None] * eye
+    w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
+    w = np.sqrt(np.abs(w2))
+    safe = np.where(w == 0, 1, w)
+    even = np.where(w2 >= 0, np.cos(w * t), np.cosh(np.where(w2 < 0, w, 0) * t))
+    odd = np.where(w2 >= 0, np.sin(w * t), np.sinh(np.where(w2 < 0, w, 0) * t)) / safe
+    odd = np.where(w == 0, t, odd)
+    decay = np.exp(-g * t)
+    return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
+
+
+def _linear_step(scheme: Scheme, generator: Extended, h: float) -> Extended:
+    """One step of a diagonally implicit tableau on z' = L z (n, 2, 2): each stage is a 2 x 2 solve."""
+    eye = np.eye(2, dtype=np.longdouble)
+    stages: list[Extended] = []
+    for row in scheme.a:
+        right = np.broadcast_to(eye, generator.shape)
+        for x, stage in zip(row, stages, strict=False):
+            right = right + number(x, np.longdouble) * np.longdouble(h) * stage
+        left = eye - number(row[len(stages)], np.longdouble) * np.longdouble(h) * generator
+        determinant = left[:, 0, 0] * left[:, 1, 1] - left[:, 0, 1] * left[:, 1, 0]
+        inverse = np.empty_like(left)
+        inverse[:, 0, 0], inverse[:, 1, 1] = left[:, 1, 1], left[:, 0, 0]
+        inverse[:, 0, 1], inverse[:, 1, 0] = -left[:, 0, 1], -left[:, 1, 0]
+        stages.append(generator @ (inverse / determinant[:, None, None]) @ right)
+    total = np.broadcast_to(eye, generator.shape)
+    for x, stage in zip(scheme.b, stages, strict=True):
+        total = total + number(x, np.longdouble) * np.longdouble(h) * stage
+    return np.asarray(total)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
