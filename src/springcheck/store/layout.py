@@ -17,10 +17,13 @@ y and z are a fill value, so it costs no bytes.  `time` and `step` are hard link
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
@@ -28,6 +31,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.model import Scene
+from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool
 
@@ -134,6 +138,35 @@ def begin(file: Any) -> None:
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
     write_attributes(head.create_group("creator"), {"name": "springcheck", "version": ours})
     head.create_group("modules/units").attrs["version"] = np.array([1, 0], dtype=np.int32)
+
+
+@lru_cache(maxsize=1)
+def _empty() -> bytes:
+    with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+@contextlib.contextmanager
+def fresh(path: Path, size: int) -> Iterator[Any]:
+    """A new HDF5 file, open for writing, with room for `size` bytes taken up on the disk beforehand.
+
+    libhdf5 cannot close a file whose last write failed, and crashes the interpreter at its end: so it is
+    never the one to find the disk full.
+    """
+    files.room(path, size)
+    path.write_bytes(_empty())
+    with reopened(path, size) as file:
+        yield file
+
+
+@contextlib.contextmanager
+def reopened(path: Path, size: int) -> Iterator[Any]:
+    """A file of ours, open for writing, with room for `size` more bytes taken up beforehand."""
+    with path.open("rb+") as raw:
+        files.reserve(raw, raw.seek(0, os.SEEK_END) + size + MARGIN)
+    with h5py.File(path, "r+", libver=LIBVER, locking=False) as file:
+        yield file
 
 
 def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]:
