@@ -23,6 +23,7 @@ import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -126,17 +127,11 @@ def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
 
 def begin(file: Any) -> None:
     """The head of every file of ours: /h5md and what it is."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        ours = version("springcheck")
-    except PackageNotFoundError:
-        ours = "unknown"
     write_attributes(file, {"NX_class": "NXroot", "format": FORMAT})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
-    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": ours})
+    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": _ours()})
     head.create_group("modules/units").attrs["version"] = np.array([1, 0], dtype=np.int32)
 
 
@@ -234,9 +229,17 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
     write_attributes(group["mass"], {"unit": unit["mass"], "units": unit["mass"]})
 
 
+def _ours() -> str:
+    try:
+        return version("springcheck")
+    except PackageNotFoundError:
+        return "unknown"
+
+
 def machine() -> dict[str, Scalar]:
-    """What ran the program."""
+    """What ran, and on what."""
     return {
+        "springcheck": _ours(),
         "machine": platform.machine(),
         "processor": _processor(),
         "cores": os.cpu_count() or 0,
