@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import subprocess
 import sys
 from dataclasses import replace
@@ -47,7 +48,9 @@ def trajectory(s: Scene, label: str, seed: int = 0, frames: int | None = None) -
         timing=Timing(start=0.25, run=1.5),
         force_calls=41,
         tolerance=1e-12,
-        arithmetic=Arithmetic(name="mixed", state=2.0**-24, force=2.0**-53, quantum=2.0**-32, overflow=2.0**31),
+        arithmetic=Arithmetic(
+            name="mixed", state=2.0**-24, force=2.0**-53, quantum=2.0**-32, overflow=2.0**31
+        ),
         rebuilds_velocity=True,
         origin={"openmm": "8.6.1", "platform": "OpenCL", "velocity": "full step"},
     )
@@ -68,7 +71,9 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
         assert (one is None) == (two is None)
         assert one is None or one.tobytes() == np.ascontiguousarray(two).tobytes(), name
     rest = {"t": np.empty(0), "q": np.empty(0), "p": np.empty(0), "energy": None}
-    plain = [{k: getattr(replace(x, **rest), k) for k in Trajectory.__slots__ if k not in rest} for x in (a, b)]
+    plain = [
+        {k: getattr(replace(x, **rest), k) for k in Trajectory.__slots__ if k not in rest} for x in (a, b)
+    ]
     assert plain[0] == plain[1]
 
 
@@ -90,7 +95,9 @@ def test_an_unfinished_store_is_read_from_its_journal(tmp_path: Path) -> None:
     assert not store.summary(tmp_path / "s.h5").complete
 
 
-def test_a_run_that_stopped_early_is_stored_at_its_length(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_stopped_early_is_stored_at_its_length(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(draft, "BUFFER", 128)
     s = scene(steps=4000)
     for frames in (1, 5, 6, 1999):
@@ -114,7 +121,7 @@ def test_the_digest_and_the_bytes_do_not_depend_on_how_the_frames_arrive(
     with pytest.MonkeyPatch.context() as patch, store.open_new(path, "run") as journal:
         patch.setattr(draft, "BUFFER", buffer)
         with journal.draft("own:euler", s) as made:
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
+            for a, b in itertools.pairwise(edges):
                 made.append(one.t[a:b], one.q[a:b], one.p[a:b], one.energy[a:b])
             digest = made.finish(store.attributes(one))
         journal.commit(s)
@@ -157,7 +164,10 @@ def test_only_what_the_scene_asks_for_is_stored(tmp_path: Path, kept: tuple[str,
 
 def test_a_scene_that_records_nothing_is_refused(tmp_path: Path) -> None:
     s = scene(quantities=())
-    with store.open_new(tmp_path / "s.h5", "run") as journal, pytest.raises(StoreError, match="records nothing"):
+    with (
+        store.open_new(tmp_path / "s.h5", "run") as journal,
+        pytest.raises(StoreError, match="records nothing"),
+    ):
         journal.draft("own:euler", s)
 
 
@@ -249,7 +259,7 @@ def test_windows_overlap_by_one_frame_and_make_up_the_whole(tmp_path: Path) -> N
     for rows in (1, 7, 110, 111, 112, 5000):
         pieces = list(store.windows(tmp_path / "s.h5", "sundials:adams", rows))
         assert all(len(piece.t) <= rows + 1 for piece in pieces)
-        assert all(np.array_equal(a.q[-1], b.q[0]) for a, b in zip(pieces[:-1], pieces[1:], strict=True))
+        assert all(np.array_equal(a.q[-1], b.q[0]) for a, b in itertools.pairwise(pieces))
         joined = np.concatenate([pieces[0].p, *(piece.p[1:] for piece in pieces[1:])])
         assert np.array_equal(joined, made.p)
 
@@ -276,10 +286,20 @@ def test_long_arrays_are_mapped_and_equal(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_verdicts_comparison_tables_and_documents_come_back(tmp_path: Path) -> None:
     verdicts = tuple(
-        Verdict(method="own:euler", check=f"c{passed}", value=1e-16, bound=np.inf, unit="nm", passed=passed, why="¼")
+        Verdict(
+            method="own:euler",
+            check=f"c{passed}",
+            value=1e-16,
+            bound=np.inf,
+            unit="nm",
+            passed=passed,
+            why="¼",
+        )
         for passed in (True, False, None)
     )
-    comparison = store.Comparison(labels=("a", "exact"), max_difference=np.array([[0, 2.5], [2.5, 0]]), unit="nm")
+    comparison = store.Comparison(
+        labels=("a", "exact"), max_difference=np.array([[0, 2.5], [2.5, 0]]), unit="nm"
+    )
     table = store.Table(
         name="precision/own:euler",
         columns={"h": [0.1, 0.2], "error": np.eye(2), "n": np.array([1, 2]), "ok": np.array([True, False]),

@@ -76,7 +76,9 @@ def test_a_checkpoint_empties_the_journal_and_counts_as_finished(tmp_path: Path)
     assert store.check(path) == []
 
 
-def test_a_forced_run_that_was_killed_leaves_the_old_store_and_is_taken_up_without_force(tmp_path: Path) -> None:
+def test_a_forced_run_that_was_killed_leaves_the_old_store_and_is_taken_up_without_force(
+    tmp_path: Path,
+) -> None:
     path, s = tmp_path / "s.h5", scene()
     made = written(path, s)
     with store.open_new(path, "new", force=True) as journal:
@@ -156,12 +158,16 @@ def _dies(real: Callable[..., object], call: int) -> Callable[..., object]:
     return dying
 
 
-def test_a_commit_that_fails_puts_an_adopted_part_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_commit_that_fails_puts_an_adopted_part_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path, s = tmp_path / "s.h5", scene()
     monkeypatch.setattr(adopt, "LARGE", 0)
     with store.open_new(path, "run") as journal:
         journal.save(trajectory(s, LABELS[0]), s)
-        before = {name: (reading.parts_folder(path) / name).read_bytes() for name in parts(path) if "run" in name}
+        before = {
+            name: (reading.parts_folder(path) / name).read_bytes() for name in parts(path) if "run" in name
+        }
         with monkeypatch.context() as patch:
             patch.setattr(merge, "_plots", _dies(print, 1))
             with pytest.raises(Killed):

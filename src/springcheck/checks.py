@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -52,7 +52,23 @@ class Case:
 
     @cached_property
     def linear(self) -> bool:
-        return mechanics.is_linear(self.scene)
+        """Whether each normal mode has a one-step matrix of its own."""
+        return mechanics.has_modes(self.scene) and not self.scheme.mixes
+
+    @property
+    def area_preserving(self) -> bool:
+        """Whether every step keeps area: a symplectic scheme, and no friction."""
+        return self.scheme.symplectic and not mechanics.is_damped(self.scene)
+
+    @cached_property
+    def law(self) -> dict[str, Any]:
+        """What `schemes.step` and `schemes.magnitude_step` need beside the forces."""
+        scene = self.judged
+        stiff: Extended | None = None
+        if self.scheme.implicit:
+            of = mechanics.own_stiffness if mechanics.is_separate(scene) else mechanics.stiffness
+            stiff = of(scene, scene.q)
+        return {"stiffness": stiff, "rate": mechanics.rates(scene) if mechanics.is_damped(scene) else None}
 
     @cached_property
     def modes(self) -> exact.Modes:
@@ -62,7 +78,7 @@ class Case:
     def matrices(self) -> Extended:
         """One-step matrices of the modes, on (y, v)."""
         one = np.ones(1, dtype=np.longdouble)
-        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2)
+        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2, c=self.modes.rate)
 
     @cached_property
     def w(self) -> Extended:
@@ -86,9 +102,10 @@ class Case:
         q, p = run.q[:-1].astype(np.longdouble), run.p[:-1].astype(np.longdouble)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
         sizes = mechanics.magnitude(scene.terms)
-        stiff = mechanics.stiffness(scene, scene.q) if self.scheme.implicit else None
+        slow, fast = mechanics.split(scene.terms)
+        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
         size_q, size_p = schemes.magnitude_step(
-            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, stiffness=stiff
+            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
         )
         of_q, of_p = rounding.state * size_q, rounding.state * size_p
         extra = np.zeros_like(p)
@@ -143,15 +160,22 @@ def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended,
     """So many steps of the scheme from states (f, n), in extended precision."""
     scene = case.judged
     force = mechanics.force(scene.terms)
+    slow, fast = mechanics.split(scene.terms)
+    parts = mechanics.force(slow), mechanics.force(fast)
     m = scene.m.astype(np.longdouble)
     a: Reals = q
     b: Reals = p
-    stiff = mechanics.stiffness(scene, scene.q) if case.scheme.implicit else None
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(steps):
-            a, b = schemes.step(case.scheme, a, b, h=case.trajectory.step, m=m, force=force, stiffness=stiff)
+            a, b = schemes.step(
+                case.scheme, a, b, h=case.trajectory.step, m=m, force=force, parts=parts, **case.law
+            )
     return np.asarray(a), np.asarray(b)
 
+
+CONTRACTED = 1e-3
+"""Determinant of a step below which its powers are not formed: as the difference of two products it has
+lost 3 of the 19 digits of the reference there."""
 
 Check: TypeAlias = Callable[[Case], Verdict]
 
@@ -229,22 +253,29 @@ def _amplified(case: Case, steps: int) -> float:
 
 
 def fastest(case: Case) -> float:
-    """An upper bound of the frequencies met along the way [1/T], from the stiffness at the widest points."""
+    """Upper bound of the frequencies and rates met along the way [1/T]: stiffness at the widest points."""
     span = np.max(np.abs(case.trajectory.q), axis=0)
     stiff = np.abs(mechanics.stiffness(case.judged, span)) / case.judged.m
-    return float(np.sqrt(np.max(np.sum(stiff, axis=1))))
+    return float(np.sqrt(np.max(np.sum(stiff, axis=1)))) + float(np.max(mechanics.rates(case.judged)))
 
 
 def _closed(case: Case) -> str | None:
     reason = _no_map(case)
     if reason:
         return reason
+    if case.scheme.mixes:
+        return "slow and fast springs act at different times: no normal mode stays by itself"
     if not case.linear:
-        return "an anharmonic scene's discrete motion has no closed form"
+        return (
+            "the discrete motion of an anharmonic scene, or of one that friction couples, has no closed form"
+        )
     if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
         return "a mode under a constant pull has no closed form here"
-    if np.any(schemes.rotation(case.matrices).determinant <= 0):
+    determinant = schemes.rotation(case.matrices).determinant
+    if np.any(determinant <= 0):
         return "the step turns area over: it has no phase"
+    if np.any(determinant < CONTRACTED):
+        return "friction contracts area more in one step than the reference has digits for"
     return None
 
 
@@ -252,7 +283,7 @@ def closed_states(case: Case) -> tuple[Extended, Extended]:
     """The scheme's closed-form motion at the frames: mode coordinates about their centres, (f, n) each."""
     y, v = case.modes.into(case.scene.q, case.scene.p)
     return schemes.propagate(
-        case.matrices, y - case.modes.centre(), v, case.steps, area_preserving=case.scheme.symplectic
+        case.matrices, y - case.modes.centre(), v, case.steps, area_preserving=case.area_preserving
     )
 
 
@@ -300,7 +331,7 @@ def shadow_energy(case: Case) -> Verdict:
     u = y - case.modes.centre()
     stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
     turn = schemes.rotation(case.matrices)
-    factor = np.ones_like(turn.determinant) if case.scheme.symplectic else turn.determinant
+    factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
     y0, v0 = case.modes.into(case.scene.q, case.scene.p)
     u0 = y0 - case.modes.centre()
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
@@ -334,6 +365,8 @@ def frequency(case: Case) -> Verdict:
     why_not = _closed(case)
     if why_not:
         return case.not_applicable("frequency", why_not)
+    if mechanics.is_damped(case.scene):
+        return case.not_applicable("frequency", "a phase that decays is seen in the closed form")
     turn = schemes.rotation(case.matrices)
     y0, v0 = case.modes.into(case.scene.q, case.scene.p)
     u0 = y0 - case.modes.centre()

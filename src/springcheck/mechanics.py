@@ -53,6 +53,8 @@ class WallSpring:
     i: Integers
     k: Floats
     at: Floats
+    fast: bool = False
+    """Whether a method of multiple time steps takes these springs in its short step."""
 
     def energy(self, q: Reals) -> Reals:
         u = gather(q, self.i) - self.at
@@ -82,6 +84,8 @@ class Spring:
     b: Integers
     k: Floats
     rest: Floats
+    fast: bool = False
+    """As in `WallSpring`."""
 
     def energy(self, q: Reals) -> Reals:
         u = gather(q, self.b) - gather(q, self.a) - self.rest
@@ -139,13 +143,74 @@ class Quartic:
         np.add.at(out, (self.i, self.i), 3 * self.b * u * u)
 
 
-TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic)
-LINEAR = frozenset({"wall-spring", "spring"})
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Damping:
+    """Friction of particles i: force -c p/m.  c [M/T], m their masses [M]."""
+
+    key: ClassVar[str] = "damping"
+    bodies: ClassVar[int] = 1
+    i: Integers
+    c: Floats
+    m: Floats
+
+    def energy(self, q: Reals) -> Reals:
+        return np.zeros(q.shape[:-1], dtype=q.dtype)
+
+    def size(self, dq: Reals) -> Reals:
+        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        scatter(out, self.i, -self.c * (p[..., self.i] / self.m))
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+        scatter(out, self.i, np.abs(self.c) * (np.abs(p[..., self.i]) / self.m))
+
+    def add_stiffness(self, q: Reals, out: Reals) -> None:
+        """Friction has no energy to differentiate."""
+
+
+TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Damping)
+LINEAR = frozenset({"wall-spring", "spring", "damping"})
 
 
 def is_linear(scene: Scene) -> bool:
-    """Whether every force of the scene is linear in q, so that steps are matrices."""
+    """Whether every force of the scene is linear in q and p, so that steps are matrices."""
     return all(term.key in LINEAR for term in scene.terms)
+
+
+def rates(scene: Scene) -> Extended:
+    """Rates at which friction alone would slow each particle down, c/m (n,) [1/T], extended precision."""
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for term in scene.terms:
+        if isinstance(term, Damping):
+            np.add.at(out, term.i, term.c / term.m.astype(np.longdouble))
+    return out
+
+
+def is_damped(scene: Scene) -> bool:
+    """Whether any friction acts."""
+    return bool(np.any(rates(scene) != 0))
+
+
+def has_modes(scene: Scene) -> bool:
+    """Whether the motion falls apart into modes: linear, and friction that couples none of them.
+
+    Friction does not couple modes where no term joins two particles, or where every particle is slowed
+    down at the same rate (to a rounding of c/m).
+    """
+    if not is_linear(scene):
+        return False
+    rate = rates(scene)
+    return is_separate(scene) or bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
+
+
+def split(terms: Iterable[Term]) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+    """The slow and the fast terms: fast are the springs that the scene marks so."""
+    parts = tuple(terms)
+    return (
+        tuple(term for term in parts if not getattr(term, "fast", False)),
+        tuple(term for term in parts if getattr(term, "fast", False)),
+    )
 
 
 def is_separate(scene: Scene) -> bool:
@@ -154,10 +219,12 @@ def is_separate(scene: Scene) -> bool:
 
 
 def in_single(scene: Scene) -> Scene:
-    """The scene with every parameter of its terms rounded to single precision."""
+    """The scene with every parameter of its potential rounded to single precision."""
 
     def rounded(term: Any) -> Any:
-        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        if isinstance(term, Damping):
+            return term
+        values = {f.name: np.asarray(getattr(term, f.name)) for f in fields(term) if f.name != "fast"}
         return replace(
             term,
             **{
@@ -167,7 +234,8 @@ def in_single(scene: Scene) -> Scene:
             },
         )
 
-    return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
+    with np.errstate(over="ignore", under="ignore"):
+        return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
 
 
 def force(terms: Iterable[Term]) -> Force:
@@ -204,6 +272,19 @@ def stiffness(scene: Scene, q: Reals) -> Extended:
     out = np.zeros((scene.n, scene.n), dtype=np.longdouble)
     for term in scene.terms:
         term.add_stiffness(np.asarray(q, dtype=np.longdouble), out)
+    return out
+
+
+def own_stiffness(scene: Scene, q: Reals) -> Extended:
+    """Diagonal of `stiffness` (n,), for scenes of many particles that nothing joins."""
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    wide = np.asarray(q, dtype=np.longdouble)
+    for term in scene.terms:
+        if isinstance(term, WallSpring):
+            np.add.at(out, term.i, term.k.astype(np.longdouble))
+        elif isinstance(term, Quartic):
+            u = wide[term.i] - term.at
+            np.add.at(out, term.i, 3 * term.b * u * u)
     return out
 
 

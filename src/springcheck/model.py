@@ -114,6 +114,8 @@ class Method:
     adaptive: bool = False
     terms: frozenset[str] = frozenset({"spring"})
     kinds: frozenset[str] = frozenset({"particles"})
+    requires: frozenset[str] = frozenset()
+    """What a scene must have for the method to be worth running: term keys, or "springs marked fast"."""
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
 

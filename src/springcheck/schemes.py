@@ -20,10 +20,14 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.model import Extended, Floats, Force, Integers, Reals
+from springcheck import mechanics
+from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene
 
 Coefficient: TypeAlias = Fraction | str
-Stage: TypeAlias = tuple[Literal["kick", "drift", "friction"], Coefficient]
+Stage: TypeAlias = tuple[Literal["kick", "drift", "pull", "friction", "slow", "fast"], Coefficient]
+"""What is done for a fraction of the step: a kick by all forces at the present q and p, a drift, a pull
+by the forces of the potential alone, the exact decay of p by friction alone, or a kick by the slow or
+by the fast springs alone."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -54,6 +58,11 @@ class Scheme:
         return any(x for i, row in enumerate(self.a) for x in row[i:])
 
     @property
+    def mixes(self) -> bool:
+        """Whether slow and fast springs act at different times, so that no normal mode stays by itself."""
+        return any(kind in ("slow", "fast") for kind, _ in self.stages)
+
+    @property
     def one_step(self) -> bool:
         """Whether `step` can carry the scheme out."""
         return bool(self.stages or self.b)
@@ -69,6 +78,9 @@ _X1 = "1.351207191959657634047687808971460826922"
 _X0 = "-1.702414383919315268095375617942921653844"
 _HALF_X1 = "0.675603595979828817023843904485730413461"
 _HALF_X0_X1 = "-0.175603595979828817023843904485730413461"
+
+
+_EIGHT: tuple[Stage, ...] = 8 * _mirrored(("fast", Fraction(1, 16)), ("drift", Fraction(1, 8)))
 
 
 def _row(*numbers: int | Fraction) -> tuple[Fraction, ...]:
@@ -218,12 +230,32 @@ _ALL = (
     ),
     Scheme(
         name="langevin-middle",
-        title="Langevin middle at T = 0: kick, half drift, friction, half drift",
+        title="Langevin middle scheme at T = 0: half pull, half drift, friction, half drift, half pull",
+        order=2,
+        limit=2.0,
+        symplectic=True,
+        stages=_mirrored(("pull", HALF), ("drift", HALF), ("friction", ONE)),
+        source="Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; Zhang et al., "
+        "J. Phys. Chem. A 123 (2019) 6056",
+    ),
+    Scheme(
+        name="respa8",
+        title="r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones",
+        order=2,
+        limit=16.0,
+        symplectic=True,
+        stages=(("slow", HALF), *_EIGHT, ("slow", HALF)),
+        source="Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990; the limit is that of a fast "
+        "spring alone, in company it resonates from h w = 16 sin(pi/16) on",
+    ),
+    Scheme(
+        name="langevin-middle-early",
+        title="Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
         order=1,
         limit=2.0,
         symplectic=True,
-        stages=(("kick", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
-        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; OpenMM's LangevinMiddleIntegrator",
+        stages=(("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
+        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; as OpenMM's integrator stores it",
     ),
     Scheme(
         name="exact",
@@ -276,26 +308,27 @@ def step(
     m: Reals,
     force: Force,
     stiffness: Reals | None = None,
-    friction: Any = 0.0,
+    rate: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
-    `friction` is the rate gamma [1/T] of the scheme's own friction stages; schemes without any ignore it.
-
-    Implicit schemes need `stiffness`, the second derivatives of the potential, (n, n) or (..., n, n);
-    double precision is enough, because it only steers an iteration whose residual has the full width.
+    Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
+    particle is joined to another; double precision is enough, because it only steers an iteration whose
+    residual has the full width.  `rate` is `mechanics.rates`, left out where nothing is damped; `parts`
+    are the forces of the slow and the fast springs, for the schemes that part them.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
         for kind, c in scheme.stages:
             ch = number(c, width) * h
-            if kind == "kick":
-                p = p + ch * force(q, p)
-            elif kind == "drift":
+            if kind == "drift":
                 q = q + ch * (p / m)
+            elif kind == "friction":
+                p = p if rate is None else p * np.exp(-ch * rate.astype(width))
             else:
-                p = p * np.exp(-ch * np.asarray(friction, dtype=width))
+                p = p + ch * _acting(kind, force, parts)(q, p)
         return q, p
     if not scheme.b:
         raise ValueError(f"{scheme.name} has no step that a force alone defines")
@@ -309,7 +342,7 @@ def step(
         if own:
             if stiffness is None:
                 raise ValueError(f"{scheme.name} needs the stiffness of the scene")
-            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness)
+            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate)
         forces.append(force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]
@@ -319,23 +352,43 @@ def step(
     )
 
 
+def _acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:
+    """The force behind a stage."""
+    if kind == "kick":
+        return force
+    if kind == "pull":
+        return lambda q, p: force(q, np.zeros_like(p))
+    if parts is None:
+        raise ValueError("this scheme needs the slow and the fast force apart")
+    return parts[kind == "fast"]
+
+
 def _implicit_stage(
-    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals
+    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals, rate: Reals | None
 ) -> tuple[Reals, Reals]:
-    """Solve Q = q + x P/m, P = p + x F(Q) by Newton's iteration."""
-    matrix = np.asarray(stiffness, dtype=np.float64) * (float(x) ** 2 / m.astype(np.float64))[:, None]
-    matrix = matrix + np.eye(len(m))
+    """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
+
+    Friction is linear in P: P (1 + x rate) = p + x F(Q, 0), so it needs no iteration of its own.
+    """
+    none = np.zeros_like(p)
+    slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
+    factor = x * x / (m * slowed)
+    diagonal = stiffness.ndim == 1
+    if diagonal:
+        matrix = 1 + np.asarray(stiffness, q.dtype) * factor
+    else:
+        matrix = np.eye(len(m)) + np.asarray(stiffness, np.float64) * factor.astype(np.float64)[:, None]
     guess = q
     for _ in range(50):
-        residual = guess - q - x * (p + x * force(guess, p)) / m
-        if matrix.shape == (1, 1):
-            change = residual / matrix[0, 0]
+        residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
+        if diagonal:
+            change = residual / matrix
         else:
             change = np.linalg.solve(matrix, residual.astype(np.float64)[..., None])[..., 0]
         guess = guess - change
         if not np.any(np.abs(change) > np.finfo(q.dtype).eps * np.abs(guess)):
             break
-    return guess, p + x * force(guess, p)
+    return guess, np.asarray((p + x * force(guess, none)) / slowed)
 
 
 def magnitude_step(
@@ -347,20 +400,28 @@ def magnitude_step(
     m: Reals,
     magnitude: Force,
     stiffness: Reals | None = None,
+    rate: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is multiplied by the norm of the inverse
-    of the matrix that it solves, the condition of its step.
+    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
+    norm of the inverse of the matrix that it solves, the condition of its step.
     """
+    direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
         for kind, c in stages:
-            if kind == "kick":
-                p = p + c * h * magnitude(q, p)
-            elif kind == "drift":
+            if kind == "drift":
                 q = q + c * h * p / m
+            elif kind == "friction":
+                # a rounding of x in exp(-x) costs x exp(-x) p, and the decayed p is exp(-x) p: the sum is
+                # below p forwards in time; backwards p grows first
+                x = np.zeros_like(m) if rate is None else -c * np.sign(direction) * h * rate
+                p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
+            else:
+                p = p + c * h * _acting(kind, magnitude, parts)(q, p)
         return q, p
     rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
     forces: list[Reals] = []
@@ -370,13 +431,10 @@ def magnitude_step(
         ps = _sum(list(zip(row, forces, strict=False)), p)
         own = row[len(forces)]
         if own:
-            condition = 1.0
-            if stiffness is not None:
-                masses = m.astype(np.float64)[:, None]
-                matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / masses
-                condition = float(np.linalg.norm(np.linalg.inv(matrix), np.inf))
-            qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0)
-            ps = ps + own * magnitude(qs, ps)
+            slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
+            condition = _condition(stiffness, own**2 / (m * slowed))
+            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition
+            ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
     weights = [abs(float(c)) * h for c in scheme.b]
@@ -386,43 +444,65 @@ def magnitude_step(
     )
 
 
+def _condition(stiffness: Reals | None, factor: Reals) -> Reals:
+    """How much solving with 1 + factor * stiffness can enlarge an error, at least 1: (n,) or one number."""
+    if stiffness is None:
+        return np.ones(1)
+    if stiffness.ndim == 1:
+        return np.maximum(1 / np.abs(1 + factor * stiffness), 1)
+    matrix = np.eye(len(factor)) + np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
+    return np.maximum(np.linalg.norm(np.linalg.inv(matrix), np.inf), np.ones(1))
+
+
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: a force 4, a kick 2, others 3, in and out 4."""
+    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4.
+
+    Friction takes 3: its exponent, the exponential and the product.
+    """
     if scheme.stages:
-        return 4 + sum(6 if kind == "kick" else 3 for kind, _ in scheme.stages)
+        return 4 + sum(3 if kind in ("drift", "friction") else 6 for kind, _ in scheme.stages)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)
 
 
 def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
-    Friction [M/T] is part of the force, -c p/m, unless the scheme has friction stages of its own; their
-    rate is c/m.  Found by stepping the two unit vectors, so the scheme is written down once; an implicit
-    one solves its stages, which are linear, and the exact flow is the exponential.
+    Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
+    from fast takes each spring for a fast one; the exact flow is the exponential.
     """
-    m, k, c = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
-    if scheme.implicit or scheme.flow:
-        generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
-        generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
-        return _exponential(generator, h) if scheme.flow else _linear_step(scheme, generator, h)
-    own = any(kind == "friction" for kind, _ in scheme.stages)
+    m, k, friction = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    if scheme.flow:
+        return _exponential(m, k, friction, h)
 
     def force(q: Reals, p: Reals) -> Reals:
-        return np.asarray(-k * q if own else -k * q - c * (p / m))
+        return np.asarray(-k * q - friction * (p / m))
+
+    def none(q: Reals, p: Reals) -> Reals:
+        return np.zeros_like(q)
 
     out = np.empty((len(m), 2, 2), dtype=np.longdouble)
     ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
     q, p = step(
-        scheme, np.stack([ones, zeros]), np.stack([zeros, ones]), h=h, m=m, force=force, friction=c / m
+        scheme,
+        np.stack([ones, zeros]),
+        np.stack([zeros, ones]),
+        h=h,
+        m=m,
+        force=force,
+        stiffness=k,
+        rate=friction / m if np.any(friction) else None,
+        parts=(none, force),
     )
     out[:, 0, :], out[:, 1, :] = q.T, p.T
     return out
 
 
-def _exponential(generator: Extended, h: float) -> Extended:
-    """exp(h L) of 2 x 2 matrices L (n, 2, 2), of any damping: with L = N - g I, N**2 is a multiple of I."""
+def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
+    """The exact flow (n, 2, 2), of any damping: of exp(h L) with L = N - g I, N**2 is a multiple of I."""
     eye = np.eye(2, dtype=np.longdouble)
     t = np.longdouble(h)
+    generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
+    generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
     g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
     traceless = generator + g[:, None, None] * eye
     w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
@@ -435,24 +515,28 @@ def _exponential(generator: Extended, h: float) -> Extended:
     return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
 
 
-def _linear_step(scheme: Scheme, generator: Extended, h: float) -> Extended:
-    """One step of a diagonally implicit tableau on z' = L z (n, 2, 2): each stage is a 2 x 2 solve."""
-    eye = np.eye(2, dtype=np.longdouble)
-    stages: list[Extended] = []
-    for row in scheme.a:
-        right = np.broadcast_to(eye, generator.shape)
-        for x, stage in zip(row, stages, strict=False):
-            right = right + number(x, np.longdouble) * np.longdouble(h) * stage
-        left = eye - number(row[len(stages)], np.longdouble) * np.longdouble(h) * generator
-        determinant = left[:, 0, 0] * left[:, 1, 1] - left[:, 0, 1] * left[:, 1, 0]
-        inverse = np.empty_like(left)
-        inverse[:, 0, 0], inverse[:, 1, 1] = left[:, 1, 1], left[:, 0, 0]
-        inverse[:, 0, 1], inverse[:, 1, 0] = -left[:, 0, 1], -left[:, 1, 0]
-        stages.append(generator @ (inverse / determinant[:, None, None]) @ right)
-    total = np.broadcast_to(eye, generator.shape)
-    for x, stage in zip(scheme.b, stages, strict=True):
-        total = total + number(x, np.longdouble) * np.longdouble(h) * stage
-    return np.asarray(total)
+def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
+    """One-step matrix (2n, 2n) on (q - q*, p - p*) of a linear scene, q* and p* a state that stays.
+
+    Found by stepping the unit vectors and taking off what the state 0 becomes; it serves scenes whose
+    modes a scheme mixes.
+    """
+    n = scene.n
+    z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
+    slow, fast = mechanics.split(scene.terms)
+    q, p = step(
+        scheme,
+        z[:, :n],
+        z[:, n:],
+        h=h,
+        m=scene.m.astype(np.longdouble),
+        force=mechanics.force(scene.terms),
+        stiffness=mechanics.stiffness(scene, scene.q) if scheme.implicit else None,
+        rate=mechanics.rates(scene),
+        parts=(mechanics.force(slow), mechanics.force(fast)),
+    )
+    after = np.concatenate([q, p], axis=1)
+    return np.asarray((after[1:] - after[0]).T, np.longdouble)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -546,9 +630,17 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     worst mode counts; (f,) each.  At the edge of stability |M**i| grows with i, and the sum with j**2.
     """
     turn = rotation(matrices)
-    d = np.abs(turn.determinant)
-    root = np.sqrt(d)
-    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(turn.growth))
+    half = (matrices[:, 0, 0] + matrices[:, 1, 1]) / 2
+    split = np.sqrt(np.maximum(half * half - turn.determinant, 0))
+    larger = half + np.where(half < 0, -split, split)
+    # where area turns over or vanishes the eigenvalues are real and of unlike sign: powers are bounded by
+    # the larger one, x**i (1 + 2 |M - x| / |x - y|), instead of by the root of the determinant
+    over = turn.determinant <= 0
+    root = np.where(over, np.abs(larger), np.sqrt(np.abs(turn.determinant)))
+    root = np.where(root > 0, root, 1)
+    growth = np.where(over, 0, turn.growth)
+    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(growth))
+    near = np.where(over, larger / root, near)
     rest = np.stack(
         [
             np.stack([matrices[:, 0, 0] / root - near, w * matrices[:, 0, 1] / root], axis=-1),
@@ -557,9 +649,10 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
         axis=-2,
     )
     size = np.sqrt(np.sum(rest * rest, axis=(-2, -1)))
-    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(turn.growth))
+    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(growth))
+    sine = np.where(over, split / root, sine)
     longest = np.where(sine > 0, 1 / np.where(sine > 0, sine, 1), np.inf)
-    radius = np.maximum(root * np.exp(turn.growth), 1)
+    radius = np.maximum(root * np.exp(growth), 1)
     j = np.asarray(steps).astype(np.longdouble)[:, None]
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -22,7 +22,7 @@ STRIDES = 12, 100
 NEAR = 0.02
 """Distance of entries, of size 1, within which a first guess is worth refining."""
 
-ONE_STEP = tuple(s for s in SCHEMES.values() if s.one_step or s.flow)
+ONE_STEP = tuple(s for s in SCHEMES.values() if (s.one_step and not s.mixes) or s.flow)
 OWN_FRICTION = tuple(s for s in ONE_STEP if any(kind == "friction" for kind, _ in s.stages))
 
 

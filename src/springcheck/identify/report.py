@@ -21,7 +21,7 @@ from springcheck.model import Floats
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
     "semi-implicit-euler-drift-kick": 0.5,
-    "langevin-middle": -0.5,
+    "langevin-middle-early": -0.5,
 }
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
 
@@ -60,7 +60,7 @@ def _stated_stride(record: Record, step: float | None, notes: list[str]) -> int 
     stride = round(ratio)
     if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
         notes.append(
-            f"the stated step {step:.9g} does not divide the interval {float(record.interval):.9g} of the states"
+            f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"
         )
         return -1
     return stride

@@ -8,8 +8,13 @@ where the spring is at rest: a bond of rest length 0 works through q = 0 and cos
 that it is handed for that.  Handed v0 it is the kick-drift Euler ("leapfrog" here).  Handed
 v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("verlet" here).
 
+`LangevinMiddleIntegrator` kicks, drifts half a step, lets friction and noise act on the velocity,
+and drifts the other half.  At T = 0 there is no noise, and read like "verlet" it is the symmetric
+scheme pull-drift-friction-drift-pull.  Its friction is one rate c/m for all particles.
+
 OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every
 scheme here turns into its own -h under that reflection, because the force does not depend on p.
+Friction does, and goes forwards only.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ import openmm as mm
 
 from springcheck import mechanics
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
 from springcheck.schemes import SCHEMES
 
 FIXED_POINT = 2.0**-32
@@ -40,6 +45,10 @@ _PRECISIONS = {
 "mixed" keeps positions as a float and a float of correction, together 48 bits."""
 
 
+SHIFTED = frozenset({"verlet", "langevin-middle"})
+"""Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
+
+
 def version() -> dict[str, str]:
     """Version of OpenMM."""
     return {"openmm": str(mm.Platform.getOpenMMVersion())}
@@ -54,7 +63,7 @@ def arithmetic(label: Label) -> Arithmetic:
 
 def convention(method: Method) -> str:
     """How the stored velocities were read."""
-    if method.name == "verlet":
+    if method.name in SHIFTED:
         return "stored half a step early by OpenMM; started half a kick back and read half a kick on"
     if method.name == "leapfrog":
         return "as OpenMM stores them, taken for synchronised"
@@ -65,18 +74,24 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     """Build system, integrator and context.  MethodError: the platform is not here."""
     origins = _origins(scene, method)
     system, positions = _system(scene, origins)
-    integrator = _integrator(method.name, abs(step))
+    integrator = _integrator(scene, method.name, step)
     context = _context(system, integrator, label)
-    force = mechanics.force(scene.terms)
-    early = 0.5 * step if method.name == "verlet" else 0.0
+    force = _pull(scene)
+    early = 0.5 * step if method.name in SHIFTED else 0.0
     m = np.copysign(scene.m, step)
     velocities = np.zeros_like(positions)
-    velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
+    with np.errstate(all="ignore"):
+        velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
         scene=scene, m=m, origins=origins, context=context, integrator=integrator, half_kick=early
     )
+
+
+def _pull(scene: Scene) -> Force:
+    """The force that OpenMM computes: all but friction."""
+    return mechanics.force(term for term in scene.terms if not isinstance(term, mechanics.Damping))
 
 
 def _origins(scene: Scene, method: Method) -> Floats:
@@ -130,8 +145,10 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for m in scene.m.tolist():
         system.addParticle(m)
     x = (scene.q - origins).tolist()
-    bonds = mm.HarmonicBondForce()
+    fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
+    fast.setForceGroup(1)
     for term in scene.terms:
+        bonds = fast if getattr(term, "fast", False) else slow
         if isinstance(term, mechanics.WallSpring):
             anchors: dict[float, int] = {}
             for i, k, at in zip(
@@ -147,16 +164,32 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
             ):
                 bonds.addBond(a, b, length, k)
-    if bonds.getNumBonds():
-        system.addForce(bonds)
+    for bonds in (slow, fast):
+        if bonds.getNumBonds():
+            system.addForce(bonds)
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
 
 
-def _integrator(name: str, step: float) -> mm.Integrator:
+def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
+    if name == "langevin-middle" and step < 0:
+        raise MethodError(
+            f"openmm:langevin-middle: time.step = {step:g}: OpenMM's friction goes forwards in time only"
+        )
+    step = abs(step)
     if name in ("verlet", "leapfrog"):
         return mm.VerletIntegrator(step)
+    if name == "mts":
+        return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
+    if name == "langevin-middle":
+        rate = mechanics.rates(scene).astype(np.float64)
+        if np.ptp(rate) > 2.0**-52 * np.max(rate):
+            raise MethodError(
+                "openmm:langevin-middle has one friction rate for all particles, and damping/mass of scene "
+                f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}; leave the method out"
+            )
+        return mm.LangevinMiddleIntegrator(0.0, float(rate[0]), step)
     integrator = mm.CustomIntegrator(step)
     if name == "euler":
         integrator.addPerDofVariable("v0", 0)
@@ -200,7 +233,7 @@ class _Context:
         self._integrator = integrator
         self._m = m
         self._origins = origins if np.any(origins) else None
-        self._force = mechanics.force(scene.terms)
+        self._force = _pull(scene)
         self._half_kick = half_kick
         self._x = np.zeros((context.getSystem().getNumParticles(), 3))
         self._v = np.zeros_like(self._x)

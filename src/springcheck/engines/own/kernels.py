@@ -161,14 +161,21 @@ def quartics(i: Row, b: Row, at: Row, q: Row, f: Row) -> None:
         f[i[s]] += -b[s] * (u * u * u)
 
 
+def dampings(i: Row, c: Row, m: Row, p: Row, f: Row) -> None:
+    """Add -c p/m to f."""
+    for s in range(len(i)):
+        f[i[s]] += -c[s] * (p[i[s]] / m[s])
+
+
 def forces(terms: Terms, q: Row, p: Row, f: Row) -> None:
     """Fill f with the force on every particle."""
-    walls, pairs, wells = terms
+    walls, pairs, wells, brakes = terms
     for i in range(len(f)):
         f[i] = 0.0
     wall_springs(walls[0], walls[1], walls[2], q, f)
     springs(pairs[0], pairs[1], pairs[2], pairs[3], q, f)
     quartics(wells[0], wells[1], wells[2], q, f)
+    dampings(brakes[0], brakes[1], brakes[2], p, f)
 
 
 def joined_euler(
@@ -209,7 +216,8 @@ def joined_implicit_euler(
 ) -> State:
     """Implicit Euler of linear terms: p' = inverse (p + h F(q)), then drift.
 
-    `inverse` holds the columns of (1 + h**2 K / m)**-1.  Column by column every p[i] is summed in the
+    `terms` hold no friction here: it is in the matrix.  `inverse` holds the columns of
+    (1 + h c/m + h**2 K / m)**-1.  Column by column every p[i] is summed in the
     same order as in a row-wise product, and the inner loop is free of dependences.
     """
     for row in range(len(qs)):
@@ -269,7 +277,7 @@ def chain_implicit_euler(
     return q, p
 
 
-HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, forces)
+HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, dampings, forces)
 """What kernels call, each after what it calls itself."""
 
 ONE: dict[str, Kernel] = {

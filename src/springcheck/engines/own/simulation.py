@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import FunctionType
 from typing import Any, cast
@@ -38,6 +38,7 @@ FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "wall-spring": (("i",), ("k", "at")),
     "spring": (("a", "b"), ("k", "rest")),
     "quartic": (("i",), ("b", "at")),
+    "damping": (("i",), ("c", "m")),
 }
 """Indices and parameters of each kind of term, in the order in which `kernels.forces` takes them."""
 
@@ -121,10 +122,14 @@ def prepare(scene: Scene, method: str, step: float, *, compiled: bool | None = N
 def _layout(scene: Scene, method: str, h: float) -> Layout:
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
     implicit = method == "implicit-euler"
+    # friction is part of what implicit Euler solves for: 1 + h c/m stands where 1 does without it
+    slowed = 1 + h * mechanics.rates(scene).astype(np.float64)
+    if implicit:
+        scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, mechanics.Damping)))
     walls = _single_walls(scene)
     if walls is not None:
         k, at = walls
-        inverse = (1 / (1 + h * h * (k / m)),) if implicit else ()
+        inverse = (1 / (slowed + h * h * (k / m)),) if implicit else ()
         if scene.n == 1 and at[0] == 0:
             constants = tuple(float(x[0]) for x in (m, k, *inverse))
             return Layout(
@@ -144,10 +149,10 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
     solver: tuple[Floats, ...] = ()
     work = float(scene.n + sum(len(rows[0]) for rows in terms))
     if implicit and _is_chain(scene):
-        kernel, solver = kernels.CHAIN[method], _factors(scene, h)
+        kernel, solver = kernels.CHAIN[method], _factors(scene, h, slowed)
         work += scene.n
     elif implicit:
-        solver = (_inverse(scene, h),)
+        solver = (_inverse(scene, h, slowed),)
         # one product and sum of the matrix costs about an eighth of a spring
         work += scene.n**2 / 8
     return Layout(
@@ -209,8 +214,8 @@ def _is_chain(scene: Scene) -> bool:
     return bool(neighbours and np.all(springs[2] >= 0) and np.all(walls[1] >= 0))
 
 
-def _factors(scene: Scene, h: float) -> tuple[Floats, Floats, Floats]:
-    """LU factors of 1 + h**2 K / m of a chain: multipliers, 1 / pivots, and the upper diagonal, each (n,)."""
+def _factors(scene: Scene, h: float, slowed: Floats | float = 1.0) -> tuple[Floats, Floats, Floats]:
+    """LU factors of slowed + h**2 K / m of a chain: multipliers, 1 / pivots, upper diagonal, each (n,)."""
     (i, k_wall, _), (a, b, k, _) = _rows(scene, "wall-spring"), _rows(scene, "spring")
     total, link = np.zeros(scene.n), np.zeros(scene.n + 1)
     np.add.at(total, i, k_wall)
@@ -220,15 +225,15 @@ def _factors(scene: Scene, h: float) -> tuple[Floats, Floats, Floats]:
     scale = h * h / scene.m
     upper = np.append(-link[1:-1] * scale[1:], 0.0)
     below = np.append(0.0, -link[1:-1] * scale[:-1])
-    lower, pivot = np.zeros(scene.n), 1 + total * scale
+    lower, pivot = np.zeros(scene.n), slowed + total * scale
     for j in range(1, scene.n):
         lower[j] = below[j] / pivot[j - 1]
         pivot[j] -= lower[j] * upper[j - 1]
     return lower, 1 / pivot, upper
 
 
-def _inverse(scene: Scene, h: float) -> Floats:
-    """Columns of (1 + h**2 K / m)**-1, as rows (n, n); not a number throughout where there is none."""
+def _inverse(scene: Scene, h: float, slowed: Floats | float = 1.0) -> Floats:
+    """Columns of (slowed + h**2 K / m)**-1, as rows (n, n); not a number throughout where there is none."""
     if scene.n > DENSE:
         raise MethodError(
             f"own:implicit-euler serves at most {DENSE} particles joined other than as a chain; "
@@ -236,7 +241,7 @@ def _inverse(scene: Scene, h: float) -> Floats:
         )
     k = np.asarray(mechanics.stiffness(scene, scene.q), dtype=np.float64)
     try:
-        return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) + h * h * (k / scene.m)).T)
+        return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) * slowed + h * h * (k / scene.m)).T)
     except np.linalg.LinAlgError:
         return np.full((scene.n, scene.n), np.nan)
 

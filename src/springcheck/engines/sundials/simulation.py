@@ -58,7 +58,7 @@ def _suits_matrix(scene: Scene) -> bool:
     """Whether the right-hand side may be one matrix product, five times as fast for a few particles."""
     if not mechanics.is_linear(scene) or scene.n > 32:
         return False
-    k = np.abs(np.concatenate([getattr(term, "k", np.ones(1)) for term in scene.terms] or [np.ones(1)]))
+    k = np.abs(np.concatenate([term.k for term in scene.terms if hasattr(term, "k")] or [np.ones(1)]))
     return bool(np.max(k) <= MOST_ALIKE * np.min(k))
 
 
@@ -69,6 +69,7 @@ def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     slope, pull = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     slope[:n, n:] = np.diag(1 / scene.m)
     slope[n:, :n] = -mechanics.stiffness(scene, zero)
+    slope[n:, n:] = -np.diag(mechanics.rates(scene))
     pull[n:] = mechanics.force(scene.terms)(zero, zero)
     return slope, pull
 
@@ -83,6 +84,7 @@ class _Solver:
         as_matrix = _suits_matrix(scene)
         slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
         pulled = bool(np.any(pull))
+        friction = np.diag(mechanics.rates(scene).astype(np.float64))
 
         def by_terms(t: float, y: Floats, yp: Floats) -> None:
             self.force_calls += 1
@@ -102,6 +104,7 @@ class _Solver:
             else:
                 jacobian[:n, n:] = np.diag(1 / m)
                 jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
+                jacobian[n:, n:] = -friction
 
         self._solver = CVODE(
             by_matrix if as_matrix else by_terms,
