@@ -420,7 +420,9 @@ def rotation(matrices: Extended) -> Rotation:
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    growth = np.where(minus < 0, np.arctanh(np.minimum(root / np.maximum(np.abs(half_trace), root), 1)), 0)
+    # where area is turned over (determinant <= 0) there is no such growth
+    hyperbolic = (minus < 0) & (determinant > 0)
+    growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
     return Rotation(
         determinant=determinant,
         angle=angle,
@@ -475,6 +477,20 @@ def propagate(
         )
 
 
+def condition(matrices: Extended, w: Extended) -> Extended:
+    """How far the invariant ellipses of one-step matrices (n, 2, 2) are from circles: the ratio of their
+    axes in energy coordinates (w y, v), w (n,) > 0.  No power of a map is larger than that, whatever its
+    determinant makes of it; infinite where the motion does not turn.
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1] * w
+    c, d = matrices[:, 1, 0] / w, matrices[:, 1, 1]
+    half = np.abs(c - b) / 2
+    area = -((a - d) ** 2 / 4 + b * c)
+    turning = area > 0
+    spread = np.sqrt(np.maximum(half**2 - area, 0))
+    return np.asarray(np.where(turning, (half + spread) / np.sqrt(np.where(turning, area, 1)), np.inf))
+
+
 def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
     """How much j steps can enlarge one rounding a step: (sum over i < j of |M**i| / r**i, r**j).
 
@@ -500,6 +516,6 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):
         ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
-        total = np.max(j + size * np.maximum(ramp, 0), axis=-1)
+        total = np.max(np.minimum(j + size * np.maximum(ramp, 0), j * condition(matrices, w)), axis=-1)
         grown = np.max(radius**j, axis=-1)
     return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)

@@ -132,6 +132,8 @@ def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
         "force_roundoff": a.force,
         "force_quantum": a.quantum,
         "force_overflow": a.overflow,
+        "force_parameters": a.parameters,
+        "keeps_displacement": a.keeps_displacement,
         "rebuilds_velocity": trajectory.rebuilds_velocity,
         **origin,
     }
@@ -178,6 +180,8 @@ def _trajectory(
             force=float(known.get("force_roundoff", default.force)),
             quantum=float(known.get("force_quantum", default.quantum)),
             overflow=float(known.get("force_overflow", default.overflow)),
+            parameters="single" if known.get("force_parameters") == "single" else "double",
+            keeps_displacement=bool(known.get("keeps_displacement", False)),
         ),
         rebuilds_velocity=bool(known.get("rebuilds_velocity", False)),
         origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
