@@ -315,8 +315,8 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is multiplied by the norm of the inverse
-    of the matrix that it solves, the condition of its step.
+    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is multiplied by the squared norm of
+    the inverse of the matrix that it solves, the condition of its step.
     """
     q, p, h = np.abs(q), np.abs(p), abs(h)
     if scheme.stages:
@@ -340,7 +340,8 @@ def magnitude_step(
                 masses = m.astype(np.float64)[:, None]
                 matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / masses
                 condition = float(np.linalg.norm(np.linalg.inv(matrix), np.inf))
-            qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0)
+            # the solution is larger than what it is made from by the condition, its error by that again
+            qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0) ** 2
             ps = ps + own * magnitude(qs, ps)
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)

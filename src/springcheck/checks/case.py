@@ -89,12 +89,17 @@ class Case:
         if rounding.force > rounding.state:
             extra += rounding.force * h * sizes(q, p)
         if rounding.quantum:
-            # each term's force on a particle is cut off once a step, not once for every rounding
-            extra += rounding.quantum * h * _pulls(scene) / self.roundings
+            # each term's force on a particle is cut off once a step, not once for every rounding, and a
+            # force below the quantum is lost, no more
+            lost = np.minimum(rounding.quantum * _pulls(scene), sizes(q, p))
+            extra += h * lost / self.roundings
         if run.rebuilds_velocity and not rounding.keeps_displacement:
             extra += rounding.state * m * (q + size_q) / h
         extra += SMALLEST * (1 + m)
-        return np.asarray(of_q + h / m * extra + SMALLEST), np.asarray(of_p + extra)
+        # carried on through the rest of the step: a shifted position is felt by the next kick
+        shift = h / m * extra + SMALLEST
+        felt = h * (sizes(q + shift, p) - sizes(q, p))
+        return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
 
     @cached_property
     def envelope(self) -> tuple[Extended, Extended]:

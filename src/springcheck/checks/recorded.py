@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
 from springcheck.checks.case import Case
-from springcheck.model import Extended, Floats, Verdict
+from springcheck.model import Arithmetic, Extended, Floats, Verdict
 
 
 def _no_map(case: Case) -> str | None:
@@ -249,6 +251,8 @@ def momentum(case: Case) -> Verdict:
     if not case.scheme.one_step:
         return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
     run = case.trajectory
+    if len(run.t) < 2:
+        return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
     _, of_p = case.allowance
@@ -319,16 +323,26 @@ def arithmetic(case: Case) -> Verdict:
     if why_not:
         return case.not_applicable("arithmetic", why_not)
     named = case.trajectory.arithmetic
-    if named.state <= 2.0**-53 and named.force <= 2.0**-53 and not named.quantum:
+    plain = Arithmetic()
+    if named.state <= plain.state and named.force <= plain.force and not named.quantum:
         return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
     seen = step_defect(case)
-    floor = 2.0**-8
+    finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
+    coarseness = case.rounding / finer.rounding
+    if coarseness < 1 / FLOOR or len(case.trajectory.t) < ENOUGH:
+        return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
     return Verdict(
         method=seen.method,
         check="arithmetic",
         value=seen.value,
         bound=seen.bound,
         unit=seen.unit,
-        passed=bool(floor <= seen.value <= seen.bound),
-        why=f"{named.name} precision: a value above is worse arithmetic, one below 2**-8 is better",
+        passed=bool(FLOOR <= seen.value <= seen.bound),
+        why=f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
     )
+
+
+FLOOR = 2.0**-8
+"""A rounding that is as good as random stays below this fraction of its unit once in 2**8 times."""
+ENOUGH = 9
+"""Frames of which all stay below `FLOOR` by chance once in 2**64 times: 8 steps, or fewer particles."""
