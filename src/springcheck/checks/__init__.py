@@ -19,7 +19,17 @@ from typing import TypeAlias
 
 import numpy as np
 
+from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
+from springcheck.checks.experiments import (
+    determinant,
+    mirror,
+    propagator,
+    repeatability,
+    reversibility,
+    symplecticity,
+)
+from springcheck.checks.laws import convergence, order, order_anharmonic, rounding_bias, rounding_growth
 from springcheck.checks.recorded import (
     arithmetic,
     closed_form,
@@ -36,11 +46,28 @@ from springcheck.checks.recorded import (
     tolerance,
     tolerance_bound,
 )
+from springcheck.errors import MethodError
 from springcheck.model import Scene, Trajectory, Verdict
 
-__all__ = ["CHECKS", "Case", "Check", "fastest", "growth_bound", "judge", "tolerance_bound", "worst"]
+__all__ = [
+    "CHECKS",
+    "THOROUGH",
+    "Bench",
+    "Case",
+    "Check",
+    "Experiment",
+    "Run",
+    "fastest",
+    "growth_bound",
+    "judge",
+    "judge_thoroughly",
+    "name",
+    "tolerance_bound",
+    "worst",
+]
 
 Check: TypeAlias = Callable[[Case], Verdict]
+Experiment: TypeAlias = Callable[[Bench], Verdict]
 
 CHECKS: tuple[Check, ...] = (
     start,
@@ -55,6 +82,43 @@ CHECKS: tuple[Check, ...] = (
     energies,
     tolerance,
 )
+
+
+THOROUGH: tuple[Experiment, ...] = (
+    propagator,
+    determinant,
+    symplecticity,
+    reversibility,
+    mirror,
+    repeatability,
+    order,
+    order_anharmonic,
+    rounding_bias,
+    rounding_growth,
+    convergence,
+)
+
+
+def name(check: Check | Experiment) -> str:
+    """What a check is called in a report."""
+    return check.__name__.replace("_", "-")
+
+
+def judge_thoroughly(
+    scene: Scene, label: str, run: Run, experiments: Sequence[Experiment] = THOROUGH
+) -> list[Verdict]:
+    """Every experiment with a method, which `run(scene, label)` carries out on scenes made here.
+
+    An experiment whose scene the method cannot serve (`run` raises MethodError) does not apply.
+    """
+    bench = Bench(scene=scene, label=label, run=run)
+    verdicts = []
+    for experiment in experiments:
+        try:
+            verdicts.append(experiment(bench))
+        except MethodError as error:
+            verdicts.append(bench.not_applicable(name(experiment), str(error)))
+    return verdicts
 
 
 def judge(scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS) -> list[Verdict]:
