@@ -406,7 +406,7 @@ def magnitude_step(
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
     `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
-    norm of the inverse of the matrix that it solves, the condition of its step.
+    squared norm of the inverse of the matrix that it solves, the condition of its step.
     """
     direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
@@ -433,7 +433,8 @@ def magnitude_step(
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
             condition = _condition(stiffness, own**2 / (m * slowed))
-            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition
+            # the solution is larger than what it is made from by the condition, its error by that again
+            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
@@ -567,8 +568,9 @@ def rotation(matrices: Extended) -> Rotation:
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    inside = (minus < 0) & (root < np.abs(half_trace))
-    growth = np.arctanh(np.where(inside, root / np.where(inside, np.abs(half_trace), 1), 0))
+    # where area is turned over (determinant <= 0) there is no such growth
+    hyperbolic = (minus < 0) & (determinant > 0)
+    growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
     return Rotation(
         determinant=determinant,
         angle=angle,
@@ -623,6 +625,20 @@ def propagate(
         )
 
 
+def condition(matrices: Extended, w: Extended) -> Extended:
+    """How far the invariant ellipses of one-step matrices (n, 2, 2) are from circles: the ratio of their
+    axes in energy coordinates (w y, v), w (n,) > 0.  No power of a map is larger than that, whatever its
+    determinant makes of it; infinite where the motion does not turn.
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1] * w
+    c, d = matrices[:, 1, 0] / w, matrices[:, 1, 1]
+    half = np.abs(c - b) / 2
+    area = -((a - d) ** 2 / 4 + b * c)
+    turning = area > 0
+    spread = np.sqrt(np.maximum(half**2 - area, 0))
+    return np.asarray(np.where(turning, (half + spread) / np.sqrt(np.where(turning, area, 1)), np.inf))
+
+
 def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
     """How much j steps can enlarge one rounding a step: (sum over i < j of |M**i| / r**i, r**j).
 
@@ -657,6 +673,6 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):
         ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
-        total = np.max(j + size * np.maximum(ramp, 0), axis=-1)
+        total = np.max(np.minimum(j + size * np.maximum(ramp, 0), j * condition(matrices, w)), axis=-1)
         grown = np.max(radius**j, axis=-1)
     return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)
