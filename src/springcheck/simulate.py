@@ -65,8 +65,8 @@ def play(
 ) -> Record:
     """Run a scene and hand every recorded frame, the start first, to `sink`.
 
-    Memory does not grow with the length of the run.  `planned`: see `bare`.  Ctrl-C ends the run with the outcome
-    `interrupted`; the frames before it have been handed over.
+    Memory does not grow with the length of the run.  Ctrl-C ends the run with the outcome
+    `interrupted`; the frames before it have been handed over.  For `planned` see `bare`.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.

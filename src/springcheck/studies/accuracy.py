@@ -56,6 +56,11 @@ class Truth:
     """Largest frequency along the motion [1/T], 0 where nothing turns."""
     duration: float
 
+    @property
+    def angle(self) -> float:
+        """w T: the largest angle through which the motion turns."""
+        return abs(self.duration) * self.w
+
     def at(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
         """True q and p (f, n) after so many steps of h."""
         return exact.true_motion(self.scene, steps, h, self.modes)
@@ -98,10 +103,10 @@ def _frequency(scene: Scene, modes: exact.Modes | None) -> float:
     q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
     root = np.sqrt(scene.m)
     w2 = [
-        np.linalg.eigvalsh(np.asarray(mechanics.stiffness(scene, row), np.float64) / root[:, None] / root)[-1]
+        np.linalg.eigvalsh(np.asarray(mechanics.stiffness(scene, row), np.float64) / root[:, None] / root)
         for row in q
     ]
-    return float(np.sqrt(max(0.0, *w2)))
+    return float(np.sqrt(max(float(np.max(w2)), 0.0)))
 
 
 class Errors:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeVar
+from typing import Literal
 
 import numpy as np
 
 from springcheck.model import Arithmetic, Method
 from springcheck.schemes import SCHEMES
+from springcheck.studies.points import Point
 
-ASYMPTOTIC = 1e-2
+ASYMPTOTIC = 2e-2
 """Errors from here down are led by the first term of their expansion: the next is about the error's own
-size smaller, a hundredth here and a quarter or a half of that at each finer step."""
+size smaller, a fiftieth here and a quarter or a half of that at each finer step."""
 
 ABOVE_FLOOR = 100.0
 """Points of a fit lie this far above their rounding, which then shifts no error by more than 1 %."""
@@ -35,36 +36,15 @@ class Fit:
     points: int
 
 
-class Measured(Protocol):
-    """A finished point: an error, what it cost, and the step that it took."""
-
-    @property
-    def size(self) -> float:
-        """Length of the step."""
-        ...
-
-    @property
-    def error(self) -> float: ...
-
-    @property
-    def rounding(self) -> float | None: ...
-
-    @property
-    def seconds(self) -> float: ...
-
-
-M = TypeVar("M", bound=Measured)
-
-
-def turned(errors: Sequence[float]) -> int | None:
-    """Index of the smallest of errors by ever finer steps, once a finer step has made it larger again."""
-    if len(errors) < 2:
+def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
+    """Index of the smallest of errors by ever finer steps, once `by` finer steps have not improved on it."""
+    if not errors:
         return None
     best = int(np.argmin(errors))
-    return best if best < len(errors) - 1 and errors[best] < ASYMPTOTIC else None
+    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
 
 
-def order(points: Sequence[Measured]) -> Fit | None:
+def order(points: Sequence[Point]) -> Fit | None:
     """Order of a method of fixed step from points by ever finer steps; None with fewer than four to go by."""
     best = turned([point.error for point in points])
     floor = points[best].error if best is not None else 0.0
@@ -142,31 +122,39 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     return Condition(name="sqrt(N)", why=why, eps=eps, angle=angle)
 
 
-def crossing(fit: Fit, rounding: float, at: float, how: Condition, duration: float) -> tuple[float, float]:
-    """Where the fitted error meets a rounding known at `at` steps -> (steps, error there)."""
-    per = rounding / how.value(at)
-    low, high = np.log(max(at / 1e6, 1.0)), np.log(1e18)
-    for _ in range(200):
+TYPICAL = 0.25
+"""Rounding over eps times its condition, where it cannot be measured: of the order of the standard
+deviation of a rounding, eps/sqrt(12), in a sum whose size changes sign."""
+
+
+def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: float) -> tuple[float, float]:
+    """Where the fitted error meets the rounding -> (steps, error there)."""
+    seen = [
+        point.rounding / (how.eps * how.value(point.steps))
+        for point in points[-4:]
+        if point.rounding and point.steps
+    ]
+    per = how.eps * (float(np.median(seen)) if seen else TYPICAL)
+    low, high = 0.0, np.log(1e18)
+    while high - low > 1e-9:
         middle = (low + high) / 2
-        n = float(np.exp(middle))
-        if fit.constant * (abs(duration) / n) ** fit.order > per * how.value(n):
-            low = middle
-        else:
-            high = middle
-    n = float(np.exp(low))
-    return n, 2 * per * how.value(n)
+        steps = float(np.exp(middle))
+        over = fit.constant * (abs(duration) / steps) ** fit.order > per * how.value(steps)
+        low, high = (middle, high) if over else (low, middle)
+    steps = float(np.exp(low))
+    return steps, 2 * per * how.value(steps)
 
 
-def front(points: Sequence[M]) -> list[M]:
+def front(points: Sequence[Point]) -> list[Point]:
     """The points that no other beats in both error and time, from the fastest to the most accurate."""
-    best: list[M] = []
+    best: list[Point] = []
     for point in sorted(points, key=lambda point: (point.seconds, point.error)):
         if not best or point.error < best[-1].error:
             best.append(point)
     return best
 
 
-def cheapest(points: Sequence[M], target: float) -> M | None:
+def cheapest(points: Sequence[Point], target: float) -> Point | None:
     """The fastest point whose error is within the target, or None."""
     reaching = [point for point in points if point.error <= target]
     return min(reaching, key=lambda point: point.seconds) if reaching else None

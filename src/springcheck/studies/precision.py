@@ -11,58 +11,49 @@ repeats to quote.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from math import ceil, floor
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil
 from time import get_clock_info, perf_counter
 
 import numpy as np
 
-from springcheck import engines, mechanics, simulate
-from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Label, Scene, Stopped
+from springcheck import mechanics, simulate
+from springcheck.model import Label, Scene, Stopped
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits
-from springcheck.studies.accuracy import FRAMES, Accuracy, Errors, Truth, truth
-from springcheck.studies.outcome import Answer, MethodSummary, Point, PrecisionStudy, machine
+from springcheck.studies.accuracy import Errors, Truth, truth
+from springcheck.studies.outcome import Answer, MethodSummary, PrecisionStudy, machine
+from springcheck.studies.points import Point
+from springcheck.studies.sweeps import (
+    PLANNED,
+    Sweep,
+    affordable,
+    begin,
+    blank,
+    is_finished,
+    repeats,
+    to_time,
+    warm_ups,
+)
 
-BUDGET = 60.0
+BUDGET = 75.0
 """Seconds that a study takes unless it is told otherwise."""
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 """Errors for which the cheapest way is looked up."""
 
-TOLERANCES = tuple(float(f"{mantissa}e-{e}") for e in range(3, 16) for mantissa in (1, 3) if e > 3 or mantissa < 2)
-"""Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-15."""
-
 TICKS = 1000
 """A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
+
+READS = 3
+"""Timings of a run with every step read."""
 
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
 
-PLANNED = 1_000_000_000
-"""Steps that an engine may take to lie before it: a sweep to the floor is worth compiling for."""
-
 Progress = Callable[[float, str], None]
 """Told of the seconds spent and of what comes next."""
-
-
-@dataclass(kw_only=True, eq=False)
-class _Sweep:
-    """One method on its way from coarse to fine; the only state that changes while a study runs."""
-
-    label: Label
-    scenes: Iterator[Scene]
-    next: Scene | None
-    points: list[Point]
-    arithmetic: Arithmetic
-    cost: float = 0.0
-    """Seconds of one bare run at the last point."""
-    growth: float = 2.0
-    """What one point costs, compared with the one before."""
-    read: float = 0.0
-    first_start: float = 0.0
 
 
 def study(
@@ -82,176 +73,75 @@ def study(
     """
     began = perf_counter()
     known = truth(scene)
-    sweeps = [_start(scene, label, known) for label in labels]
+    sweeps = [begin(scene, label, known) for label in labels]
     interrupted = False
+
+    def tell(what: str) -> None:
+        if progress:
+            progress(perf_counter() - began, what)
+
     try:
-        _carry_out(sweeps, known, began, budget, progress)
+        while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
+            _level(ready, known, tell)
     except KeyboardInterrupt:
         interrupted = True
+    why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
+    for sweep in _open(sweeps):
+        sweep.points.append(blank(sweep, "cut off", why))
     return _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
 
 
-def _carry_out(
-    sweeps: list[_Sweep], known: Truth, began: float, budget: float, progress: Progress | None
-) -> None:
-    open_sweeps = [sweep for sweep in sweeps if sweep.next is not None]
-    while open_sweeps:
-        left = budget - (perf_counter() - began)
-        ready = _affordable(open_sweeps, left)
-        if not ready:
-            break
-        _level(ready, known, lambda what: progress and progress(perf_counter() - began, what))
-        open_sweeps = [sweep for sweep in open_sweeps if sweep.next is not None]
-    for sweep in open_sweeps:
-        assert sweep.next is not None
-        sweep.points.append(
-            _blank(sweep.label, sweep.next, "cut off", f"the budget of {budget:g} s ends before it")
-        )
+def _open(sweeps: list[Sweep]) -> list[Sweep]:
+    return [sweep for sweep in sweeps if sweep.scene is not None]
 
 
-def _affordable(sweeps: list[_Sweep], left: float) -> list[_Sweep]:
-    """Those whose next point fits into an equal share of what is left; else the cheapest that fits at all.
-
-    A method that waits does not lose its share: when others have reached their floor, it goes on.
-    """
-    ready = [sweep for sweep in sweeps if _price(sweep) <= left / len(sweeps)]
-    if ready:
-        return ready
-    cheapest = min(sweeps, key=_price)
-    return [cheapest] if _price(cheapest) <= left else []
-
-
-def _repeats(seconds: float) -> int:
-    """Timed runs of a point: fewer where one is long, and so averages over more of the machine's noise."""
-    return 9 if seconds < 0.02 else 5 if seconds < 0.2 else 3
-
-
-def _price(sweep: _Sweep) -> float:
-    """Seconds that the next point will take: one run for the errors, one to warm up, and the repeats."""
-    run = sweep.cost * sweep.growth
-    return run * (2 + _repeats(run))
-
-
-def _start(scene: Scene, label: Label, known: Truth) -> _Sweep:
-    """A sweep at its coarsest point, or at its end where the method cannot run."""
-    method = engines.method(label)
-    plain = replace(scene, quantities=("q", "p"))
-    sweep = _Sweep(
-        label=label,
-        scenes=_adaptive(plain) if method.adaptive else _fixed(plain, SCHEMES[method.scheme].limit, known),
-        next=None,
-        points=[],
-        arithmetic=Arithmetic(),
-    )
-    reason = engines.refusal(scene, label) or engines.absence(label.engine)
-    if reason is None:
-        try:
-            driver = engines.load(label.engine)
-            sweep.arithmetic = driver.arithmetic(label)
-            sweep.next = next(sweep.scenes)
-            began = perf_counter()
-            simulate.bare(sweep.next, label, planned=PLANNED)
-            sweep.first_start = perf_counter() - began
-        except MethodError as error:
-            reason = str(error)
-        except Stopped:
-            # the sweep will meet this again and make a row of it
-            reason = None
-    if reason is not None:
-        sweep.next = None
-        sweep.points.append(_blank(label, None, "cannot run", reason))
-    return sweep
-
-
-def coarsest(known: Truth, limit: float) -> int:
-    """The fewest steps worth taking: the first below the limit of stability, or h w = 1 without one."""
-    angle = abs(known.duration) * known.w
-    within = limit if 0 < limit < np.inf else 1.0
-    return max(1, floor(angle / within) + 1 if within == limit else ceil(angle))
-
-
-def _fixed(scene: Scene, limit: float, known: Truth) -> Iterator[Scene]:
-    """The scene in ever more steps, read at the same instants from some 4096 steps on."""
-    steps, every = coarsest(known, limit), 1
-    while steps < 2**31:
-        yield replace(scene, step=known.duration / steps, steps=steps, every=every)
-        steps *= 2
-        every = every * 2 if steps // every > FRAMES else every
-
-
-def _adaptive(scene: Scene) -> Iterator[Scene]:
-    """The scene at ever smaller tolerances, on a time grid fine enough to see its largest error."""
-    finer = max(1, FRAMES // scene.steps)
-    h = scene.step / finer
-    for tolerance in TOLERANCES:
-        yield replace(scene, step=h, steps=scene.steps * finer, every=1, tolerance=tolerance)
-
-
-def _level(sweeps: list[_Sweep], known: Truth, tell: Callable[[str], object]) -> None:
+def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
     """The next point of each of these sweeps: errors one by one, then timings in turn."""
     points: list[Point] = []
     for sweep in sweeps:
-        assert sweep.next is not None
         tell(f"{sweep.label}, errors")
-        points.append(_errors(sweep, sweep.next, known))
-    finished = list(zip(sweeps, points, strict=True))
+        points.append(_errors(sweep, known))
     tell(f"timing {len(sweeps)} methods in turn")
-    timed = _timings([(sweep, sweep.next) for sweep, point in finished if sweep.next and point.outcome == "complete"])
-    for sweep, point in finished:
-        sweep.points.append(replace(point, **timed.get(str(sweep.label), {})))
-        runs = timed.get(str(sweep.label), {}).get("run_repeats")
-        if runs:
-            before, sweep.cost = sweep.cost, min(runs)
-            if engines.method(sweep.label).adaptive and before:
+    clocks = [
+        _Clock(sweep=sweep, scene=to_time(known.scene, sweep))
+        for sweep, point in zip(sweeps, points, strict=True)
+        if point.complete
+    ]
+    _time(clocks)
+    timed = {id(clock.sweep): clock for clock in clocks}
+    for sweep, point in zip(sweeps, points, strict=True):
+        clock = timed.get(id(sweep))
+        sweep.points.append(point if clock is None else clock.onto(point))
+        if clock and not clock.gave_up:
+            before, sweep.cost = sweep.cost, min(run.timing.run for run in clock.runs)
+            sweep.read = min(clock.reads, default=np.inf)
+            if sweep.method.adaptive and before:
                 sweep.growth = max(1.2, sweep.cost / before)
-        sweep.next = None if _is_finished(sweep) else next(sweep.scenes, None)
+        sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
 
 
-def _is_finished(sweep: _Sweep) -> bool:
-    """Whether the error has turned up: clearly, or twice."""
-    errors = [point.error for point in sweep.points if point.complete]
-    best = fits.turned(errors)
-    if best is None or engines.method(sweep.label).adaptive:
-        return False
-    return errors[-1] > 1.5 * errors[best] or best <= len(errors) - 3
-
-
-def _errors(sweep: _Sweep, scene: Scene, known: Truth) -> Point:
+def _errors(sweep: Sweep, known: Truth) -> Point:
     """Run for the errors."""
-    method = engines.method(sweep.label)
-    single = sweep.arithmetic.parameters == "single"
+    scene = sweep.scene
+    assert scene is not None
     errors = Errors(
         known,
         scene.step,
         scene.every,
-        scheme=SCHEMES[method.scheme],
-        judged=mechanics.in_single(known.scene) if single else None,
+        scheme=SCHEMES[sweep.method.scheme],
+        judged=mechanics.in_single(known.scene) if sweep.arithmetic.parameters == "single" else None,
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
     if outcome.status == "interrupted":
         raise KeyboardInterrupt
-    found = errors.result
     if outcome.status != "complete":
         message = f"after {outcome.step} steps: {outcome.message}"
-        return replace(_blank(sweep.label, scene, outcome.status, message), force_calls=record.force_calls)
+        return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
+    found = errors.result
     if not np.isfinite(found.largest):
-        return _blank(sweep.label, scene, "diverged", "the error is beyond the range of numbers")
-    return replace(
-        _blank(sweep.label, scene, "complete", ""), accuracy=found, force_calls=record.force_calls
-    )
-
-
-def _blank(label: Label, scene: Scene | None, outcome: str, message: str) -> Point:
-    adaptive = engines.method(label).adaptive
-    return Point(
-        method=str(label),
-        step=None if scene is None or adaptive else scene.step,
-        tolerance=scene.tolerance if scene is not None and adaptive else None,
-        steps=None if scene is None or adaptive else scene.steps,
-        outcome=outcome,
-        message=message,
-    )
+        return blank(sweep, "diverged", "the error is beyond the range of numbers")
+    return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
 
 
 def tick() -> float:
@@ -266,40 +156,70 @@ def tick() -> float:
     return max(min(seen), get_clock_info("perf_counter").resolution)
 
 
-def _timings(level: list[tuple[_Sweep, Scene]]) -> dict[str, dict[str, tuple[float, ...] | int]]:
-    """Bare runs, started afresh, in turn between the methods; the first of each only warms up."""
+@dataclass(kw_only=True, eq=False)
+class _Clock:
+    """The timings of one point while they are taken."""
+
+    sweep: Sweep
+    scene: Scene
+    copies: int = 1
+    count: int = 0
+    runs: list[simulate.Bare] = field(default_factory=list)
+    reads: list[float] = field(default_factory=list)
+    gave_up: str = ""
+
+    def warm_up(self, shortest: float) -> None:
+        """Find how many runs fit into one timing, and how many timings are worth taking."""
+        expected = self.sweep.cost * self.sweep.growth
+        if warm_ups(expected):
+            warm = self._bare()
+            expected = warm.timing.run if warm else 0.0
+        self.copies = max(1, min(64, ceil(shortest / max(expected, 1e-9))))
+        self.count = repeats(expected)
+
+    def turn(self, number: int) -> None:
+        """One repeat."""
+        run = self._bare(copies=self.copies)
+        if run:
+            self.runs.append(run)
+        if number < READS and self.sweep.read * self.sweep.growth <= READ_SECONDS:
+            read = self._bare(copies=self.copies, read=True)
+            if read:
+                self.reads.append(read.timing.run)
+
+    def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
+        try:
+            return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+        except Stopped as stop:
+            self.gave_up = str(stop)
+            return None
+
+    def onto(self, point: Point) -> Point:
+        """The point with its timings."""
+        if self.gave_up:
+            return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
+        return replace(
+            point,
+            run_repeats=tuple(run.timing.run for run in self.runs),
+            start_repeats=tuple(run.timing.start for run in self.runs),
+            read_repeats=tuple(self.reads),
+            force_calls=self.runs[0].force_calls,
+        )
+
+
+def _time(clocks: list[_Clock]) -> None:
+    """Warm up, then repeat in turn: A B C A B C."""
     shortest = TICKS * tick()
-    runs: dict[str, list[simulate.Bare]] = {str(sweep.label): [] for sweep, _ in level}
-    reads: dict[str, list[float]] = {str(sweep.label): [] for sweep, _ in level}
-    waiting = []
-    for sweep, scene in level:
-        single = simulate.bare(scene, sweep.label, planned=PLANNED)
-        seconds = single.timing.run
-        copies = max(1, min(64, ceil(shortest / max(seconds, 1e-9))))
-        waiting.append((sweep, scene, copies, _repeats(seconds)))
-    for turn in range(max((count for *_, count in waiting), default=0)):
-        for sweep, scene, copies, count in waiting:
-            if turn < count:
-                name = str(sweep.label)
-                runs[name].append(simulate.bare(scene, sweep.label, copies=copies, planned=PLANNED))
-                if turn < 3 and sweep.read * sweep.growth <= READ_SECONDS:
-                    read = simulate.bare(scene, sweep.label, copies=copies, read=True, planned=PLANNED)
-                    reads[name].append(read.timing.run)
-    for sweep, _ in level:
-        sweep.read = min(reads[str(sweep.label)], default=np.inf)
-    return {
-        name: {
-            "run_repeats": tuple(run.timing.run for run in found),
-            "start_repeats": tuple(run.timing.start for run in found),
-            "read_repeats": tuple(reads[name]),
-            "force_calls": found[0].force_calls,
-        }
-        for name, found in runs.items()
-    }
+    for clock in clocks:
+        clock.warm_up(shortest)
+    for number in range(max((clock.count for clock in clocks), default=0)):
+        for clock in clocks:
+            if number < clock.count and not clock.gave_up:
+                clock.turn(number)
 
 
 def _put_together(
-    scene: Scene, sweeps: list[_Sweep], known: Truth, budget: float, seconds: float, interrupted: bool
+    scene: Scene, sweeps: list[Sweep], known: Truth, budget: float, seconds: float, interrupted: bool
 ) -> PrecisionStudy:
     points = tuple(point for sweep in sweeps for point in sweep.points)
     timed = [point for point in points if point.complete and point.run_repeats]
@@ -317,18 +237,17 @@ def _put_together(
     )
 
 
-def _summary(sweep: _Sweep, known: Truth) -> MethodSummary:
-    method = engines.method(sweep.label)
-    points = [point for point in sweep.points if point.complete]
+def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
+    points = sweep.complete
     timed = [point for point in points if point.run_repeats]
-    fit = None if method.adaptive else fits.order(points)
-    best = fits.turned([point.error for point in points])
-    how = fits.condition(method, sweep.arithmetic, abs(known.duration) * known.w)
-    finest = [point for point in timed if point.steps and timed[-1].steps and 4 * point.steps >= timed[-1].steps]
-    crossing = None
-    last = points[-1] if points else None
-    if best is None and fit and how and last and last.steps and last.rounding:
-        crossing = fits.crossing(fit, last.rounding, last.steps, how, known.duration)
+    fit = None if sweep.method.adaptive else fits.order(points)
+    # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
+    best = fits.turned([point.error for point in points], by=2 if sweep.method.adaptive else 1)
+    expected = None
+    if best is None and fit and sweep.condition:
+        expected = fits.expected_floor(points, fit, sweep.condition, known.duration)
+    longest = max((point.steps or 0 for point in timed), default=0)
+    finest = [point for point in timed if point.steps and 4 * point.steps >= longest]
     return MethodSummary(
         method=str(sweep.label),
         order=fit.order if fit else None,
@@ -337,13 +256,15 @@ def _summary(sweep: _Sweep, known: Truth) -> MethodSummary:
         constant=fit.constant if fit else None,
         floor=points[best].error if best is not None else None,
         floor_steps=points[best].steps if best is not None else None,
-        condition=how,
-        crossing=crossing,
+        condition=sweep.condition,
+        expected_floor=expected,
         seconds_per_step=min((p.seconds / p.steps for p in finest if p.steps), default=None),
-        seconds_per_force_call=min((p.seconds / p.force_calls for p in timed[-3:] if p.force_calls), default=None),
+        seconds_per_force_call=min(
+            (p.seconds / p.force_calls for p in timed[-3:] if p.force_calls), default=None
+        ),
         read_seconds_per_step=min(
             (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None
         ),
         start_seconds=min((min(p.start_repeats) for p in timed if p.start_repeats), default=None),
-        first_start_seconds=sweep.first_start or None,
+        first_start_seconds=sweep.first_start,
     )
