@@ -98,7 +98,7 @@ def truth(scene: Scene) -> Truth:
 def _frequency(scene: Scene, modes: exact.Modes | None) -> float:
     """The largest w along the motion: from the modes, or from the stiffness on the true path."""
     if modes is not None:
-        return float(np.sqrt(max(np.max(modes.w2), 0)))
+        return float(np.sqrt(np.maximum(np.max(modes.w2), 0)))
     samples = 256
     q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
     root = np.sqrt(scene.m)

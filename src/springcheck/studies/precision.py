@@ -246,8 +246,6 @@ def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
     expected = None
     if best is None and fit and sweep.condition:
         expected = fits.expected_floor(points, fit, sweep.condition, known.duration)
-    longest = max((point.steps or 0 for point in timed), default=0)
-    finest = [point for point in timed if point.steps and 4 * point.steps >= longest]
     return MethodSummary(
         method=str(sweep.label),
         order=fit.order if fit else None,
@@ -258,9 +256,10 @@ def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
         floor_steps=points[best].steps if best is not None else None,
         condition=sweep.condition,
         expected_floor=expected,
-        seconds_per_step=min((p.seconds / p.steps for p in finest if p.steps), default=None),
+        # what a call costs beside its steps only adds to a short run, so that the minimum is the step's own
+        seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
         seconds_per_force_call=min(
-            (p.seconds / p.force_calls for p in timed[-3:] if p.force_calls), default=None
+            (p.seconds / p.force_calls for p in timed if p.force_calls), default=None
         ),
         read_seconds_per_step=min(
             (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None

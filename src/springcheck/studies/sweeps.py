@@ -21,7 +21,7 @@ TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantis
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double
 precision: how a solver answers that is a row too."""
 
-RESERVED = 0.7
+RESERVED = 0.75
 """Part of the time left that may be set aside for the methods that can reach their floor."""
 
 PLANNED = 1_000_000_000
