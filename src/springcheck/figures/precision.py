@@ -48,7 +48,9 @@ def picture(document: Document) -> Figure:
     left.set_ylabel("largest error (distance in the energy norm, of the start)")
     figure.suptitle(f"{document['scene']}: error against cost, to the same final time", x=0.02, ha="left")
     handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right upper", frameon=False, handlelength=3.2, title="method (order)")
+    figure.legend(
+        handles, labels, loc="outside right upper", frameon=False, handlelength=3.2, title="method (order)"
+    )
     figure.text(
         0.995,
         0.02,
@@ -72,9 +74,9 @@ def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             "color": COLOURS[found.index(engine) % len(COLOURS)],
             "linestyle": LINES[count[engine] % len(LINES)],
             "marker": MARKERS[i % len(MARKERS)],
-            # every other engine is drawn hollow and larger, so that curves that coincide show both
-            "markerfacecolor": "none" if found.index(engine) % 2 else None,
-            "markersize": 6.0 if found.index(engine) % 2 else 3.2,
+            # the first engines are drawn hollow and larger, so that curves that coincide show both
+            "markerfacecolor": "none" if found.index(engine) < 2 else None,
+            "markersize": 6.5 if found.index(engine) < 2 else 3.2,
         }
         count[engine] += 1
     return out
@@ -129,11 +131,11 @@ def _frame(axes: Axes, document: Document) -> None:
 def _slopes(axes: Axes, document: Document) -> None:
     """Short lines of the orders that were found, from one point at the lower left, where no curve runs."""
     orders = sorted({round(m["order"]) for m in document["methods"] if m["order"] is not None})
-    x = axes.get_xlim()[0] * np.array([2.0, 2.0 * 10**1.2])
+    x = axes.get_xlim()[0] * np.array([2.0, 2.0 * 10**0.8])
     low, high = np.log10(axes.get_ylim())
     start = 10 ** (low + 0.62 * (high - low))
     for order in orders:
-        y = start * np.array([1.0, 10.0 ** (-1.2 * order)])
+        y = start * np.array([1.0, 10.0 ** (-0.8 * order)])
         axes.plot(x, y, color="#333333", linewidth=0.9)
         axes.annotate(
             f"order {order}",

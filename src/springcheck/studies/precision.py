@@ -11,14 +11,16 @@ repeats to quote.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
+from pathlib import Path
 from time import get_clock_info, perf_counter
 
 import numpy as np
 
-from springcheck import mechanics, simulate
+from springcheck import mechanics, simulate, store
 from springcheck.model import Label, Scene, Stopped
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits
@@ -51,6 +53,9 @@ READS = 3
 
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
+
+DOCUMENT = "precision"
+"""Name of the study's document in a store."""
 
 Progress = Callable[[float, str], None]
 """Told of the seconds spent and of what comes next."""
@@ -89,6 +94,28 @@ def study(
     for sweep in _open(sweeps):
         sweep.points.append(blank(sweep, "cut off", why))
     return _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
+
+
+def record(
+    scene: Scene,
+    labels: Sequence[Label],
+    path: str | Path,
+    *,
+    budget: float = BUDGET,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> PrecisionStudy:
+    """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    command = "\n".join(["precision", *map(str, labels), scene.text])
+    with store.open_new(path, command, force=force) as journal:
+        found = study(scene, labels, budget=budget, progress=progress)
+        for table in found.tables():
+            journal.add(table)
+        journal.commit(scene, documents={DOCUMENT: json.dumps(found.document(), allow_nan=False)})
+    return found
 
 
 def _open(sweeps: list[Sweep]) -> list[Sweep]:
@@ -258,9 +285,7 @@ def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
         expected_floor=expected,
         # what a call costs beside its steps only adds to a short run, so that the minimum is the step's own
         seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
-        seconds_per_force_call=min(
-            (p.seconds / p.force_calls for p in timed if p.force_calls), default=None
-        ),
+        seconds_per_force_call=min((p.seconds / p.force_calls for p in timed if p.force_calls), default=None),
         read_seconds_per_step=min(
             (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None
         ),
