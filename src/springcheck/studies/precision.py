@@ -166,7 +166,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         message = f"after {outcome.step} steps: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
     found = errors.result
-    if not np.isfinite(found.largest):
+    if not (np.isfinite(found.largest) and np.isfinite(found.energy)):
         return blank(sweep, "diverged", "the error is beyond the range of numbers")
     return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
 

@@ -134,7 +134,7 @@ def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
         for i, sweep in enumerate(sweeps)
         if (i in aside and _price(sweep) <= left) or _price(sweep) <= share
     ]
-    if ready:
+    if ready or not sweeps:
         return ready
     cheapest = min(sweeps, key=_price)
     return [cheapest] if _price(cheapest) <= left else []
