@@ -616,7 +616,11 @@ def propagate(
             np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
         )
         root = np.sqrt(d)
-        size = np.exp(j / 2 * np.log(d))
+        # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
+        less = matrices - np.eye(2, dtype=np.longdouble)
+        a, c = less[:, 0, 0], less[:, 1, 1]
+        beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
+        size = np.exp(j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond)))
         a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
         c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
         return (

@@ -19,6 +19,7 @@ Friction does, and goes forwards only.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +111,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     velocities = np.zeros_like(positions)
     with np.errstate(all="ignore"):
         velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
+    _warm_up(context, integrator, positions)
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
@@ -239,6 +241,17 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
+
+
+def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) -> None:
+    """Take and forget a step: OpenMM compiles what it needs in the first, which belongs to the start."""
+    context.setPositions(positions)
+    # a scene that blows up in its first step is to do so in its run
+    with contextlib.suppress(mm.OpenMMException):
+        integrator.step(1)
+        context.getState(positions=True, velocities=True)
+    context.setTime(0.0)
+    context.setStepCount(0)
 
 
 class _Context:
