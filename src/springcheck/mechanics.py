@@ -368,23 +368,32 @@ def is_separate(scene: Scene) -> bool:
 
 
 def in_single(scene: Scene) -> Scene:
-    """The scene with every parameter of its potential rounded to single precision."""
+    """The scene with stiffnesses and rest lengths rounded to single precision; rest points stay."""
 
     def rounded(term: Any) -> Any:
-        if isinstance(term, Damping):
-            return term
-        values = {f.name: np.asarray(getattr(term, f.name)) for f in fields(term) if f.name != "fast"}
+        kept = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b", "rest")}
         return replace(
             term,
             **{
                 name: value.astype(np.float32).astype(np.float64)
-                for name, value in values.items()
+                for name, value in kept.items()
                 if value.dtype == np.float64
             },
         )
 
     with np.errstate(over="ignore", under="ignore"):
         return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
+
+
+def stiffened(scene: Scene, factor: float) -> Scene:
+    """The scene with every force of its potential multiplied by a factor."""
+
+    def scaled(term: Any) -> Any:
+        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b")}
+        # the b of a spring is the index of an end
+        return replace(term, **{name: x * factor for name, x in found.items() if x.dtype == np.float64})
+
+    return replace(scene, terms=tuple(scaled(term) for term in scene.terms))
 
 
 def force(terms: Iterable[Term]) -> Force:
@@ -451,6 +460,36 @@ def energy(scene: Scene, q: Reals, p: Reals) -> Reals:
     for term in scene.terms:
         total = total + term.energy(q)
     return np.asarray(total)
+
+
+def rest_positions(scene: Scene) -> Floats | None:
+    """Positions (n,) [L] at which every spring between particles has its rest length.
+
+    The lowest particle of each connected group stands at 0.  None where springs in a ring disagree.
+    """
+    neighbours: dict[int, list[tuple[int, float]]] = {}
+    for term in scene.terms:
+        if isinstance(term, Spring):
+            for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
+                neighbours.setdefault(a, []).append((b, rest))
+                neighbours.setdefault(b, []).append((a, -rest))
+    found = np.zeros(scene.n)
+    seen: set[int] = set()
+    for root in sorted(neighbours):
+        if root in seen:
+            continue
+        seen.add(root)
+        front = [root]
+        while front:
+            a = front.pop()
+            for b, rest in neighbours[a]:
+                if b not in seen:
+                    seen.add(b)
+                    found[b] = found[a] + rest
+                    front.append(b)
+                elif found[b] != found[a] + rest and found[a] != found[b] - rest:
+                    return None
+    return found
 
 
 def free_groups(scene: Scene) -> tuple[Integers, ...]:

@@ -131,11 +131,15 @@ class Arithmetic:
     force: float = 2.0**-53
     """Unit roundoff of the force."""
     quantum: float = 0.0
-    """Smallest step of a force that is summed in fixed point, in the engine's own unit of force."""
+    """Fixed-point unit of force [M L/T2]: each term's force on a particle is cut off to a multiple of it."""
     overflow: float = float("inf")
     """Largest force that the fixed-point sum holds."""
     parameters: Literal["double", "single"] = "double"
     """Width in which force constants and rest lengths are kept."""
+    excess: float = 0.0
+    """Every force is too large by this fraction."""
+    keeps_displacement: bool = False
+    """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

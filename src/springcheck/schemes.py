@@ -1,9 +1,10 @@
 """The mathematics of the methods: one-step maps as data, and what follows from them exactly.
 
-A scheme is either a splitting (a sequence of kicks ``p += c h F(q)`` and drifts ``q += d h p/m``) or a
-Runge-Kutta tableau.  Coefficients are exact: fractions, or decimal strings of 40 digits where they are
-irrational.  `step` carries out a scheme in the width of the numbers it is given; everything else
-(matrix, determinant, frequency, shadow energy, stability) is derived from that one definition.
+A scheme is either a splitting (a sequence of kicks ``p += c h F(q)``, drifts ``q += d h p/m`` and
+frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or
+decimal strings of 40 digits where they are irrational.  `step` carries out a scheme in the width of the
+numbers it is given; everything else (matrix, determinant, frequency, shadow energy, stability) is
+derived from that one definition.
 
 Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
 the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
@@ -36,7 +37,8 @@ class Scheme:
     """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
 
     `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.
-    A scheme with neither stages nor tableau has no one-step map: an adaptive solver.
+    A scheme with neither stages nor tableau has no step: an adaptive solver, or the exact flow (`flow`),
+    which has a matrix on linear scenes and nothing else.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Scheme:
     stages: tuple[Stage, ...] = ()
     a: tuple[tuple[Fraction, ...], ...] = ()
     b: tuple[Fraction, ...] = ()
+    flow: bool = False
     source: str = ""
 
     @property
@@ -61,7 +64,7 @@ class Scheme:
 
     @property
     def one_step(self) -> bool:
-        """Whether the scheme is a map from one state to the next."""
+        """Whether `step` can carry the scheme out."""
         return bool(self.stages or self.b)
 
 
@@ -246,6 +249,24 @@ _ALL = (
         "spring alone, in company it resonates from h w = 16 sin(pi/16) on",
     ),
     Scheme(
+        name="langevin-middle-early",
+        title="Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
+        order=1,
+        limit=2.0,
+        symplectic=True,
+        stages=(("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
+        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; as OpenMM's integrator stores it",
+    ),
+    Scheme(
+        name="exact",
+        title="exact flow",
+        order=0,
+        limit=np.inf,
+        symplectic=True,
+        flow=True,
+        source="the solution of the equation of motion",
+    ),
+    Scheme(
         name="adams",
         title="CVODE Adams-Moulton, orders 1-12",
         order=0,
@@ -309,6 +330,8 @@ def step(
             else:
                 p = p + ch * _acting(kind, force, parts)(q, p)
         return q, p
+    if not scheme.b:
+        raise ValueError(f"{scheme.name} has no step that a force alone defines")
     forces: list[Reals] = []
     velocities: list[Reals] = []
     for row in scheme.a:
@@ -383,7 +406,7 @@ def magnitude_step(
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
     `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
-    norm of the inverse of the matrix that it solves, the condition of its step.
+    squared norm of the inverse of the matrix that it solves, the condition of its step.
     """
     direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
@@ -410,7 +433,8 @@ def magnitude_step(
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
             condition = _condition(stiffness, own**2 / (m * slowed))
-            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition
+            # the solution is larger than what it is made from by the condition, its error by that again
+            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
@@ -445,9 +469,11 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
     Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
-    from fast takes each spring for a fast one.
+    from fast takes each spring for a fast one; the exact flow is the exponential.
     """
     m, k, friction = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    if scheme.flow:
+        return _exponential(m, k, friction, h)
 
     def force(q: Reals, p: Reals) -> Reals:
         return np.asarray(-k * q - friction * (p / m))
@@ -470,6 +496,24 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     )
     out[:, 0, :], out[:, 1, :] = q.T, p.T
     return out
+
+
+def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
+    """The exact flow (n, 2, 2), of any damping: of exp(h L) with L = N - g I, N**2 is a multiple of I."""
+    eye = np.eye(2, dtype=np.longdouble)
+    t = np.longdouble(h)
+    generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
+    generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
+    g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
+    traceless = generator + g[:, None, None] * eye
+    w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
+    w = np.sqrt(np.abs(w2))
+    safe = np.where(w == 0, 1, w)
+    even = np.where(w2 >= 0, np.cos(w * t), np.cosh(np.where(w2 < 0, w, 0) * t))
+    odd = np.where(w2 >= 0, np.sin(w * t), np.sinh(np.where(w2 < 0, w, 0) * t)) / safe
+    odd = np.where(w == 0, t, odd)
+    decay = np.exp(-g * t)
+    return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
 
 
 def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
@@ -524,8 +568,9 @@ def rotation(matrices: Extended) -> Rotation:
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    inside = (minus < 0) & (root < np.abs(half_trace))
-    growth = np.arctanh(np.where(inside, root / np.where(inside, np.abs(half_trace), 1), 0))
+    # where area is turned over (determinant <= 0) there is no such growth
+    hyperbolic = (minus < 0) & (determinant > 0)
+    growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
     return Rotation(
         determinant=determinant,
         angle=angle,
@@ -571,13 +616,31 @@ def propagate(
             np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
         )
         root = np.sqrt(d)
-        size = np.exp(j / 2 * np.log(d))
+        # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
+        less = matrices - np.eye(2, dtype=np.longdouble)
+        a, c = less[:, 0, 0], less[:, 1, 1]
+        beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
+        size = np.exp(j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond)))
         a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
         c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
         return (
             np.asarray(size * (even * y + odd * (a * y + b * v))),
             np.asarray(size * (even * v + odd * (c * y + e * v))),
         )
+
+
+def condition(matrices: Extended, w: Extended) -> Extended:
+    """How far the invariant ellipses of one-step matrices (n, 2, 2) are from circles: the ratio of their
+    axes in energy coordinates (w y, v), w (n,) > 0.  No power of a map is larger than that, whatever its
+    determinant makes of it; infinite where the motion does not turn.
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1] * w
+    c, d = matrices[:, 1, 0] / w, matrices[:, 1, 1]
+    half = np.abs(c - b) / 2
+    area = -((a - d) ** 2 / 4 + b * c)
+    turning = area > 0
+    spread = np.sqrt(np.maximum(half**2 - area, 0))
+    return np.asarray(np.where(turning, (half + spread) / np.sqrt(np.where(turning, area, 1)), np.inf))
 
 
 def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
@@ -614,6 +677,6 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):
         ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
-        total = np.max(j + size * np.maximum(ramp, 0), axis=-1)
+        total = np.max(np.minimum(j + size * np.maximum(ramp, 0), j * condition(matrices, w)), axis=-1)
         grown = np.max(radius**j, axis=-1)
     return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)

@@ -16,7 +16,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import h5py
 import numpy as np
 
 from springcheck.model import Floats, Scene
@@ -163,11 +162,12 @@ class Draft:
         digests = {name: total.hexdigest() for name, total in self._hash.items()}
         digest = combined(digests, self._columns)
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        with h5py.File(self._temporary, "r+", libver=layout.LIBVER, locking=False) as file:
+        given = {name: value for name, value in attributes.items() if value is not None}
+        text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.text])
+        with layout.reopened(self._temporary, text) as file:
             layout.begin(file)
             layout.write_attributes(file, {"part": self.label})
             parameters = file.create_group(f"parameters/{self.label}")
-            given = {name: value for name, value in attributes.items() if value is not None}
             known: dict[str, Scalar] = {
                 "scene": self.scene.text,
                 "scene_name": self.scene.name,
@@ -226,10 +226,5 @@ def _lay_out(
     path: Path, label: str, scene: Scene, frames: int, columns: Mapping[str, Column]
 ) -> dict[str, int]:
     total = sum(column.size for column in columns.values())
-    files.room(path, total + layout.MARGIN)
-    path.unlink(missing_ok=True)
-    with h5py.File(path, "x", libver=layout.LIBVER, locking=False) as file:
-        offsets = layout.skeleton(file, label, scene, frames)
-    with path.open("rb+") as file:
-        files.reserve(file, file.seek(0, os.SEEK_END) + layout.MARGIN + len(scene.text.encode()))
-    return offsets
+    with layout.fresh(path, total) as file:
+        return layout.skeleton(file, label, scene, frames)

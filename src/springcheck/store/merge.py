@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,17 +35,16 @@ def collection(
     total = sum(source.stat().st_size for source in sources)
     text = sum(len(document.encode()) for document in documents.values())
     margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
-    files.room(path, total + margin)
     if base is None:
-        path.unlink(missing_ok=True)
         kept: tuple[seal.Extent, ...] = ()
-        with h5py.File(path, "x", libver=layout.LIBVER, locking=False) as file:
-            layout.begin(file)
+        made = layout.fresh(path, total + margin)
     else:
+        files.room(path, total + margin)
         kept = adopt.adopt(base, path)
-    with path.open("rb+") as raw:
-        files.reserve(raw, raw.seek(0, os.SEEK_END) + total + margin)
-    with h5py.File(path, "r+", libver=layout.LIBVER, locking=False) as file:
+        made = layout.reopened(path, total + margin)
+    with made as file:
+        if base is None:
+            layout.begin(file)
         file.attrs.pop("part", None)
         layout.write_attributes(file, root)
         for source in sources:

@@ -19,6 +19,8 @@ Friction does, and goes forwards only.
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +37,13 @@ mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow near 2**31 a
 
 _PRECISIONS = {
     name: Arithmetic(
-        name=name, state=state, force=force, quantum=FIXED_POINT, overflow=2.0**31, parameters="single"
+        name=name,
+        state=state,
+        force=force,
+        quantum=FIXED_POINT,
+        overflow=2.0**31,
+        parameters="single",
+        keeps_displacement=True,
     )
     for name, state, force in (
         ("single", 2.0**-24, 2.0**-24),
@@ -44,7 +52,8 @@ _PRECISIONS = {
     )
 }
 """Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
-"mixed" keeps positions as a float and a float of correction, together 48 bits."""
+"mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
+displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
 
 EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -57,6 +66,15 @@ SHIFTED = frozenset({"verlet", "langevin-middle"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
 
 
+CUSTOM = ("euler", "semi-implicit-euler", "mts")
+"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
+
+CUSTOM_EXCESS = 2.0**-32
+"""On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
+1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
+its forces are too large by 2.3e-10.  springcheck's step defect showed it before the source was read."""
+
+
 def version() -> dict[str, str]:
     """Version of OpenMM."""
     return {"openmm": str(mm.Platform.getOpenMMVersion())}
@@ -66,7 +84,8 @@ def arithmetic(label: Label) -> Arithmetic:
     """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
     if label.platform in ("", "Reference", "CPU"):
         return Arithmetic()
-    return _PRECISIONS[label.precision or "single"]
+    found = _PRECISIONS[label.precision or "single"]
+    return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found
 
 
 def convention(method: Method) -> str:
@@ -79,7 +98,16 @@ def convention(method: Method) -> str:
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """Build system, integrator and context.  MethodError: the platform is not here."""
+    """Build system, integrator and context.
+
+    Raises MethodError where the platform is not here, and for friction backwards in time: OpenMM takes no
+    negative step, and friction is not undone by reflecting the momenta.
+    """
+    if step < 0 and mechanics.is_damped(scene):
+        raise MethodError(f"{label}: OpenMM takes no negative step, so friction runs forwards in time only")
+    if arithmetic(label).parameters == "single":
+        # the half kicks below must be those of the springs that OpenMM feels
+        scene = mechanics.in_single(scene)
     origins = _origins(scene, method)
     system, positions = _system(scene, origins)
     integrator = _integrator(scene, method.name, step)
@@ -90,6 +118,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     velocities = np.zeros_like(positions)
     with np.errstate(all="ignore"):
         velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
+    _warm_up(context, integrator, positions)
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
@@ -106,45 +135,44 @@ def _origins(scene: Scene, method: Method) -> Floats:
     """Where each particle's OpenMM coordinate is counted from, (n,) [L].
 
     OpenMM's bonds know their length, not its sign, so a bond of a rest length is the scene's spring
-    only while it does not turn over.  Where the energy rules that out by a factor of 4 and the scheme
-    does not feed energy in, real positions are used (origins 0).  Elsewhere each particle is counted
+    only while it does not turn over.  Where the energy that the scheme can reach rules that out,
+    real positions are used (origins 0).  Elsewhere each particle is counted
     from its own rest position, so that every bond has rest length 0 and the two laws are one.
     """
     origins = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
-    energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
-    bounded = SCHEMES[method.scheme].symplectic
+    springs = [t for t in scene.terms if isinstance(t, mechanics.WallSpring | mechanics.Spring)]
+    stiffnesses = [k for term in springs for k in term.k.tolist()]
+    hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
+    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and min(stiffnesses, default=0.0) >= 0
+    # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
+    energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
     def safe(term: mechanics.Spring) -> bool:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
-        return bool(np.all((term.rest == 0) | (bounded & (u > 0) & (0.5 * term.k * term.rest**2 > energy))))
+        return bool(np.all((term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy))))
 
     if all(safe(term) for term in pairs):
         return origins
-    neighbours: dict[int, list[tuple[int, float]]] = {}
-    for term in pairs:
-        for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
-            neighbours.setdefault(a, []).append((b, rest))
-            neighbours.setdefault(b, []).append((a, -rest))
-    seen: set[int] = set()
-    for root in neighbours:
-        if root in seen:
-            continue
-        seen.add(root)
-        front = [root]
-        while front:
-            a = front.pop()
-            for b, rest in neighbours[a]:
-                if b not in seen:
-                    seen.add(b)
-                    origins[b] = origins[a] + rest
-                    front.append(b)
-                elif origins[b] != origins[a] + rest:
-                    raise MethodError(
-                        f"the springs around particles {a} and {b} have no common rest, and OpenMM's "
-                        "HarmonicBondForce knows only the length of a bond that may turn over"
-                    )
-    return origins
+    rest = mechanics.rest_positions(scene)
+    if rest is None:
+        raise MethodError(
+            f"{scene.name}: springs in a ring have no common rest, and OpenMM's HarmonicBondForce knows only "
+            "the length of a bond that may turn over"
+        )
+    return rest
+
+
+def _largest_w2(scene: Scene) -> float:
+    """An upper bound of the squared frequencies of a linear scene, by Gershgorin's circles [1/T2]."""
+    row = np.zeros(scene.n)
+    for term in scene.terms:
+        if isinstance(term, mechanics.WallSpring):
+            np.add.at(row, term.i, np.abs(term.k))
+        elif isinstance(term, mechanics.Spring):
+            np.add.at(row, term.a, 2 * np.abs(term.k))
+            np.add.at(row, term.b, 2 * np.abs(term.k))
+    return float(np.max(row / scene.m))
 
 
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
@@ -218,7 +246,7 @@ def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
     if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
         raise MethodError(
             f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
-            "its second end must lie to the right of the first, a rest length apart that its energy cannot close"
+            "its second end must start to the right of the first, at a rest length that the energy cannot close"
         )
 
 
@@ -262,6 +290,17 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
+
+
+def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) -> None:
+    """Take and forget a step: OpenMM compiles what it needs in the first, which belongs to the start."""
+    context.setPositions(positions)
+    # a scene that blows up in its first step is to do so in its run
+    with contextlib.suppress(mm.OpenMMException):
+        integrator.step(1)
+        context.getState(positions=True, velocities=True)
+    context.setTime(0.0)
+    context.setStepCount(0)
 
 
 class _Context:

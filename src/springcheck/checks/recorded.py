@@ -1,183 +1,18 @@
-"""The checks: one function each, one number against one bound, and the bound's reason.
-
-A check looks at a recorded trajectory, or at a piece of one.  The first line of its docstring is its
-sentence in the report.  Bounds are formulas: roundings counted along one step, times what the map can
-make of them.  Values and bounds of the rounding checks are in units of one rounding of what was added
-up, so that "4.1 of 19" reads: four roundings were seen where nineteen take place.
-
-Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
-Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need
-the solution and holds for nonlinear scenes too.
-"""
+"""Checks of a recorded trajectory, or of a piece of one: they need no further run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, TypeAlias
+from dataclasses import replace
 
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
-from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
-
-SMALLEST = np.longdouble(5e-324)
-"""What an operation can lose to underflow: one unit of a subnormal double."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Case:
-    """A trajectory, or a piece of it, with what the checks share: computed at most once."""
-
-    trajectory: Trajectory
-    scene: Scene
-
-    @property
-    def scheme(self) -> schemes.Scheme:
-        """The scheme that the method claims to run."""
-        return schemes.SCHEMES[self.trajectory.scheme]
-
-    @cached_property
-    def judged(self) -> Scene:
-        """The scene with its parameters as the engine's arithmetic keeps them."""
-        single = self.trajectory.arithmetic.parameters == "single"
-        return mechanics.in_single(self.scene) if single else self.scene
-
-    @cached_property
-    def steps(self) -> Integers:
-        """The number of steps behind each frame."""
-        first = round(float(self.trajectory.t[0] / self.trajectory.step))
-        return first + np.arange(len(self.trajectory.t)) * self.trajectory.every
-
-    @cached_property
-    def linear(self) -> bool:
-        """Whether each normal mode has a one-step matrix of its own."""
-        return mechanics.has_modes(self.scene) and not self.scheme.mixes
-
-    @property
-    def area_preserving(self) -> bool:
-        """Whether every step keeps area: a symplectic scheme, and no friction."""
-        return self.scheme.symplectic and not mechanics.is_damped(self.scene)
-
-    @cached_property
-    def law(self) -> dict[str, Any]:
-        """What `schemes.step` and `schemes.magnitude_step` need beside the forces."""
-        scene = self.judged
-        stiff: Extended | None = None
-        if self.scheme.implicit:
-            of = mechanics.own_stiffness if mechanics.is_separate(scene) else mechanics.stiffness
-            stiff = of(scene, scene.q)
-        return {"stiffness": stiff, "rate": mechanics.rates(scene) if mechanics.is_damped(scene) else None}
-
-    @cached_property
-    def modes(self) -> exact.Modes:
-        return exact.modes(self.judged)
-
-    @cached_property
-    def matrices(self) -> Extended:
-        """One-step matrices of the modes, on (y, v)."""
-        one = np.ones(1, dtype=np.longdouble)
-        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2, c=self.modes.rate)
-
-    @cached_property
-    def w(self) -> Extended:
-        """Frequencies that scale mode positions to velocities; a free mode takes 1/duration."""
-        duration = abs(self.trajectory.step) * max(int(self.steps[-1]), 1)
-        w = np.sqrt(np.abs(self.modes.w2))
-        return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
-
-    @cached_property
-    def next_states(self) -> tuple[Extended, Extended]:
-        """The scheme's own next state after each frame but the last, in extended precision."""
-        q = self.trajectory.q[:-1].astype(np.longdouble)
-        p = self.trajectory.p[:-1].astype(np.longdouble)
-        return advance(self, q, p, self.trajectory.every)
-
-    @cached_property
-    def allowance(self) -> tuple[Extended, Extended]:
-        """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
-        run, scene = self.trajectory, self.judged
-        rounding = run.arithmetic
-        q, p = run.q[:-1].astype(np.longdouble), run.p[:-1].astype(np.longdouble)
-        h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-        sizes = mechanics.magnitude(scene.terms)
-        slow, fast = mechanics.split(scene.terms)
-        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
-        size_q, size_p = schemes.magnitude_step(
-            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
-        )
-        of_q, of_p = rounding.state * size_q, rounding.state * size_p
-        extra = np.zeros_like(p)
-        if rounding.force > rounding.state:
-            extra += rounding.force * h * sizes(np.abs(q), np.abs(p))
-        if rounding.quantum:
-            extra += rounding.quantum * h
-        if run.rebuilds_velocity:
-            extra += rounding.state * m * (np.abs(q) + size_q) / h
-        return of_q + h / m * extra + SMALLEST, of_p + extra + SMALLEST
-
-    @cached_property
-    def norm(self) -> mechanics.Norm:
-        return mechanics.norm(self.judged)
-
-    @cached_property
-    def rounding(self) -> float:
-        """The largest allowance of a step in the norm of errors, up to each frame (f-1,)."""
-        return float(np.max(self.norm(*self.allowance)))
-
-    @property
-    def roundings(self) -> int:
-        """Roundings along one step."""
-        return schemes.roundings(self.scheme)
-
-    def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
-        """Passed only if the value is a number within the bound."""
-        return Verdict(
-            method=self.trajectory.label,
-            check=check,
-            value=value,
-            bound=bound,
-            unit=unit,
-            passed=bool(value <= bound),
-            why=why,
-        )
-
-    def not_applicable(self, check: str, why: str) -> Verdict:
-        """Reported as what it is, never as passed."""
-        return Verdict(
-            method=self.trajectory.label,
-            check=check,
-            value=float("nan"),
-            bound=float("nan"),
-            unit="",
-            passed=None,
-            why=why,
-        )
-
-
-def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:
-    """So many steps of the scheme from states (f, n), in extended precision."""
-    scene = case.judged
-    force = mechanics.force(scene.terms)
-    slow, fast = mechanics.split(scene.terms)
-    parts = mechanics.force(slow), mechanics.force(fast)
-    m = scene.m.astype(np.longdouble)
-    a: Reals = q
-    b: Reals = p
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(steps):
-            a, b = schemes.step(
-                case.scheme, a, b, h=case.trajectory.step, m=m, force=force, parts=parts, **case.law
-            )
-    return np.asarray(a), np.asarray(b)
-
+from springcheck.checks.case import Case
+from springcheck.model import Arithmetic, Extended, Floats, Verdict
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has
 lost 3 of the 19 digits of the reference there."""
-
-Check: TypeAlias = Callable[[Case], Verdict]
 
 
 def _no_map(case: Case) -> str | None:
@@ -254,8 +89,9 @@ def _amplified(case: Case, steps: int) -> float:
 
 def fastest(case: Case) -> float:
     """Upper bound of the frequencies and rates met along the way [1/T]: stiffness at the widest points."""
-    span = np.max(np.abs(case.trajectory.q), axis=0)
-    stiff = np.abs(mechanics.stiffness(case.judged, span)) / case.judged.m
+    q = case.trajectory.q
+    stiff = np.abs([mechanics.stiffness(case.judged, x) for x in (np.max(q, axis=0), np.min(q, axis=0))])
+    stiff = np.max(stiff, axis=0) / case.judged.m[:, None]
     return float(np.sqrt(np.max(np.sum(stiff, axis=1)))) + float(np.max(mechanics.rates(case.judged)))
 
 
@@ -295,7 +131,12 @@ def growth_bound(case: Case) -> tuple[Floats, Floats]:
     total, grown = schemes.amplification(case.matrices, case.w, case.steps)
     size = case.norm(*case.allowance)
     size = np.maximum.accumulate(np.concatenate([size[:1], size]))
-    unit = np.maximum(size, np.asarray(size[0] * grown, np.float64))
+    if case.steps[0] == 0:
+        first = size[0]
+    else:
+        # a piece of a long run: what came before it is bounded by the envelope of the motion
+        first = max(case.norm(*case.allowance_at(*x)) for x in (case.envelope, (case.scene.q, case.scene.p)))
+    unit = np.maximum(size, np.asarray(first * grown, np.float64))
     return np.asarray(case.roundings * total), np.asarray(unit)
 
 
@@ -340,6 +181,8 @@ def shadow_energy(case: Case) -> Verdict:
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = growth_bound(case)
     size = np.maximum.accumulate(case.norm(run.q - _rest(case), run.p))
+    if case.steps[0] != 0:
+        size = np.maximum(size, case.norm(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
     scale = 2 * shape * size * unit * np.longdouble(case.norm.unit) ** 2
     off = np.max(np.abs(stored - expected), axis=1)
     late = case.steps > 0
@@ -381,7 +224,8 @@ def frequency(case: Case) -> Verdict:
         return case.not_applicable("frequency", "nothing has moved yet")
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
-    backwards = -1 if case.trajectory.step < 0 else 1
+    # beyond its limit a scheme of several stages can turn the other way
+    backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)
     off = phase - expected
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
@@ -390,11 +234,8 @@ def frequency(case: Case) -> Verdict:
     amplitude = case.norm(case.trajectory.q - _rest(case), case.trajectory.p)[-1]
     mode = abs(float(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j])))
     whole = float(case.norm.unit) * np.sqrt(2) * amplitude
-    # an error e of a state of size z turns its phase by e/z, times the shape of the invariant ellipse
-    shape = float(
-        (np.abs(form[0]) / case.w[j] ** 2 + abs(form[1]) / case.w[j] + abs(form[2]))
-        / abs(np.sqrt(np.abs(form[0] * form[2] - form[1] ** 2 / 4)) / case.w[j])
-    )
+    # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
+    shape = float(schemes.condition(case.matrices, case.w)[j])
     limit = float(bound[-1] * unit[-1] / amplitude * (whole / mode) * shape / abs(expected))
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
@@ -423,10 +264,14 @@ def momentum(case: Case) -> Verdict:
     if not case.scheme.one_step:
         return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
     run = case.trajectory
+    if len(run.t) < 2:
+        return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
     _, of_p = case.allowance
     unit = np.maximum.accumulate(np.sum(of_p, axis=1))
+    if case.steps[0] != 0:
+        unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
     limit = case.roundings * case.steps[1:].astype(np.float64)
     seen = np.asarray(off[1:] / unit, np.float64)
     worst = int(np.argmax(seen / limit))
@@ -491,51 +336,26 @@ def arithmetic(case: Case) -> Verdict:
     if why_not:
         return case.not_applicable("arithmetic", why_not)
     named = case.trajectory.arithmetic
-    if named.state <= 2.0**-53 and named.force <= 2.0**-53 and not named.quantum:
+    plain = Arithmetic()
+    if named.state <= plain.state and named.force <= plain.force and not named.quantum:
         return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
     seen = step_defect(case)
-    floor = 2.0**-8
+    finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
+    coarseness = case.rounding / finer.rounding
+    if coarseness < 1 / FLOOR or len(case.trajectory.t) < ENOUGH:
+        return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
     return Verdict(
         method=seen.method,
         check="arithmetic",
         value=seen.value,
         bound=seen.bound,
         unit=seen.unit,
-        passed=bool(floor <= seen.value <= seen.bound),
-        why=f"{named.name} precision: a value above is worse arithmetic, one below 2**-8 is better",
+        passed=bool(FLOOR <= seen.value <= seen.bound),
+        why=f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
     )
 
 
-CHECKS: tuple[Check, ...] = (
-    start,
-    times,
-    line,
-    step_defect,
-    arithmetic,
-    closed_form,
-    shadow_energy,
-    frequency,
-    momentum,
-    energies,
-    tolerance,
-)
-
-
-def judge(scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS) -> list[Verdict]:
-    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None."""
-    case = Case(trajectory=trajectory, scene=scene)
-    return [check(case) for check in checks]
-
-
-def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
-    """Of the verdicts on the pieces of one trajectory, the worst of each check."""
-    out: list[Verdict] = []
-    for same in zip(*pieces, strict=True):
-        judged = [verdict for verdict in same if verdict.passed is not None]
-        out.append(max(judged, key=_badness) if judged else same[0])
-    return out
-
-
-def _badness(verdict: Verdict) -> tuple[bool, float]:
-    ratio = verdict.value / verdict.bound if verdict.bound else verdict.value
-    return (not verdict.passed, ratio if np.isfinite(ratio) else np.inf)
+FLOOR = 2.0**-8
+"""A rounding that is as good as random stays below this fraction of its unit once in 2**8 times."""
+ENOUGH = 9
+"""Frames of which all stay below `FLOOR` by chance once in 2**64 times: 8 steps, or fewer particles."""

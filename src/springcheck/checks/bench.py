@@ -1,0 +1,113 @@
+"""What experiments share: the runs of one method that several of them look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from springcheck import exact, mechanics, schemes
+from springcheck.checks.case import Case
+from springcheck.model import Floats, Scene, Term, Trajectory, Verdict
+
+Run: TypeAlias = Callable[[Scene, str], Trajectory]
+"""(scene, label) -> trajectory.  May raise MethodError: the experiment does not apply then."""
+
+LARGEST = 8
+"""Particles of which the one-step matrix is recovered: it takes 2n+1 copies of n particles."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bench:
+    """A method, a scene, and the means to run it.  Runs that serve several experiments are made once."""
+
+    scene: Scene
+    label: str
+    run: Run
+
+    kept: dict[int, Trajectory] = field(default_factory=dict)
+
+    def once(self, scene: Scene) -> Trajectory:
+        """The run of a scene that several experiments ask for; made at the first of them."""
+        if id(scene) not in self.kept:
+            self.kept[id(scene)] = self.run(scene, self.label)
+        return self.kept[id(scene)]
+
+    @cached_property
+    def forwards(self) -> Trajectory:
+        """The scene's own run, of at most 200 steps, every step recorded."""
+        return self.run(replace(self.scene, every=1, steps=min(self.scene.steps, 200)), self.label)
+
+    @property
+    def scheme(self) -> schemes.Scheme:
+        """The scheme that the method claims to run."""
+        return schemes.SCHEMES[self.forwards.scheme]
+
+    @cached_property
+    def copies(self) -> tuple[Case, Floats]:
+        """One step of 2n+1 copies of the scene side by side, and by how much each was pushed (2n,).
+
+        Copy 0 starts in equilibrium; copies 1..n have one position pushed, the rest one momentum.
+        """
+        scene, n = self.scene, self.scene.n
+        modes = exact.modes(scene)
+        rest, _ = modes.out_of(modes.centre(), np.zeros(n, dtype=np.longdouble))
+        k = np.abs(np.diag(mechanics.stiffness(scene, scene.q))).astype(np.float64)
+        unit = float(mechanics.norm(scene).unit) or 1.0
+        momentum = np.sqrt(2 * scene.m) * unit
+        k = np.where(k > 0, k, scene.m / scene.step**2)
+        pushes = np.concatenate([np.sqrt(2 / k) * unit, momentum])
+        state = np.zeros((2 * n + 1, 2 * n))
+        state[:, :n] = rest.astype(np.float64)
+        state[1:] += np.diag(pushes)
+        many = replicated(scene, 2 * n + 1)
+        start = replace(many, q=state[:, :n].ravel(), p=state[:, n:].ravel(), steps=1, every=1)
+        return Case(trajectory=self.run(start, self.label), scene=start), state[
+            np.arange(1, 2 * n + 1), np.arange(2 * n)
+        ] - state[0]
+
+    def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
+        """Passed only if the value is a number within the bound."""
+        return Verdict(
+            method=self.label,
+            check=check,
+            value=value,
+            bound=bound,
+            unit=unit,
+            passed=bool(value <= bound),
+            why=why,
+        )
+
+    def not_applicable(self, check: str, why: str) -> Verdict:
+        """Reported as what it is, never as passed."""
+        return Verdict(
+            method=self.label, check=check, value=np.nan, bound=np.nan, unit="", passed=None, why=why
+        )
+
+
+def replicated(scene: Scene, copies: int) -> Scene:
+    """So many copies of a scene side by side, which do not act on each other."""
+
+    def many(term: Term) -> Any:
+        record: Any = term
+        values = {f.name: getattr(record, f.name) for f in fields(record)}
+        return replace(
+            record,
+            **{
+                name: (value + scene.n * np.arange(copies)[:, None]).ravel()
+                if value.dtype.kind == "i"
+                else np.tile(value, copies)
+                for name, value in values.items()
+            },
+        )
+
+    return replace(
+        scene,
+        m=np.tile(scene.m, copies),
+        q=np.tile(scene.q, copies),
+        p=np.tile(scene.p, copies),
+        terms=tuple(many(term) for term in scene.terms),
+    )

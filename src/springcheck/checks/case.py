@@ -1,0 +1,207 @@
+"""What the checks of one trajectory share: the scheme's own next states, and what one rounding is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from springcheck import exact, mechanics, schemes
+from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
+
+SMALLEST = np.longdouble(5e-324)
+"""What an operation can lose to underflow: one unit of a subnormal double."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A trajectory, or a piece of it, with what the checks share: computed at most once."""
+
+    trajectory: Trajectory
+    scene: Scene
+
+    @property
+    def scheme(self) -> schemes.Scheme:
+        """The scheme that the method claims to run."""
+        return schemes.SCHEMES[self.trajectory.scheme]
+
+    @cached_property
+    def judged(self) -> Scene:
+        """The scene with its parameters as the engine's arithmetic keeps them."""
+        arithmetic = self.trajectory.arithmetic
+        scene = mechanics.in_single(self.scene) if arithmetic.parameters == "single" else self.scene
+        return mechanics.stiffened(scene, 1 + arithmetic.excess) if arithmetic.excess else scene
+
+    @cached_property
+    def steps(self) -> Integers:
+        """The number of steps behind each frame."""
+        first = round(float(self.trajectory.t[0] / self.trajectory.step))
+        return first + np.arange(len(self.trajectory.t)) * self.trajectory.every
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether each normal mode has a one-step matrix of its own."""
+        return mechanics.has_modes(self.scene) and not self.scheme.mixes
+
+    @property
+    def area_preserving(self) -> bool:
+        """Whether every step keeps area: a symplectic scheme, and no friction."""
+        return self.scheme.symplectic and not mechanics.is_damped(self.scene)
+
+    @cached_property
+    def law(self) -> dict[str, Any]:
+        """What `schemes.step` and `schemes.magnitude_step` need beside the forces."""
+        scene = self.judged
+        stiff: Extended | None = None
+        if self.scheme.implicit:
+            of = mechanics.own_stiffness if mechanics.is_separate(scene) else mechanics.stiffness
+            stiff = of(scene, scene.q)
+        return {"stiffness": stiff, "rate": mechanics.rates(scene) if mechanics.is_damped(scene) else None}
+
+    @cached_property
+    def modes(self) -> exact.Modes:
+        return exact.modes(self.judged)
+
+    @cached_property
+    def matrices(self) -> Extended:
+        """One-step matrices of the modes, on (y, v)."""
+        one = np.ones(1, dtype=np.longdouble)
+        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2, c=self.modes.rate)
+
+    @cached_property
+    def w(self) -> Extended:
+        """Frequencies that scale mode positions to velocities; a free mode takes 1/duration."""
+        duration = abs(self.trajectory.step) * max(int(self.steps[-1]), 1)
+        w = np.sqrt(np.abs(self.modes.w2))
+        return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
+
+    @cached_property
+    def next_states(self) -> tuple[Extended, Extended]:
+        """The scheme's own next state after each frame but the last, in extended precision."""
+        q = self.trajectory.q[:-1].astype(np.longdouble)
+        p = self.trajectory.p[:-1].astype(np.longdouble)
+        return advance(self, q, p, self.trajectory.every)
+
+    @cached_property
+    def allowance(self) -> tuple[Extended, Extended]:
+        """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
+        return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
+
+    def allowance_at(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
+        """One rounding of everything that one step from states (..., n) adds up, (..., n) each."""
+        run, scene = self.trajectory, self.judged
+        rounding = run.arithmetic
+        q, p = np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble)
+        h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+        sizes = mechanics.magnitude(scene.terms)
+        slow, fast = mechanics.split(scene.terms)
+        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
+        size_q, size_p = schemes.magnitude_step(
+            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
+        )
+        # an engine may count positions from where the springs rest, and so round those
+        size_q = size_q + np.abs(self.rest_positions)
+        of_q, of_p = rounding.state * size_q, rounding.state * size_p
+        extra = np.zeros_like(p)
+        if rounding.force > rounding.state:
+            extra += rounding.force * h * sizes(q, p)
+        if rounding.quantum:
+            # each term's force on a particle is cut off once a step, not once for every rounding, and a
+            # force below the quantum is lost, no more
+            lost = np.minimum(rounding.quantum * _pulls(scene), sizes(q, p))
+            extra += h * lost / self.roundings
+        if run.rebuilds_velocity and not rounding.keeps_displacement:
+            extra += rounding.state * m * (q + size_q) / h
+        extra += SMALLEST * (1 + m)
+        # carried on through the rest of the step: a shifted position is felt by the next kick
+        shift = h / m * extra + SMALLEST
+        felt = h * (sizes(q + shift, p) - sizes(q, p))
+        return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
+
+    @cached_property
+    def envelope(self) -> tuple[Extended, Extended]:
+        """What |q| and |p| (n,) never exceed while the map's determinants do not grow.
+
+        Each mode stays within its invariant ellipse, whose axes have the ratio `schemes.condition`;
+        a mode that does not turn is left at its start.
+        """
+        y, v = self.modes.into(self.scene.q, self.scene.p)
+        centre = self.modes.centre()
+        axes = schemes.condition(self.matrices, self.w)
+        reach = np.hypot(self.w * (y - centre), v) * np.where(np.isfinite(axes), axes, 1)
+        spread = np.eye(self.scene.n) if self.modes.vectors is None else np.abs(self.modes.vectors)
+        rest, _ = self.modes.out_of(centre, np.zeros_like(centre))
+        q = np.abs(rest) + spread @ (reach / self.w) / self.modes.root_m
+        return np.asarray(q), np.asarray(spread @ reach * self.modes.root_m)
+
+    @cached_property
+    def rest_positions(self) -> Floats:
+        """Where springs between particles have their rest lengths, 0 where they cannot agree (n,)."""
+        found = mechanics.rest_positions(self.judged)
+        return np.zeros(self.scene.n) if found is None else found
+
+    @cached_property
+    def norm(self) -> mechanics.Norm:
+        return mechanics.norm(self.judged)
+
+    @cached_property
+    def rounding(self) -> float:
+        """The largest allowance of a step in the norm of errors, up to each frame (f-1,)."""
+        return float(np.max(self.norm(*self.allowance)))
+
+    @property
+    def roundings(self) -> int:
+        """Roundings along one step."""
+        return schemes.roundings(self.scheme)
+
+    def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
+        """Passed only if the value is a number within the bound."""
+        return Verdict(
+            method=self.trajectory.label,
+            check=check,
+            value=value,
+            bound=bound,
+            unit=unit,
+            passed=bool(value <= bound),
+            why=why,
+        )
+
+    def not_applicable(self, check: str, why: str) -> Verdict:
+        """Reported as what it is, never as passed."""
+        return Verdict(
+            method=self.trajectory.label,
+            check=check,
+            value=float("nan"),
+            bound=float("nan"),
+            unit="",
+            passed=None,
+            why=why,
+        )
+
+
+def _pulls(scene: Scene) -> Integers:
+    """How many terms pull at each particle (n,)."""
+    count = np.zeros(scene.n, dtype=np.int64)
+    for term in scene.terms:
+        for name in ("i", "a", "b"):
+            np.add.at(count, getattr(term, name, np.empty(0, dtype=np.int64)), 1)
+    return count
+
+
+def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:
+    """So many steps of the scheme from states (f, n), in extended precision."""
+    scene = case.judged
+    force = mechanics.force(scene.terms)
+    slow, fast = mechanics.split(scene.terms)
+    parts = mechanics.force(slow), mechanics.force(fast)
+    m = scene.m.astype(np.longdouble)
+    a: Reals = q
+    b: Reals = p
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(steps):
+            a, b = schemes.step(
+                case.scheme, a, b, h=case.trajectory.step, m=m, force=force, parts=parts, **case.law
+            )
+    return np.asarray(a), np.asarray(b)

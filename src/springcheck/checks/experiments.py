@@ -1,0 +1,229 @@
+"""Checks of the one-step map that need runs of their own: what it is, what it keeps, how it turns back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck import mechanics, schemes
+from springcheck.checks.bench import LARGEST, Bench
+from springcheck.checks.case import Case
+from springcheck.checks.recorded import fastest
+from springcheck.model import Extended, Floats, Scene, Trajectory, Verdict
+
+
+def _no_matrix(bench: Bench) -> str | None:
+    """Why there is no one-step matrix to recover, or None."""
+    if not bench.scheme.one_step:
+        return "an adaptive solver has no one-step map; it is judged by its tolerance"
+    if not mechanics.is_linear(bench.scene):
+        return "an anharmonic scene's step is no matrix; the step defect judges it"
+    if bench.scene.n > LARGEST:
+        return f"of more than {LARGEST} particles the step defect says as much"
+    return None
+
+
+def propagator(bench: Bench) -> Verdict:
+    """The one-step matrix, recovered from single steps, is the scheme's."""
+    why_not = _no_matrix(bench)
+    if why_not:
+        return bench.not_applicable("propagator", why_not)
+    case, _ = bench.copies
+    q, p = case.next_states
+    of_q, of_p = case.allowance
+    off = np.maximum(np.abs(q - case.trajectory.q[1:]) / of_q, np.abs(p - case.trajectory.p[1:]) / of_p)
+    return bench.verdict(
+        "propagator",
+        float(np.max(off)),
+        float(case.roundings),
+        "roundings",
+        f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each",
+    )
+
+
+def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
+    """The scheme's matrix, the engine's departure from it, what rounding allows, and the scale (2n,).
+
+    On (q, p) in units in which a canonical pair has the action 1, (2n, 2n) each.
+    """
+    case, pushes = bench.copies
+    n = bench.scene.n
+    k = np.abs(np.diag(mechanics.stiffness(bench.scene, bench.scene.q))).astype(np.float64)
+    k = np.where(k > 0, k, bench.scene.m / bench.scene.step**2)
+    root = (bench.scene.m * k) ** 0.25
+    scale = np.concatenate([1 / root, root])
+
+    def columns(q: Extended, p: Extended, sign: int) -> Floats:
+        """Of each push, over the copy that was not pushed."""
+        states = np.concatenate([q.reshape(2 * n + 1, n), p.reshape(2 * n + 1, n)], axis=1)
+        return np.asarray(((states[1:] + sign * states[0]) / pushes[:, None]).T, np.float64)
+
+    def scaled(matrix: Floats) -> Floats:
+        return np.asarray(matrix * scale[None, :] / scale[:, None])
+
+    q, p = case.next_states
+    ideal = columns(q[0], p[0], -1)
+    departure = columns(case.trajectory.q[1] - q[0], case.trajectory.p[1] - p[0], -1)
+    allowed = np.abs(columns(*(case.roundings * x[0] for x in case.allowance), 1))
+    return scaled(ideal), scaled(departure), scaled(allowed), scale
+
+
+def determinant(bench: Bench) -> Verdict:
+    """The one-step matrix changes area by the scheme's factor, to rounding."""
+    why_not = _no_matrix(bench)
+    if why_not:
+        return bench.not_applicable("determinant", why_not)
+    ideal, departure, allowed, _ = _matrices(bench)
+    inverse = np.linalg.inv(ideal)
+    relative = inverse @ departure
+    # det(1 + X) - 1, whose leading part is exact as a trace where the determinant itself would round
+    change = float(np.trace(relative))
+    if not float(np.max(np.abs(relative))) < 1e-8:
+        change = float(np.linalg.det(np.eye(len(relative)) + relative)) - 1
+    return bench.verdict(
+        "determinant",
+        abs(change),
+        float(np.sum(np.abs(inverse).T * allowed)),
+        "relative",
+        f"roundings of every entry, each of the sign that hurts; the scheme's own is "
+        f"{float(np.linalg.det(ideal)):.6g}",
+    )
+
+
+def symplecticity(bench: Bench) -> Verdict:
+    """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
+    why_not = _no_matrix(bench)
+    if why_not:
+        return bench.not_applicable("symplecticity", why_not)
+    if not bench.scheme.symplectic:
+        return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
+    ideal, departure, allowed, _ = _matrices(bench)
+    n = bench.scene.n
+    form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
+    one = ideal.T @ form @ departure
+    off = np.abs(one - one.T + departure.T @ form @ departure)
+    half = np.abs(ideal).T @ np.abs(form) @ allowed
+    limit = half + half.T
+    ratio = off / np.where(limit > 0, limit, 1)
+    worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
+    return bench.verdict(
+        "symplecticity",
+        float(off[worst]),
+        float(limit[worst]),
+        "of an action",
+        "roundings of every entry, each of the sign that hurts",
+    )
+
+
+def symmetric(scheme: schemes.Scheme) -> bool:
+    """Whether a scheme is its own adjoint, so that it runs back the way it came."""
+    if scheme.stages:
+        return scheme.stages == tuple(reversed(scheme.stages))
+    s = len(scheme.b)
+    if scheme.b != tuple(reversed(scheme.b)):
+        return False
+    full = [row + (row[0] * 0,) * (s - len(row)) for row in scheme.a]
+    return all(full[s - 1 - i][s - 1 - j] + full[i][j] == scheme.b[j] for i in range(s) for j in range(s))
+
+
+def _shifted(
+    scene: Scene, scheme: schemes.Scheme, state: tuple[Floats, Floats], sign: int
+) -> tuple[Floats, Floats]:
+    """The first stage of a two-stage scheme, forwards or backwards: where it is synchronised with its adjoint."""
+    q, p = (x.astype(np.longdouble) for x in state)
+    h = np.longdouble(sign * scene.step)
+    if scheme.stages[0][0] == "kick":
+        p = p + h * mechanics.force(scene.terms)(q, p)
+    else:
+        q = q + h * (p / scene.m)
+    return np.asarray(q, np.float64), np.asarray(p, np.float64)
+
+
+def reversibility(bench: Bench) -> Verdict:
+    """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
+    scheme = bench.scheme
+    two_stage = len(scheme.stages) == 2
+    if not scheme.one_step:
+        return bench.not_applicable("reversibility", "an adaptive solver chooses other steps on its way back")
+    if not symmetric(scheme) and not two_stage:
+        return bench.not_applicable(
+            "reversibility", f"{scheme.title} is not its own adjoint: only another scheme undoes its steps"
+        )
+    out = bench.forwards
+    steps = len(out.t) - 1
+    case = Case(trajectory=out, scene=bench.scene)
+    if out.outcome.status != "complete" or not steps:
+        return bench.not_applicable("reversibility", "the run did not come to its end")
+    state = out.q[-1], -out.p[-1]
+    # kick-drift and drift-kick undo each other; they differ by the first stage, at start and end
+    if two_stage:
+        state = _shifted(case.judged, scheme, state, -1)
+    back = bench.run(replace(bench.scene, q=state[0], p=state[1], steps=steps, every=1), bench.label)
+    end = back.q[-1], back.p[-1]
+    if two_stage:
+        end = _shifted(case.judged, scheme, end, 1)
+    size = max(_rounding(bench.scene, out), _rounding(bench.scene, back))
+    enlarged = _enlarged(case, 2 * steps + 2)
+    if enlarged is None:
+        return bench.not_applicable("reversibility", "the motion grows, and rounding with it")
+    off = float(case.norm(end[0] - bench.scene.q, end[1] + bench.scene.p))
+    return bench.verdict(
+        "reversibility",
+        off / size,
+        case.roundings * enlarged,
+        "roundings",
+        f"{steps} steps out and {steps} back, each rounded, all of one sign",
+    )
+
+
+def _rounding(scene: Scene, run: Trajectory) -> float:
+    """The largest rounding along a run, in units of the scene's start."""
+    case = Case(trajectory=run, scene=scene)
+    return float(np.max(case.norm(*case.allowance)))
+
+
+def _enlarged(case: Case, steps: int) -> float | None:
+    """What the map makes of one rounding in each of so many steps; None where it grows without bound."""
+    if case.linear:
+        total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
+        return float(total[0]) if grown[0] < 2 else None
+    # a rounding shifts the energy, and with it the frequency of an anharmonic motion
+    return steps * (1 + steps * fastest(case) * abs(case.trajectory.step) / 2)
+
+
+def mirror(bench: Bench) -> Verdict:
+    """A negative step does what flipped momenta do, bit for bit."""
+    if not bench.scheme.one_step:
+        return bench.not_applicable("mirror", "an adaptive solver is judged by its tolerance")
+    steps = min(bench.scene.steps, 20)
+    flipped = bench.run(replace(bench.scene, p=-bench.scene.p, steps=steps, every=1), bench.label)
+    backwards = bench.run(replace(bench.scene, step=-bench.scene.step, steps=steps, every=1), bench.label)
+    if len(flipped.t) != len(backwards.t):
+        return bench.verdict("mirror", float("inf"), 0.0, "frames", "one of the two runs ended early")
+    differ = np.any((flipped.q != backwards.q) | (flipped.p != -backwards.p), axis=1)
+    return bench.verdict(
+        "mirror",
+        float(np.count_nonzero(differ)),
+        0.0,
+        "frames",
+        "rounding to nearest does not know the sign",
+    )
+
+
+def repeatability(bench: Bench) -> Verdict:
+    """A second run of the same scene gives the same numbers, bit for bit."""
+    first = bench.forwards
+    again = bench.run(replace(bench.scene, every=1, steps=min(bench.scene.steps, 200)), bench.label)
+    if first.q.shape != again.q.shape:
+        return bench.verdict("repeatability", float("inf"), 0.0, "frames", "the runs differ in length")
+    same = (first.q.view(np.int64) == again.q.view(np.int64)) & (
+        first.p.view(np.int64) == again.p.view(np.int64)
+    )
+    return bench.verdict(
+        "repeatability",
+        float(np.count_nonzero(~np.all(same, axis=1))),
+        0.0,
+        "frames",
+        "the same operations in the same order",
+    )

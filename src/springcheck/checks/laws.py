@@ -1,0 +1,294 @@
+"""Checks of laws that show only over many runs: order, rounding over long times, tolerance.
+
+Order is fitted on the spring and on an anharmonic well: on the spring alone it can lie.  A scheme's
+error is C h**r (1 + c h + ...), the second term c h**2 where the scheme is symmetric; both are fitted,
+so that what is left over tells how well the slope is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from springcheck import exact, mechanics, schemes
+from springcheck.checks.bench import Bench
+from springcheck.checks.case import Case
+from springcheck.checks.experiments import symmetric
+from springcheck.model import Extended, Floats, Scene, Trajectory, Verdict
+
+HALVINGS = 6
+T_THREE = 12.92
+"""Student's t of 3 degrees of freedom, two-sided 1e-3: six points less three parameters."""
+UNRESOLVED = 0.125
+"""Orders are whole numbers; a slope that is not known to an eighth does not name one."""
+COARSEST = 16
+"""Steps of the coarsest run over 2.5 radians: h w = 0.16, where the second term of the error is small."""
+
+MEMBERS = 256
+LONG = 4096
+SIGMAS = 5.0
+"""Of a normal variable: passed by chance once in 1.7 million."""
+
+HIGHEST = {"adams": 12, "bdf": 5}
+"""Highest order of each adaptive method: the one that a smooth motion at small tolerances comes to."""
+T_SEVEN = 5.41
+"""Student's t of 7 degrees of freedom, two-sided 1e-3: nine tolerances less two parameters."""
+DECADES = tuple(10.0**-d for d in range(4, 13))
+
+
+def _scene(
+    terms: tuple[mechanics.WallSpring | mechanics.Quartic, ...], q: Floats, p: Floats, m: Floats
+) -> Scene:
+    return Scene(
+        name="experiment",
+        title="",
+        source="",
+        m=m,
+        q=q,
+        p=p,
+        terms=terms,
+        step=1.0,
+        steps=1,
+        quantities=("q", "p"),
+    )
+
+
+def _one(x: float) -> Floats:
+    return np.array([x])
+
+
+# values far from 1, so that no mass, stiffness or coefficient can hide
+SPRING = _scene(
+    (mechanics.WallSpring(i=np.array([0]), k=_one(2.9), at=_one(0.0)),), _one(0.3), _one(0.7), _one(3.7)
+)
+WELL = _scene(
+    (mechanics.Quartic(i=np.array([0]), b=_one(2.3), at=_one(0.0)),), _one(0.9), _one(0.4), _one(1.3)
+)
+DURATION = 2.5 / np.sqrt(2.9 / 3.7)
+
+
+def order(bench: Bench) -> Verdict:
+    """On a spring the error falls with the scheme's power of the step."""
+    return _order(bench, "order", SPRING, "spring")
+
+
+def order_anharmonic(bench: Bench) -> Verdict:
+    """In a quartic well, where order cannot lie, the error falls with the scheme's power of the step."""
+    return _order(bench, "order-anharmonic", WELL, "quartic well")
+
+
+def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
+    scheme = bench.scheme
+    if not scheme.one_step:
+        return bench.not_applicable(check, "an adaptive solver chooses its order as it goes")
+    truth = _truth(where, DURATION)
+    norm = mechanics.norm(scene)
+    h, error, floor = [], [], []
+    for j in range(HALVINGS):
+        steps = COARSEST * 2**j
+        made = replace(scene, step=float(DURATION / steps), steps=steps, every=steps)
+        run = bench.run(made, bench.label)
+        if len(run.t) < 2:
+            return bench.verdict(check, float("inf"), UNRESOLVED, "orders", f"stopped at h = {made.step:g}")
+        case = Case(trajectory=run, scene=made)
+        h.append(made.step)
+        error.append(float(norm(run.q[-1] - truth[0], run.p[-1] - truth[1])))
+        floor.append(float(norm(*(x[0] for x in case.allowance))) * steps)
+    slope, se, rounding = fitted(h, error, floor, second=2 if symmetric(scheme) else 1)
+    return bench.verdict(
+        check,
+        abs(slope - scheme.order),
+        min(T_THREE * se + rounding, UNRESOLVED),
+        "orders",
+        f"slope {slope:.5f} +- {se:.1g} on the {where}, h from {h[0]:.3g} to {h[-1]:.3g}; "
+        f"{scheme.title} has order {scheme.order}",
+    )
+
+
+def fitted(
+    h: Sequence[float], error: Sequence[float], floor: Sequence[float], *, second: int
+) -> tuple[float, float, float]:
+    """Signed slope of log error on log h beside a term h**second: slope, standard error, and what errors
+    of the size of `floor` can do to it."""
+    x, y = np.array(h), np.log(np.maximum(np.array(error), 1e-300))
+    design = np.stack([np.ones_like(x), np.log(x), x**second], axis=1)
+    inverse = np.linalg.pinv(design)
+    best = inverse @ y
+    left = y - design @ best
+    variance = float(left @ left) / (len(x) - 3)
+    rounding = float(np.sum(np.abs(inverse[1]) * np.array(floor) / np.maximum(np.array(error), 1e-300)))
+    return float(best[1]), float(np.sqrt(variance) * np.linalg.norm(inverse[1])), rounding
+
+
+@cache
+def _truth(where: str, duration: float) -> tuple[Extended, Extended]:
+    if where == "spring":
+        q, p = exact.true_motion(replace(SPRING, step=duration), np.array([1]), duration)
+        return q[0], p[0]
+    return extrapolated(WELL, duration)
+
+
+def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extended, Extended]:
+    """The state of any scene without friction after a time, in extended precision: (n,) and (n,).
+
+    Velocity Verlet with 24, 48, 72 ... steps; its error has even powers of the step alone, and
+    Neville's scheme removes one with each level (Hairer, Lubich & Wanner, V.3; Gragg 1965).
+    """
+    force = mechanics.force(scene.terms)
+    rows: list[tuple[Extended, Extended]] = []
+    counts = [24 * (j + 1) for j in range(levels)]
+    for count in counts:
+        q, p = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
+        h = np.longdouble(duration) / count
+        for _ in range(count):
+            a, b = schemes.step(schemes.SCHEMES["velocity-verlet"], q, p, h=h, m=scene.m, force=force)
+            q, p = np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
+        rows.append((q, p))
+    for level in range(1, levels):
+        for j in range(levels - 1, level - 1, -1):
+            ratio = (np.longdouble(counts[j]) / counts[j - level]) ** 2 - 1
+            fine, coarse = rows[j], rows[j - 1]
+            rows[j] = (fine[0] + (fine[0] - coarse[0]) / ratio, fine[1] + (fine[1] - coarse[1]) / ratio)
+    return rows[-1]
+
+
+@cache
+def ensemble(h: float) -> Scene:
+    """256 springs of one kind with random starts: the random walks of their rounding are independent."""
+    rng = np.random.default_rng(20260101)
+    m, k = np.full(MEMBERS, 3.7), np.full(MEMBERS, 2.9)
+    amplitude, phase = rng.uniform(1, 2, MEMBERS), rng.uniform(0, 2 * np.pi, MEMBERS)
+    spring = mechanics.WallSpring(i=np.arange(MEMBERS), k=k, at=np.zeros(MEMBERS))
+    start = amplitude * np.cos(phase), amplitude * np.sin(phase) * np.sqrt(m * k)
+    return replace(_scene((spring,), start[0], start[1], m), step=h, steps=LONG, every=LONG // 64)
+
+
+ODD, EVEN = 0.013, 2.0**-7
+"""A step whose reciprocal rounds, h fl(1/h) = 1 - 8.9e-17, and one whose reciprocal is exact."""
+
+
+def drifts(scene: Scene, run: Trajectory) -> tuple[Floats, Floats]:
+    """Steps (f,) and relative change of each member's shadow energy at them (f, n)."""
+    case = Case(trajectory=run, scene=scene)
+    form = schemes.invariant(case.matrices, h=run.step)
+    y, v = case.modes.into(run.q, run.p)
+    energy = form[:, 0] * y * y + form[:, 1] * y * v + form[:, 2] * v * v
+    return case.steps[1:].astype(np.float64), np.asarray(energy[1:] / energy[0] - 1, np.float64)
+
+
+def predicted_drift(run: Trajectory) -> float:
+    """Relative change of the shadow energy each step that a method's arithmetic implies.
+
+    A velocity rebuilt as (x' - x) fl(1/h) is multiplied by h fl(1/h) at every step: a friction, or its
+    opposite, of one rounding.  Half of the energy is kinetic on average, and it goes with the square.
+    """
+    if not run.rebuilds_velocity:
+        return 0.0
+    h = np.longdouble(run.step)
+    return float(h * np.longdouble(1.0 / run.step) - 1)
+
+
+def _walk(bench: Bench, check: str) -> str | None:
+    scheme = bench.scheme
+    if not scheme.one_step or not scheme.symplectic or not scheme.stages:
+        return "only a splitting keeps a shadow energy that its own arithmetic does not solve for"
+    if bench.forwards.arithmetic.quantum or bench.forwards.arithmetic.state > 2.0**-53:
+        return "the rounding of its forces hides that of its steps"
+    return None
+
+
+def rounding_bias(bench: Bench) -> Verdict:
+    """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
+    why_not = _walk(bench, "rounding-bias")
+    if why_not:
+        return bench.not_applicable("rounding-bias", why_not)
+    found = [_drift(bench, h) for h in (ODD, EVEN)]
+    off, se = max(
+        ((abs(mean - implied), se) for mean, se, implied in found), key=lambda x: x[0] / (x[1] or 1)
+    )
+    seen = "; ".join(
+        f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} a step, implied is {implied:.1e}"
+        for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)
+    )
+    return bench.verdict(
+        "rounding-bias",
+        off,
+        SIGMAS * se + exact.EPS,
+        "a step",
+        f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}",
+    )
+
+
+def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
+    """Mean relative drift of the shadow energy a step, its standard error, and what is implied."""
+    run = bench.once(ensemble(h))
+    steps, change = drifts(ensemble(h), run)
+    each = change[-1] / steps[-1]
+    se = float(np.std(each, ddof=1) / np.sqrt(MEMBERS))
+    return float(np.mean(each)), se, predicted_drift(run)
+
+
+def rounding_growth(bench: Bench) -> Verdict:
+    """The shadow energy's rounding grows no faster than a random walk, with the square root of the steps."""
+    why_not = _walk(bench, "rounding-growth")
+    if why_not:
+        return bench.not_applicable("rounding-growth", why_not)
+    scene = ensemble(ODD)
+    run = bench.once(scene)
+    steps, change = drifts(scene, run)
+    change = change - predicted_drift(run) * steps[:, None]
+    late = np.array([j for j in (1, 2, 4, 8, 16, 32, 64) if j <= len(steps)]) - 1
+
+    def exponent(members: Floats) -> float:
+        size = np.sqrt(np.mean(members[late] ** 2, axis=1))
+        if not np.all(size > 0):
+            return 0.0
+        return float(np.polyfit(np.log(steps[late]), np.log(size), 1)[0])
+
+    blocks = np.array_split(np.arange(MEMBERS), 16)
+    left = np.array([exponent(np.delete(change, block, axis=1)) for block in blocks])
+    se = float(np.sqrt((len(left) - 1) * np.mean((left - np.mean(left)) ** 2)))
+    slope = exponent(change)
+    return bench.verdict(
+        "rounding-growth",
+        slope,
+        0.5 + SIGMAS * se,
+        "exponent",
+        f"a walk has 1/2, a bias 1; {slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, "
+        f"{LONG} steps of {ODD:g}",
+    )
+
+
+def convergence(bench: Bench) -> Verdict:
+    """The error of an adaptive solver falls with its tolerance, decade by decade."""
+    if bench.scheme.one_step:
+        return bench.not_applicable("convergence", "a method of fixed step has no tolerance")
+    duration = 20.0
+    error = []
+    for tolerance in DECADES:
+        scene = replace(SPRING, tolerance=tolerance, step=duration / 40, steps=40, quantities=("q", "p"))
+        run = bench.run(scene, bench.label)
+        if len(run.t) < scene.frames:
+            return bench.verdict("convergence", float("inf"), UNRESOLVED, "", f"stopped at {tolerance:g}")
+        case = Case(trajectory=run, scene=scene)
+        q, p = exact.true_motion(scene, case.steps, scene.step)
+        error.append(float(np.sqrt(np.mean(case.norm(run.q - q, run.p - p) ** 2))))
+    x, y = np.log(np.array(DECADES)), np.log(np.maximum(np.array(error), 1e-300))
+    design = np.stack([np.ones_like(x), x], axis=1)
+    inverse = np.linalg.pinv(design)
+    slope = float((inverse @ y)[1])
+    left = y - design @ (inverse @ y)
+    se = float(np.sqrt(left @ left / (len(x) - 2)) * np.linalg.norm(inverse[1]))
+    highest = HIGHEST[bench.scheme.name]
+    law = highest / (highest + 1)
+    return bench.verdict(
+        "convergence",
+        abs(slope - law),
+        T_SEVEN * se,
+        "exponent",
+        f"exponent {slope:.3f} +- {se:.2g} over {len(x)} decades of tolerance; a step h of order {highest} "
+        f"leaves h**{highest + 1} = tolerance, and there are 1/h of them: {law:.3f}",
+    )

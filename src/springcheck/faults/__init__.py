@@ -1,0 +1,1 @@
+"""Engines broken on purpose: the package's own negative controls."""

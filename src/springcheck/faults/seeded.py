@@ -1,0 +1,377 @@
+"""The ways in which an engine is broken: small pure functions over a plain engine.
+
+A fault's `make(scene, scheme, size)` moves the scene wrongly and records it as if all were well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from springcheck import exact, mechanics, schemes
+from springcheck.faults.steppers import State, Step, energies, record, textbook, trajectory
+from springcheck.model import Arithmetic, Floats, Reals, Scene, Trajectory
+
+Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
+Where: TypeAlias = Literal["spring", "chain", "long spring"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """An engine broken on purpose."""
+
+    name: str
+    about: str
+    make: Make
+    caught_by: tuple[str, ...]
+    scheme: str = "velocity-verlet"
+    """The scheme that the engine claims."""
+    size: float | None = None
+    """Size in the table; None where the fault has no size."""
+    scene: Where = "spring"
+
+    def run(self, scene: Scene, label: str = "", *, size: float | None = None) -> Trajectory:
+        """The broken engine's trajectory of a scene."""
+        chosen = size if size is not None else self.size
+        made = self.make(scene, schemes.SCHEMES[self.scheme], 0.0 if chosen is None else chosen)
+        return replace(made, label=label or self.name)
+
+
+def moving(change: Callable[[Scene, float], Scene]) -> Make:
+    """The engine moves another scene than it was given."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+        other = change(scene, size)
+        return record(scene, scheme, textbook(other, scheme), start=(other.q, other.p))
+
+    return make
+
+
+def stepping(change: Callable[[Scene, schemes.Scheme, float], Step]) -> Make:
+    """The engine takes another step than its scheme's."""
+    return lambda scene, scheme, size: record(scene, scheme, change(scene, scheme, size))
+
+
+def following(change: Callable[[Scene, float, int, State], State]) -> Make:
+    """Something is done to the state after every right step: change(scene, size, step, (q, p))."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        right = textbook(scene, scheme)
+        return lambda i, q, p: change(scene, size, i, right(i, q, p))
+
+    return stepping(broken)
+
+
+def pulling(change: Callable[[Scene, float, Reals, Reals], Reals]) -> Make:
+    """Another force: change(scene, size, q, right force)."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        right = mechanics.force(scene.terms)
+        return textbook(scene, scheme, force=lambda q, p: change(scene, size, q, right(q, p)))
+
+    return stepping(broken)
+
+
+def reporting(change: Callable[[Scene, float, Trajectory], Trajectory], *, again: bool = True) -> Make:
+    """The motion is right, its record is not; energies are computed `again` from the wrong record."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+        wrong = change(scene, size, record(scene, scheme, textbook(scene, scheme)))
+        return replace(wrong, energy=energies(scene, wrong.q, wrong.p)) if again else wrong
+
+    return make
+
+
+def reported_start(change: Callable[[Scene, float], Scene]) -> Make:
+    """The engine starts elsewhere, and reports the start that it was given."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+        other = change(scene, size)
+        run = record(scene, scheme, textbook(other, scheme), start=(other.q, other.p))
+        q, p = run.q.copy(), run.p.copy()
+        q[0], p[0] = scene.q, scene.p
+        return trajectory(scene, scheme, q, p)
+
+    return make
+
+
+def reach(scene: Scene) -> float:
+    """The largest force that the energy of the start allows [M L/T2]."""
+    energy = float(mechanics.energy(scene, scene.q, scene.p))
+    stiff = float(np.max(np.abs(np.diag(mechanics.stiffness(scene, scene.q)))))
+    return float(np.sqrt(2 * energy * stiff)) or 1.0
+
+
+def _springs(scene: Scene, change: Callable[[Any], Any]) -> Scene:
+    return replace(scene, terms=tuple(change(term) for term in scene.terms))
+
+
+def stiffer(scene: Scene, factor: float) -> Scene:
+    """Every stiffness or coefficient times a factor."""
+
+    def term(t: Any) -> Any:
+        return replace(t, b=t.b * factor) if isinstance(t, mechanics.Quartic) else replace(t, k=t.k * factor)
+
+    return _springs(scene, term)
+
+
+def shifted(scene: Scene, size: float) -> Scene:
+    """Rest points moved by a fraction of the amplitude."""
+    reach = float(np.max(np.abs(scene.q)) + np.max(np.abs(scene.p)))
+
+    def term(t: Any) -> Any:
+        return (
+            replace(t, at=t.at + size * reach) if hasattr(t, "at") else replace(t, rest=t.rest + size * reach)
+        )
+
+    return _springs(scene, term)
+
+
+def mass_of_drift(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """dq/dt = p: a velocity taken for a momentum."""
+    force = mechanics.force(scene.terms)
+    h = scene.step
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        p = p + h / 2 * force(q, p)
+        q = q + h * p
+        return q, np.asarray(p + h / 2 * force(q, p), np.float64)
+
+    return step
+
+
+def verlet(
+    scene: Scene, *, first: float = 0.5, drift: float = 1.0, second: float = 0.5
+) -> Callable[[int, Floats, Floats], State]:
+    """Velocity Verlet with other coefficients."""
+    force = mechanics.force(scene.terms)
+    h, m = scene.step, scene.m
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        p = p + first * h * force(q, p)
+        q = q + drift * h * (p / m)
+        return q, np.asarray(p + second * h * force(q, p), np.float64)
+
+    return step
+
+
+def swapped_halves(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """h/2 where h*h/2 belongs, in the position form of velocity Verlet."""
+    force = mechanics.force(scene.terms)
+    h, m = scene.step, scene.m
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        f = force(q, p)
+        q = np.asarray(q + h * (p / m) + h / 2 * (f / m), np.float64)
+        return q, np.asarray(p + h / 2 * (f + force(q, p)), np.float64)
+
+    return step
+
+
+def old_second_kick(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """The second half kick with the force of the old position."""
+    force = mechanics.force(scene.terms)
+    h, m = scene.step, scene.m
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        f = force(q, p)
+        p = p + h / 2 * f
+        q = q + h * (p / m)
+        return q, np.asarray(p + h / 2 * f, np.float64)
+
+    return step
+
+
+def stale_force(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Forces come from a buffer one step old."""
+    force = mechanics.force(scene.terms)
+    buffer = [force(scene.q, scene.p)]
+
+    def stale(q: Reals, p: Reals) -> Reals:
+        old = buffer[0]
+        buffer[0] = force(q, p)
+        return old
+
+    return textbook(scene, scheme, force=stale)
+
+
+def other_scheme(name: str) -> Make:
+    """The engine runs another scheme than it claims."""
+    return stepping(lambda scene, scheme, size: textbook(scene, schemes.SCHEMES[name]))
+
+
+def coefficient(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """The second coefficient of a splitting is wrong in a digit."""
+    (a, x), (b, y), *rest = scheme.stages
+    wrong = str(np.longdouble(schemes.number(y, np.longdouble)) * (1 + np.longdouble(size)))
+    return textbook(scene, replace(scheme, stages=((a, x), (b, wrong), *rest)))
+
+
+def skipped(every: int) -> Make:
+    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        right = textbook(scene, scheme)
+        return lambda i, q, p: (q, p) if i % every == every - 1 else right(i, q, p)
+
+    return stepping(broken)
+
+
+def doubled(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    right = textbook(scene, scheme)
+    return lambda i, q, p: right(i, *right(i, q, p)) if i % 1000 == 999 else right(i, q, p)
+
+
+def unsigned(scene: Scene, size: float) -> Scene:
+    return replace(scene, step=abs(scene.step))
+
+
+def single_state(scene: Scene, size: float, i: int, state: State) -> State:
+    return tuple(x.astype(np.float32).astype(np.float64) for x in state)  # type: ignore[return-value]
+
+
+def significant(x: Floats, size: float) -> Floats:
+    """Rounded to a relative spacing, like text of so many digits."""
+    with np.errstate(divide="ignore"):
+        unit = np.where(x == 0, 1, 10 ** np.floor(np.log10(np.abs(np.where(x == 0, 1, x))))) * size
+    return np.asarray(np.round(x / unit) * unit)
+
+
+def towards_zero(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Every result is cut off instead of rounded: no step is off by more than one rounding."""
+    force = mechanics.force(scene.terms)
+    m = scene.m.astype(np.longdouble)
+
+    def cut(x: Reals) -> Floats:
+        near = np.asarray(x, np.float64)
+        return np.where(np.abs(near) > np.abs(x), np.nextafter(near, 0), near)
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        a, b = schemes.step(
+            scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=scene.step, m=m, force=force
+        )
+        return cut(a), cut(b)
+
+    return step
+
+
+def half_step(scene: Scene, sign: int, run: Trajectory) -> Trajectory:
+    force = mechanics.force(scene.terms)(run.q, run.p)
+    p = np.asarray(run.p + sign * scene.step / 2 * force, np.float64)
+    p[0] = scene.p
+    return replace(run, p=p)
+
+
+def delayed(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """Momenta are one frame behind the positions."""
+    return replace(run, p=np.concatenate([run.p[:1], run.p[:-1]]))
+
+
+def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    order = np.arange(len(run.t))
+    middle = len(order) // 2
+    if middle + 1 < len(order):
+        order[[middle, middle + 1]] = order[[middle + 1, middle]]
+    return replace(run, q=run.q[order], p=run.p[order])
+
+
+def accumulated(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    t = np.concatenate([[0.0], np.cumsum(np.full(len(run.t) - 1, run.step * run.every))])
+    return replace(run, t=t)
+
+
+def half_step_energy(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    return replace(run, energy=_early_energy(scene, run))
+
+
+def _early_energy(scene: Scene, run: Trajectory) -> Floats:
+    force = mechanics.force(scene.terms)(run.q, run.p)
+    return energies(scene, run.q, np.asarray(run.p - scene.step / 2 * force, np.float64))
+
+
+def late_start(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+    """The first frame is the state after the first step."""
+    step = textbook(scene, scheme)
+    return record(scene, scheme, step, start=step(0, scene.q, scene.p))
+
+
+def unpaired(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Action is not reaction: what springs do to their second particle is too large."""
+    right = mechanics.force(scene.terms)
+
+    def force(q: Reals, p: Reals) -> Reals:
+        out = right(q, p)
+        for term in scene.terms:
+            if isinstance(term, mechanics.Spring):
+                tension = term.k * (q[..., term.b] - q[..., term.a] - term.rest)
+                np.subtract.at(out, term.b, size * tension)
+            elif isinstance(term, mechanics.WallSpring):
+                np.subtract.at(out, term.i, size * term.k * (q[..., term.i] - term.at))
+        return out
+
+    return textbook(scene, scheme, force=force)
+
+
+def rescaled(scene: Scene, size: float, i: int, state: State) -> State:
+    """A thermostat left on: momenta scaled so that the energy stays what it was."""
+    q, p = state
+    start = mechanics.energy(scene, scene.q, scene.p)
+    kinetic = mechanics.kinetic_energy(scene, p)
+    wanted = start - (mechanics.energy(scene, q, p) - kinetic)
+    return (q, p * float(np.sqrt(wanted / kinetic))) if kinetic > 0 and wanted > 0 else (q, p)
+
+
+def random(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Noise from the clock: no two runs are equal."""
+    right = textbook(scene, scheme)
+    rng = np.random.default_rng()
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        q, p = right(i, q, p)
+        return q, p * (1 + size * rng.standard_normal(len(p)))
+
+    return step
+
+
+def restarted(scene: Scene, size: float, i: int, state: State) -> State:
+    """One restart from a text file in the middle of the run."""
+    if i != scene.steps // 2:
+        return state
+    return significant(state[0], size), significant(state[1], size)
+
+
+def one_iteration(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Implicit Euler by one fixed-point iteration instead of a solution."""
+    force = mechanics.force(scene.terms)
+    h, m = scene.step, scene.m
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        new = q + h * (p / m)
+        p = np.asarray(p + h * force(new, p), np.float64)
+        return q + h * (p / m), p
+
+    return step
+
+
+def claims_single(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+    named = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
+    return record(scene, scheme, textbook(scene, scheme), arithmetic=named)
+
+
+def adaptive(error: Callable[[float, float], float]) -> Make:
+    """The true motion, too slow by `error(tolerance, size)` of its time."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+        steps = np.arange(scene.frames) * scene.every
+        q, p = exact.true_motion(scene, steps, scene.step * (1 - error(scene.tolerance, size)))
+        return trajectory(
+            scene,
+            scheme,
+            np.asarray(q, np.float64),
+            np.asarray(p, np.float64),
+            tolerance=scene.tolerance,
+            calls=2 * scene.steps,
+        )
+
+    return make

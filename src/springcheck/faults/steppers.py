@@ -1,0 +1,104 @@
+"""A plain double-precision engine for every scheme, and the places where it can be broken.
+
+It is the clean engine of the negative controls: the textbook step in NumPy doubles, and a recorder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from springcheck import mechanics, schemes
+from springcheck.model import Arithmetic, Floats, Force, Outcome, Scene, Timing, Trajectory
+
+State: TypeAlias = tuple[Floats, Floats]
+Step: TypeAlias = Callable[[int, Floats, Floats], State]
+"""(number of the step from 0, q, p) -> the next (q, p)."""
+
+
+def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None) -> Step:
+    """The scheme's own step in double precision, with the scene's force or another."""
+    pull = force or mechanics.force(scene.terms)
+    m, h = scene.m, scene.step
+    if scheme.stages:
+        stages = [(kind == "kick", float(schemes.number(c, np.float64)) * h) for kind, c in scheme.stages]
+
+        def split(i: int, q: Floats, p: Floats) -> State:
+            for kick, ch in stages:
+                if kick:
+                    p = np.asarray(p + ch * pull(q, p), np.float64)
+                else:
+                    q = q + ch * (p / m)
+            return q, p
+
+        return split
+    stiff = mechanics.stiffness(scene, scene.q).astype(np.float64) if scheme.implicit else None
+
+    def tableau(i: int, q: Floats, p: Floats) -> State:
+        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff)
+        return np.asarray(a, np.float64), np.asarray(b, np.float64)
+
+    return tableau
+
+
+def record(
+    scene: Scene,
+    scheme: schemes.Scheme,
+    step: Step,
+    *,
+    start: State | None = None,
+    arithmetic: Arithmetic | None = None,
+    label: str = "plain",
+) -> Trajectory:
+    """Carry the start through `scene.steps` steps and keep every `scene.every`-th state."""
+    q = np.empty((scene.frames, scene.n))
+    p = np.empty_like(q)
+    a, b = start or (scene.q, scene.p)
+    q[0], p[0] = a, b
+    with np.errstate(all="ignore"):
+        for row in range(1, scene.frames):
+            for i in range((row - 1) * scene.every, row * scene.every):
+                a, b = step(i, a, b)
+            q[row], p[row] = a, b
+    return trajectory(scene, scheme, q, p, arithmetic=arithmetic, label=label)
+
+
+def trajectory(
+    scene: Scene,
+    scheme: schemes.Scheme,
+    q: Floats,
+    p: Floats,
+    *,
+    arithmetic: Arithmetic | None = None,
+    label: str = "plain",
+    tolerance: float | None = None,
+    calls: int | None = None,
+) -> Trajectory:
+    """Recorded states with the times and energies that belong to them, up to the last finite one."""
+    finite = np.isfinite(q).all(axis=1) & np.isfinite(p).all(axis=1)
+    f = len(q) if finite.all() else int(np.argmin(finite))
+    q, p = q[:f], p[:f]
+    return Trajectory(
+        label=label,
+        scheme=scheme.name,
+        t=np.arange(f) * scene.every * scene.step,
+        q=q,
+        p=p,
+        energy=energies(scene, q, p) if "energy" in scene.quantities else None,
+        step=scene.step,
+        every=scene.every,
+        outcome=Outcome(status="complete" if f == scene.frames else "diverged", step=(f - 1) * scene.every),
+        timing=Timing(start=0.0, run=0.0),
+        force_calls=scene.steps if calls is None else calls,
+        tolerance=tolerance,
+        arithmetic=arithmetic or Arithmetic(),
+        off_axis=0.0,
+    )
+
+
+def energies(scene: Scene, q: Floats, p: Floats) -> Floats:
+    """Total energy of each frame (f,)."""
+    with np.errstate(all="ignore"):
+        return np.asarray(mechanics.energy(scene, q, p), np.float64)
