@@ -76,7 +76,7 @@ class WallSpring:
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.k * (gather(q, self.i) - self.at))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         scatter(out, self.i, np.abs(self.k) * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
     def curvature(self, q: Reals) -> Reals:
@@ -110,7 +110,7 @@ class Spring:
         scatter(out, self.a, tension)
         scatter(out, self.b, -tension)
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         size = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
         scatter(out, self.a, np.abs(self.k) * size)
         scatter(out, self.b, np.abs(self.k) * size)
@@ -142,10 +142,11 @@ class Quartic:
         u = gather(q, self.i) - self.at
         scatter(out, self.i, -self.b * (u * u * u))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         # a relative error of u counts threefold in u**3
-        u = np.abs(gather(q, self.i) - self.at)
-        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(gather(q, self.i)) + np.abs(self.at)))
+        size = np.abs(gather(q, self.i)) + np.abs(self.at)
+        u = size if near is None else np.abs(gather(near, self.i) - self.at)
+        scatter(out, self.i, 3 * np.abs(self.b) * u * u * size)
 
     def curvature(self, q: Reals) -> Reals:
         u = gather(q, self.i) - self.at
@@ -184,7 +185,7 @@ class Cosine:
         angle = (gather(q, self.i) - self.at) / self.length
         scatter(out, self.i, -(self.depth / self.length) * np.sin(angle))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         # the sine's own rounding, and that of its argument, which turns round and round
         size = 1 + (np.abs(gather(q, self.i)) + np.abs(self.at)) / self.length
         scatter(out, self.i, np.abs(self.depth) / self.length * size)
@@ -233,11 +234,11 @@ class Morse:
         scatter(out, self.a, tension)
         scatter(out, self.b, -tension)
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        # an error of u counts in both factors, x (1 - x) of x = exp(-steepness u)
-        x = 1 - self._gap(q)
-        u = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
-        size = 2 * self.depth * self.steepness * x * (1 + x) * (1 + 2 * np.abs(self.steepness) * u)
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
+        # roundings of 1 - x, of x = exp(-steepness u) itself, and of u, which both factors feel
+        size = gather(q, self.b) + gather(q, self.a) + np.abs(self.rest)
+        x = np.exp(self.steepness * size) if near is None else 1 - self._gap(near)
+        size = 2 * self.depth * self.steepness * x * (1 + x + np.abs(1 - 2 * x) * self.steepness * size)
         scatter(out, self.a, np.abs(size))
         scatter(out, self.b, np.abs(size))
 
@@ -267,7 +268,7 @@ class Damping:
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.c * (p[..., self.i] / self.m))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         scatter(out, self.i, np.abs(self.c) * (np.abs(p[..., self.i]) / self.m))
 
     def curvature(self, q: Reals) -> Reals:
@@ -389,7 +390,7 @@ def stiffened(scene: Scene, factor: float) -> Scene:
     """The scene with every force of its potential multiplied by a factor."""
 
     def scaled(term: Any) -> Any:
-        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b")}
+        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b", "depth")}
         # the b of a spring is the index of an end
         return replace(term, **{name: x * factor for name, x in found.items() if x.dtype == np.float64})
 
@@ -409,17 +410,19 @@ def force(terms: Iterable[Term]) -> Force:
     return total
 
 
-def magnitude(terms: Iterable[Term]) -> Force:
+def magnitude(terms: Iterable[Term], near: Reals | None = None) -> Force:
     """Like `force`, with every product and difference taken as a sum of absolute values.
 
-    Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.
+    Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  It takes sizes
+    of positions and momenta.  Laws that bend are evaluated at the states `near` (..., n), a step away at
+    most, or where these are not given at the worst place within the sizes.
     """
     parts = tuple(terms)
 
     def total(q: Reals, p: Reals) -> Reals:
         out = np.zeros_like(q)
         for term in parts:
-            term.add_magnitude(q, p, out)
+            term.add_magnitude(q, p, out, near)
         return out
 
     return total
@@ -446,6 +449,17 @@ def own_stiffness(scene: Scene, q: Reals) -> Extended:
     for term in scene.terms:
         for end in particles(term):
             np.add.at(out, end, term.curvature(wide))
+    return out
+
+
+def steepest(scene: Scene, q: Reals) -> Floats:
+    """Bound on the sum of |stiffness| of each particle's row at any of the states q (..., n) -> (n,) [M/T2]."""
+    out = np.zeros(scene.n)
+    for term in scene.terms:
+        k = np.abs(term.curvature(q)).reshape(-1, len(term.rigidity))
+        k = np.maximum(np.max(k, axis=0, initial=0.0), term.rigidity)
+        for end in particles(term):
+            np.add.at(out, end, k * term.bodies)
     return out
 
 

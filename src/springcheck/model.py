@@ -58,12 +58,12 @@ class Term(Protocol):
         """Add the force at (q, p), each (..., n), to out (..., n) [M L/T2]."""
         ...
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        """Add the sum of the absolute values of everything that add_force adds or subtracts."""
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
+        """Add what bounds the rounding of add_force at states of sizes q, p (see `mechanics.magnitude`)."""
         ...
 
     def curvature(self, q: Reals) -> Reals:
-        """Second derivative of each energy by the elongation of its spring, at q (n,) -> (s,) [M/T2]."""
+        """Second derivative of each energy by the elongation of its spring, at q (..., n) -> (..., s), or (s,) [M/T2]."""
         ...
 
     @property

@@ -93,11 +93,12 @@ class Case:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each."""
         run, scene = self.trajectory, self.judged
         rounding = run.arithmetic
-        q, p = np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble)
+        near = q.astype(np.longdouble)
+        q, p = np.abs(near), np.abs(p).astype(np.longdouble)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-        sizes = mechanics.magnitude(scene.terms)
+        sizes = mechanics.magnitude(scene.terms, near)
         slow, fast = mechanics.split(scene.terms)
-        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
+        parts = mechanics.magnitude(slow, near), mechanics.magnitude(fast, near)
         size_q, size_p = schemes.magnitude_step(
             self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
         )

@@ -88,11 +88,9 @@ def _amplified(case: Case, steps: int) -> float:
 
 
 def fastest(case: Case) -> float:
-    """Upper bound of the frequencies and rates met along the way [1/T]: stiffness at the widest points."""
-    q = case.trajectory.q
-    stiff = np.abs([mechanics.stiffness(case.judged, x) for x in (np.max(q, axis=0), np.min(q, axis=0))])
-    stiff = np.max(stiff, axis=0) / case.judged.m[:, None]
-    return float(np.sqrt(np.max(np.sum(stiff, axis=1)))) + float(np.max(mechanics.rates(case.judged)))
+    """Upper bound of the frequencies and rates met along the way [1/T], by Gershgorin's circles."""
+    stiff = mechanics.steepest(case.judged, case.trajectory.q) / case.judged.m
+    return float(np.sqrt(np.max(stiff))) + float(np.max(mechanics.rates(case.judged)))
 
 
 def _closed(case: Case) -> str | None:

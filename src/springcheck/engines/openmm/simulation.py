@@ -246,7 +246,7 @@ def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
     if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
         raise MethodError(
             f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
-            "its second end must start to the right of the first, at a rest length that the energy cannot close"
+            "its second end must start to the right of the first, and its energy must not close the rest length"
         )
 
 
