@@ -48,12 +48,16 @@ def scatter(out: Reals, index: Integers, values: Reals) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A parameter of a term: its name in a scene file, the field that takes it, and what it may be."""
+    """A parameter of a term: its name in a scene file, the field that takes it, and what it may be.
+
+    The field takes the number as it stands, or its inverse.
+    """
 
     name: str
     field: str
     default: float | None = None
     positive: bool = False
+    inverse: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -159,44 +163,44 @@ class Quartic:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cosine:
-    """Pendulums: V = depth (1 - cos((q - at)/length)).  depth, m g l, [M L2/T2]; length and at [L].
+    """Pendulums: V = depth (1 - cos(wave (q - at))).  depth [M L2/T2], wave [1/L], at [L].
 
-    An angle and its angular momentum take length 1.
+    For a pendulum depth is m g l and wave 1/l; for an angle and its angular momentum wave is 1.
     """
 
     key: ClassVar[str] = "cosine"
     bodies: ClassVar[int] = 1
     columns: ClassVar[tuple[Column, ...]] = (
         Column("depth", "depth"),
-        Column("length", "length", 1.0, positive=True),
+        Column("length", "wave", 1.0, positive=True, inverse=True),
         Column("at", "at", 0.0),
     )
     i: Integers
     depth: Floats
-    length: Floats
+    wave: Floats
     at: Floats
 
     def energy(self, q: Reals) -> Reals:
         # 1 - cos without its cancellation at small angles
-        half = np.sin((gather(q, self.i) - self.at) / (2 * self.length))
+        half = np.sin(self.wave * (gather(q, self.i) - self.at) / 2)
         return np.asarray(2 * np.sum(self.depth * half * half, axis=-1))
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        angle = (gather(q, self.i) - self.at) / self.length
-        scatter(out, self.i, -(self.depth / self.length) * np.sin(angle))
+        angle = self.wave * (gather(q, self.i) - self.at)
+        scatter(out, self.i, -(self.depth * self.wave) * np.sin(angle))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         # the sine's own rounding, and that of its argument, which turns round and round
-        size = 1 + (np.abs(gather(q, self.i)) + np.abs(self.at)) / self.length
-        scatter(out, self.i, np.abs(self.depth) / self.length * size)
+        size = 1 + np.abs(self.wave) * (np.abs(gather(q, self.i)) + np.abs(self.at))
+        scatter(out, self.i, np.abs(self.depth * self.wave) * size)
 
     def curvature(self, q: Reals) -> Reals:
-        angle = (gather(q, self.i) - self.at) / self.length
-        return np.asarray(self.depth / self.length**2 * np.cos(angle))
+        angle = self.wave * (gather(q, self.i) - self.at)
+        return np.asarray(self.depth * self.wave**2 * np.cos(angle))
 
     @property
     def rigidity(self) -> Floats:
-        return np.asarray(np.abs(self.depth) / self.length**2)
+        return np.asarray(np.abs(self.depth) * self.wave**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -369,18 +373,12 @@ def is_separate(scene: Scene) -> bool:
 
 
 def in_single(scene: Scene) -> Scene:
-    """The scene with stiffnesses and rest lengths rounded to single precision; rest points stay."""
+    """The scene with the parameters of its potential in single precision; walls stay in their place."""
 
     def rounded(term: Any) -> Any:
-        kept = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b", "rest")}
-        return replace(
-            term,
-            **{
-                name: value.astype(np.float32).astype(np.float64)
-                for name, value in kept.items()
-                if value.dtype == np.float64
-            },
-        )
+        names = {column.field for column in term.columns} or {"k", "rest"}
+        kept = {f.name: getattr(term, f.name) for f in fields(term) if f.name in names}
+        return replace(term, **{name: x.astype(np.float32).astype(np.float64) for name, x in kept.items()})
 
     with np.errstate(over="ignore", under="ignore"):
         return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
@@ -453,7 +451,7 @@ def own_stiffness(scene: Scene, q: Reals) -> Extended:
 
 
 def steepest(scene: Scene, q: Reals) -> Floats:
-    """Bound on the sum of |stiffness| of each particle's row at any of the states q (..., n) -> (n,) [M/T2]."""
+    """Bound on the sum of |stiffness| in each particle's row, at all states q (..., n) -> (n,) [M/T2]."""
     out = np.zeros(scene.n)
     for term in scene.terms:
         k = np.abs(term.curvature(q)).reshape(-1, len(term.rigidity))
@@ -578,3 +576,19 @@ def norm(scene: Scene) -> Norm:
     for term in scene.terms:
         unit = unit + np.abs(term.energy(q))
     return Norm(scene=scene, groups=groups, duration=duration, unit=np.longdouble(np.sqrt(unit)))
+
+
+def amplitudes(scene: Scene) -> tuple[Floats, Floats]:
+    """How far each position and momentum could go (n,) if it had all of the energy of the start to itself.
+
+    A particle that nothing holds is as far as it could get within the run.
+    """
+    unit = float(norm(scene).unit)
+    k = np.zeros(scene.n)
+    for term in scene.terms:
+        for end in particles(term):
+            np.add.at(k, end, np.maximum(np.abs(term.curvature(scene.q)), term.rigidity))
+    p = np.sqrt(2 * scene.m) * unit
+    held = k > 0
+    duration = abs(scene.step) * scene.steps
+    return np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / scene.m * duration), p

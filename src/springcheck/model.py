@@ -63,7 +63,10 @@ class Term(Protocol):
         ...
 
     def curvature(self, q: Reals) -> Reals:
-        """Second derivative of each energy by the elongation of its spring, at q (..., n) -> (..., s), or (s,) [M/T2]."""
+        """Second derivative of each energy by its spring's elongation, at q (..., n) -> (..., s) [M/T2].
+
+        A constant may come back as (s,).
+        """
         ...
 
     @property

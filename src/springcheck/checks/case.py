@@ -186,8 +186,8 @@ def _pulls(scene: Scene) -> Integers:
     """How many terms pull at each particle (n,)."""
     count = np.zeros(scene.n, dtype=np.int64)
     for term in scene.terms:
-        for name in ("i", "a", "b"):
-            np.add.at(count, getattr(term, name, np.empty(0, dtype=np.int64)), 1)
+        for end in mechanics.particles(term):
+            np.add.at(count, end, 1)
     return count
 
 

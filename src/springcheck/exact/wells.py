@@ -149,12 +149,12 @@ def _swings(scene: Scene) -> bool:
 def _pendulum(scene: Scene, t: Extended) -> States:
     """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
 
-    R**2 = E / 2 depth, w**2 = depth / (mass length**2); Landau & Lifshitz, Mechanics, section 11.
+    R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     for term in scene.terms:
         assert isinstance(term, mechanics.Cosine)
-        i, length = term.i, term.length.astype(np.longdouble)
+        i, length = term.i, 1 / term.wave.astype(np.longdouble)
         mass = scene.m[i].astype(np.longdouble)
         # upside down, the pendulum hangs from the other side
         at = term.at + np.where(term.depth < 0, PI * length, 0)

@@ -192,7 +192,10 @@ def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
 
 def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
     """A term from rows of its table: what it acts on, and an array for each column."""
-    values = {column.field: np.array([getattr(row, column.name) for row in rows]) for column in term.columns}
+    values = {}
+    for column in term.columns:
+        given = np.array([getattr(row, column.name) for row in rows])
+        values[column.field] = 1 / given if column.inverse else given
     if term.bodies == 1:
         field = f"{term.key}[{{}}].particle"
         chosen = [_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]

@@ -58,9 +58,10 @@ displacement of the step times 1/h, so it does not lose the digits of x' - x as 
 
 EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
     "quartic": ("0.25*b*(x-at)^4", ("b",)),
-    "cosine": ("depth*(1-cos((x-at)/length))", ("depth", "length")),
+    "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave")),
 }
-"""One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`."""
+"""One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`.  No parameter is divided
+by or multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
 SHIFTED = frozenset({"verlet", "langevin-middle"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
@@ -246,7 +247,7 @@ def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
     if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
         raise MethodError(
             f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
-            "its second end must start to the right of the first, and its energy must not close the rest length"
+            "its second end must start to the right of the first, too slow to close the rest length"
         )
 
 

@@ -2,7 +2,7 @@
 
 Interpreted, the rows `m, k, q, p ...` are lists of floats (Python's floats neither warn nor raise when
 they overflow); compiled, they are arrays.  So no kernel may contain what rounds or fails differently
-there: only + - * / on floats, in a fixed order, and no division by anything but a mass or a length.
+there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
 Sines and exponentials are made of these too: the C library's differ in the last digit from one system
 to the next, and Python's raise where these give inf or nan.
 
@@ -235,10 +235,10 @@ def quartics(rows: Rows, q: Row, p: Row, f: Row) -> None:
 
 
 def cosines(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add -(depth/length) sin((q - at)/length) to f."""
-    i, depth, length, at = rows
+    """Add -depth wave sin(wave (q - at)) to f."""
+    i, depth, wave, at = rows
     for s in range(len(i)):
-        f[i[s]] += -(depth[s] / length[s]) * sine((q[i[s]] - at[s]) / length[s])
+        f[i[s]] += -(depth[s] * wave[s]) * sine(wave[s] * (q[i[s]] - at[s]))
 
 
 def morses(rows: Rows, q: Row, p: Row, f: Row) -> None:

@@ -38,7 +38,7 @@ FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "wall-spring": (("i",), ("k", "at")),
     "spring": (("a", "b"), ("k", "rest")),
     "quartic": (("i",), ("b", "at")),
-    "cosine": (("i",), ("depth", "length", "at")),
+    "cosine": (("i",), ("depth", "wave", "at")),
     "morse": (("a", "b"), ("depth", "steepness", "rest")),
     "damping": (("i",), ("c", "m")),
 }
