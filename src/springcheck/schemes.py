@@ -383,10 +383,7 @@ def _implicit_stage(
     guess, last = q, np.inf
     for _ in range(50):
         residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
-        if diagonal:
-            change = residual / matrix
-        else:
-            change = residual.astype(np.float64) @ inverse
+        change = residual / matrix if diagonal else residual.astype(np.float64) @ inverse
         guess = guess - change
         eps = np.finfo(q.dtype).eps
         if not np.any(np.abs(change) > eps * np.abs(guess)):
