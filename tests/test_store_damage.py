@@ -15,12 +15,12 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from test_store import LABELS, scene, trajectory
 
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.model import Comparison
 from springcheck.store import seal, trust
+from test_store import LABELS, scene, trajectory
 
 READERS: list[Callable[[Path], object]] = [
     store.read,

@@ -12,11 +12,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from test_store import LABELS, assert_same, scene, trajectory, written
 
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.store import adopt, files, merge, reading, seal
+from test_store import LABELS, assert_same, scene, trajectory, written
 
 
 class Killed(BaseException):

@@ -15,11 +15,11 @@ import pyh5md
 import pytest
 from silx.io import nxdata
 from silx.io import open as silx_open
-from test_store import LABELS, scene, trajectory, written
 
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.model import Comparison
+from test_store import LABELS, scene, trajectory, written
 
 
 @pytest.mark.parametrize("label", LABELS)
