@@ -18,7 +18,9 @@ from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, T
 
 def scatter(out: Reals, index: Integers, values: Reals) -> None:
     """Add values (..., s) to out (..., n) at index (s,), repeated indices included."""
-    if len(index) == out.shape[-1] and np.array_equal(index, np.arange(len(index))):
+    if len(index) == 1:
+        out[..., index[0]] += values[..., 0]
+    elif len(index) == out.shape[-1] and np.array_equal(index, np.arange(len(index))):
         out += values
     elif len(np.unique(index)) == len(index):
         out[..., index] += values

@@ -315,8 +315,8 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is multiplied by the squared norm of
-    the inverse of the matrix that it solves, the condition of its step.
+    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is carried through the
+    solution of its equation.
     """
     q, p, h = np.abs(q), np.abs(p), abs(h)
     if scheme.stages:
@@ -335,13 +335,7 @@ def magnitude_step(
         ps = _sum(list(zip(row, forces, strict=False)), p)
         own = row[len(forces)]
         if own:
-            condition = 1.0
-            if stiffness is not None:
-                masses = m.astype(np.float64)[:, None]
-                matrix = np.eye(len(m)) + own**2 * np.asarray(stiffness, dtype=np.float64) / masses
-                condition = float(np.linalg.norm(np.linalg.inv(matrix), np.inf))
-            # the solution is larger than what it is made from by the condition, its error by that again
-            qs = (qs + own * (ps + own * magnitude(qs, ps)) / m) * max(condition, 1.0) ** 2
+            qs = _solved(qs + own * (ps + own * magnitude(qs, ps)) / m, own, m, stiffness)
             ps = ps + own * magnitude(qs, ps)
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
@@ -350,6 +344,21 @@ def magnitude_step(
         _sum(list(zip(weights, velocities, strict=True)), q),
         _sum(list(zip(weights, forces, strict=True)), p),
     )
+
+
+def _solved(given: Reals, own: float, m: Reals, stiffness: Reals | None) -> Reals:
+    """What bounds the rounding of the solution of an implicit stage whose right side is made of `given`.
+
+    Componentwise backward error: |A^-1| (|A| |x| + |b|) with |x| <= |A^-1| |b| (Higham, Accuracy and
+    Stability of Numerical Algorithms, 7.2).
+    """
+    if stiffness is None:
+        return given
+    change = own**2 * np.asarray(stiffness, dtype=np.float64) / m.astype(np.float64)[:, None]
+    inverse = np.abs(np.linalg.inv(np.eye(len(m)) + change))
+    size = np.eye(len(m)) + np.abs(change)
+    solution = given @ inverse.T
+    return np.asarray((solution @ size.T + given) @ inverse.T)
 
 
 def roundings(scheme: Scheme) -> int:

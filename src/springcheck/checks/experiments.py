@@ -65,7 +65,8 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     q, p = case.next_states
     ideal = columns(q[0], p[0], -1)
     departure = columns(case.trajectory.q[1] - q[0], case.trajectory.p[1] - p[0], -1)
-    allowed = np.abs(columns(*(case.roundings * x[0] for x in case.allowance), 1))
+    roundings = [case.roundings * x[0] for x in case.allowance]
+    allowed = np.abs(columns(roundings[0], roundings[1], 1))
     return scaled(ideal), scaled(departure), scaled(allowed), scale
 
 
@@ -124,13 +125,13 @@ def symmetric(scheme: schemes.Scheme) -> bool:
     if scheme.b != tuple(reversed(scheme.b)):
         return False
     full = [row + (row[0] * 0,) * (s - len(row)) for row in scheme.a]
-    return all(
-        full[s - 1 - i][s - 1 - j] + full[i][j] == scheme.b[j] for i in range(s) for j in range(s)
-    )
+    return all(full[s - 1 - i][s - 1 - j] + full[i][j] == scheme.b[j] for i in range(s) for j in range(s))
 
 
-def _shifted(scene: Scene, scheme: schemes.Scheme, state: tuple[Floats, Floats], sign: int) -> tuple[Floats, Floats]:
-    """The first stage of a two-stage scheme, forwards or backwards: where it is synchronised with its adjoint."""
+def _shifted(
+    scene: Scene, scheme: schemes.Scheme, state: tuple[Floats, Floats], sign: int
+) -> tuple[Floats, Floats]:
+    """The state a first stage of a two-stage scheme on, or back: there its adjoint is synchronised."""
     q, p = (x.astype(np.longdouble) for x in state)
     h = np.longdouble(sign * scene.step)
     if scheme.stages[0][0] == "kick":
@@ -217,7 +218,9 @@ def repeatability(bench: Bench) -> Verdict:
     again = bench.run(replace(bench.scene, every=1, steps=min(bench.scene.steps, 200)), bench.label)
     if first.q.shape != again.q.shape:
         return bench.verdict("repeatability", float("inf"), 0.0, "frames", "the runs differ in length")
-    same = (first.q.view(np.int64) == again.q.view(np.int64)) & (first.p.view(np.int64) == again.p.view(np.int64))
+    same = (first.q.view(np.int64) == again.q.view(np.int64)) & (
+        first.p.view(np.int64) == again.p.view(np.int64)
+    )
     return bench.verdict(
         "repeatability",
         float(np.count_nonzero(~np.all(same, axis=1))),

@@ -39,9 +39,20 @@ T_SEVEN = 5.41
 DECADES = tuple(10.0**-d for d in range(4, 13))
 
 
-def _scene(terms: tuple[mechanics.WallSpring | mechanics.Quartic, ...], q: Floats, p: Floats, m: Floats) -> Scene:
+def _scene(
+    terms: tuple[mechanics.WallSpring | mechanics.Quartic, ...], q: Floats, p: Floats, m: Floats
+) -> Scene:
     return Scene(
-        name="experiment", title="", source="", m=m, q=q, p=p, terms=terms, step=1.0, steps=1, quantities=("q", "p")
+        name="experiment",
+        title="",
+        source="",
+        m=m,
+        q=q,
+        p=p,
+        terms=terms,
+        step=1.0,
+        steps=1,
+        quantities=("q", "p"),
     )
 
 
@@ -195,7 +206,9 @@ def rounding_bias(bench: Bench) -> Verdict:
     if why_not:
         return bench.not_applicable("rounding-bias", why_not)
     found = [_drift(bench, h) for h in (ODD, EVEN)]
-    off, se = max(((abs(mean - implied), se) for mean, se, implied in found), key=lambda x: x[0] / (x[1] or 1))
+    off, se = max(
+        ((abs(mean - implied), se) for mean, se, implied in found), key=lambda x: x[0] / (x[1] or 1)
+    )
     seen = "; ".join(
         f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} a step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)

@@ -30,7 +30,9 @@ def scene(
 
 def walls(k: Floats, at: Floats) -> mechanics.WallSpring:
     """One wall spring for each particle."""
-    return mechanics.WallSpring(i=np.arange(len(k)), k=np.asarray(k, np.float64), at=np.asarray(at, np.float64))
+    return mechanics.WallSpring(
+        i=np.arange(len(k)), k=np.asarray(k, np.float64), at=np.asarray(at, np.float64)
+    )
 
 
 def random_scene(rng: np.random.Generator, *, steps: int = 200, decades: float = 6.0) -> Scene:
@@ -56,7 +58,9 @@ def _spread(rng: np.random.Generator, decades: float, n: int) -> Floats:
 
 def _hw(rng: np.random.Generator) -> float:
     """h w: anywhere below the limit, near the limit, or small."""
-    return float(rng.choice([rng.uniform(0.01, 1.9), 2 - 10 ** rng.uniform(-2, -1), 10 ** rng.uniform(-3, -0.5)]))
+    return float(
+        rng.choice([rng.uniform(0.01, 1.9), 2 - 10 ** rng.uniform(-2, -1), 10 ** rng.uniform(-3, -0.5)])
+    )
 
 
 def _side_by_side(rng: np.random.Generator, kind: str, steps: int, decades: float) -> Scene:

@@ -65,12 +65,13 @@ def following(change: Callable[[Scene, float, int, State], State]) -> Make:
     return stepping(broken)
 
 
-def pulling(change: Callable[[Scene, float, Reals, Reals], Reals]) -> Make:
-    """Another force: change(scene, size, q, right force)."""
+def pulling(change: Callable[[float, float, Reals], Reals]) -> Make:
+    """Another force: change(largest force, size, right force)."""
 
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
         right = mechanics.force(scene.terms)
-        return textbook(scene, scheme, force=lambda q, p: change(scene, size, q, right(q, p)))
+        largest = reach(scene)
+        return textbook(scene, scheme, force=lambda q, p: change(largest, size, right(q, p)))
 
     return stepping(broken)
 
@@ -123,7 +124,9 @@ def shifted(scene: Scene, size: float) -> Scene:
     reach = float(np.max(np.abs(scene.q)) + np.max(np.abs(scene.p)))
 
     def term(t: Any) -> Any:
-        return replace(t, at=t.at + size * reach) if hasattr(t, "at") else replace(t, rest=t.rest + size * reach)
+        return (
+            replace(t, at=t.at + size * reach) if hasattr(t, "at") else replace(t, rest=t.rest + size * reach)
+        )
 
     return _springs(scene, term)
 

@@ -83,7 +83,7 @@ def trajectory(
     return Trajectory(
         label=label,
         scheme=scheme.name,
-        t=np.arange(f) * scene.every * scene.step,
+        t=np.arange(f, dtype=np.float64) * scene.every * scene.step,
         q=q,
         p=p,
         energy=energies(scene, q, p) if "energy" in scene.quantities else None,
