@@ -1,1 +1,33 @@
-"""springcheck: simulation engines judged to rounding by a mass on a spring."""
+"""springcheck: simulation engines judged to rounding by a mass on a spring.
+
+>>> import springcheck
+>>> scene = springcheck.load_scene("spring")
+>>> run = springcheck.run(scene, "own:semi-implicit-euler")
+>>> run.t.shape, run.q.shape, run.p.shape
+((201,), (201, 1), (201, 1))
+
+`load_scene` reads a scene, `run` moves it by one method, `read` opens a store, `judge` gives verdicts.
+What they return is described in `springcheck.model`.  Each is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from springcheck.checks import judge
+    from springcheck.scenes import load_scene
+    from springcheck.session import read
+    from springcheck.simulate import run
+
+__all__ = ["judge", "load_scene", "read", "run"]
+
+_HOMES = {"judge": "checks", "load_scene": "scenes", "read": "session", "run": "simulate"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -8,21 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import checks, exact, mechanics
-from springcheck.model import Extended, Floats, Scene, Trajectory
+from springcheck.model import Comparison, Extended, Floats, Scene, Trajectory
 
 EXACT = "exact"
 """The label of the true motion among the others."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison:
-    """Largest difference of each pair over all frames, in units of the start (`mechanics.Norm`).
-
-    max_difference (l, l), symmetric; NaN where one of the two runs did not complete.
-    """
-
-    labels: tuple[str, ...]
-    max_difference: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +61,9 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
         return float(np.max(bound * unit))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
     steps = float(case.steps[-1])
-    return case.roundings * case.rounding * steps * (1 + steps * checks.fastest(case) * abs(trajectory.step) / 2)
+    return (
+        case.roundings * case.rounding * steps * (1 + steps * checks.fastest(case) * abs(trajectory.step) / 2)
+    )
 
 
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:

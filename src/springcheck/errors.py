@@ -17,3 +17,7 @@ class MethodError(SpringcheckError):
 
 class StoreError(SpringcheckError):
     """A file that cannot be read, written or trusted."""
+
+
+class IdentificationError(SpringcheckError):
+    """States from which no one-step map can be read: too few, at rest, or at uneven times."""

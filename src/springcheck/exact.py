@@ -1,7 +1,8 @@
 """The true motion of a scene: normal modes, in extended precision.
 
-A linear scene falls apart into modes y'' = -w2 y + g, one for each eigenvector of M^-1/2 K M^-1/2:
-circular functions for w2 > 0, hyperbolic ones for w2 < 0, a parabola for w2 = 0.  Every scheme acts on
+A linear scene falls apart into modes y'' = -w2 y - r y' + g, one for each eigenvector of
+M^-1/2 K M^-1/2: without friction (r = 0) circular functions for w2 > 0, hyperbolic ones for w2 < 0, a
+parabola for w2 = 0; with friction the same, decaying.  Every scheme acts on
 each mode by itself too, which is why limits and shadow energies are read off here as well.
 
 Phases are taken as (number of steps) * (h w) with the very double h that the engines were given, in
@@ -26,11 +27,13 @@ wider than double the references round like the engines, and every bound that na
 class Modes:
     """Normal modes: q = M**-1/2 V y.  `vectors` is None where no term joins two particles (V = 1).
 
-    w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2].
+    w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2];
+    rate (n,): that of its friction, c/m [1/T].
     """
 
     w2: Extended
     pull: Extended
+    rate: Extended
     root_m: Extended
     vectors: Extended | None
 
@@ -51,25 +54,112 @@ class Modes:
         return np.asarray(np.where(held, self.pull / np.where(held, self.w2, 1), 0))
 
 
+SMALL = 32
+"""Particles up to which modes are found to high relative accuracy, at a cost of about 10 n**3."""
+
+
 def modes(scene: Scene) -> Modes:
-    """Normal modes of a linear scene.  Errors of w2 are about n EPS max(w2)."""
-    if not mechanics.is_linear(scene):
-        raise ValueError(f"scene {scene.name!r} is not linear: it has no normal modes")
+    """Normal modes of a linear scene.
+
+    Errors of w2 are about n EPS of each value itself where no particle is joined to another, and up to
+    `SMALL` particles that nothing pushes apart (no negative stiffness); elsewhere n EPS max(w2).
+    """
+    if not mechanics.has_modes(scene):
+        raise ValueError(
+            f"scene {scene.name!r} has no normal modes: it is not linear, or friction couples them"
+        )
     root_m = np.sqrt(scene.m.astype(np.longdouble))
     zero = np.zeros(scene.n, dtype=np.longdouble)
     pull: Extended = np.asarray(mechanics.force(scene.terms)(zero, zero) / root_m, np.longdouble)
+    rate = mechanics.rates(scene)
     if mechanics.is_separate(scene):
-        k = np.zeros(scene.n, dtype=np.longdouble)
-        for term in scene.terms:
-            assert isinstance(term, mechanics.WallSpring)
-            np.add.at(k, term.i, term.k.astype(np.longdouble))
-        return Modes(w2=k / scene.m, pull=pull, root_m=root_m, vectors=None)
-    scaled = mechanics.stiffness(scene, zero) / root_m[:, None] / root_m
-    symmetric = np.asarray(scaled, np.longdouble)
-    w2, vectors = _eigen(symmetric)
-    # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
-    w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
-    return Modes(w2=w2, pull=pull @ vectors, root_m=root_m, vectors=vectors)
+        k = mechanics.own_stiffness(scene, zero)
+        return Modes(w2=k / scene.m, pull=pull, rate=rate, root_m=root_m, vectors=None)
+    rows = _spring_rows(scene, root_m) if scene.n <= SMALL else None
+    if rows is not None:
+        w2, vectors = _graded(rows)
+        free = len(mechanics.free_groups(scene))
+        w2[np.argsort(w2)[:free]] = 0
+    else:
+        scaled = mechanics.stiffness(scene, zero) / root_m[:, None] / root_m
+        w2, vectors = _eigen(np.asarray(scaled, np.longdouble))
+        # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
+        w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
+    return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
+
+
+def _spring_rows(scene: Scene, root_m: Extended) -> Extended | None:
+    """G (s, n) with M^-1/2 K M^-1/2 = G^T G: one row for each spring.  None where a stiffness is negative."""
+    rows: list[Extended] = []
+    for term in scene.terms:
+        if isinstance(term, mechanics.WallSpring | mechanics.Spring):
+            if np.any(term.k < 0):
+                return None
+            block = np.zeros((len(term.k), scene.n), dtype=np.longdouble)
+            each = np.arange(len(term.k))
+            if isinstance(term, mechanics.Spring):
+                block[each, term.a], block[each, term.b] = -1, 1
+            else:
+                block[each, term.i] = 1
+            rows.append(np.sqrt(term.k.astype(np.longdouble))[:, None] * block / root_m)
+    return np.concatenate(rows)
+
+
+def _graded(rows: Extended) -> tuple[Extended, Extended]:
+    """Eigenvalues and vectors of G^T G, each value to high relative accuracy, for G = rows (s, n).
+
+    Rows of very different size (stiff and soft springs) would drown the small eigenvalues in the
+    rounding of the large ones if G^T G were formed.  One-sided Jacobi rotations do not form it
+    (Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13 (1992) 1204); a pivoted QR factorisation of G^T
+    before them makes their columns graded (Drmac & Veselic, SIAM J. Matrix Anal. Appl. 29 (2008) 1322).
+    """
+    n = rows.shape[1]
+    basis, triangle = _pivoted_qr(rows.T)
+    columns = triangle.T.copy()
+    turn = np.eye(n, dtype=np.longdouble)
+    for _ in range(60):
+        largest = 0.0
+        for i in range(n - 1):
+            for j in range(i + 1, n):
+                x, y = columns[:, i], columns[:, j]
+                a, b, c = x @ x, y @ y, x @ y
+                if c == 0 or abs(c) <= EPS * np.sqrt(a * b):
+                    continue
+                largest = max(largest, float(abs(c) / np.sqrt(a * b)))
+                zeta = (b - a) / (2 * c)
+                t = (1 if zeta >= 0 else -1) / (abs(zeta) + np.sqrt(1 + zeta * zeta))
+                cosine = 1 / np.sqrt(1 + t * t)
+                sine = cosine * t
+                for of in (columns, turn):
+                    x, y = of[:, i].copy(), of[:, j].copy()
+                    of[:, i], of[:, j] = cosine * x - sine * y, sine * x + cosine * y
+        if largest <= n * EPS:
+            break
+    return np.sum(columns * columns, axis=0), basis @ turn
+
+
+def _pivoted_qr(matrix: Extended) -> tuple[Extended, Extended]:
+    """Q (n, n) orthogonal and R (n, s) with matrix = Q R, the columns of R in their order of matrix.
+
+    Householder reflections, the column that is largest in what remains first.
+    """
+    rest = matrix.copy()
+    n, s = rest.shape
+    basis = np.eye(n, dtype=np.longdouble)
+    open_columns = np.ones(s, dtype=bool)
+    for i in range(min(n, s)):
+        sizes = np.where(open_columns, np.sum(rest[i:] * rest[i:], axis=0), -1)
+        j = int(np.argmax(sizes))
+        if sizes[j] <= 0:
+            break
+        open_columns[j] = False
+        mirror = rest[i:, j].copy()
+        mirror[0] += np.sqrt(sizes[j]) * (1 if mirror[0] >= 0 else -1)
+        factor = 2 / (mirror @ mirror)
+        rest[i:] -= np.outer(mirror, factor * (mirror @ rest[i:]))
+        rest[i + 1 :, j] = 0
+        basis[:, i:] -= np.outer(basis[:, i:] @ mirror, factor * mirror)
+    return basis, rest
 
 
 def _eigen(symmetric: Extended) -> tuple[Extended, Extended]:
@@ -112,7 +202,7 @@ def _clusters(close: np.ndarray) -> list[Integers]:
 
 def has_true_motion(scene: Scene) -> bool:
     """Whether `true_motion` knows the scene."""
-    return mechanics.is_linear(scene)
+    return mechanics.has_modes(scene)
 
 
 def true_motion(
@@ -120,29 +210,90 @@ def true_motion(
 ) -> tuple[Extended, Extended]:
     """True q and p (f, n) after these numbers of steps of h, in extended precision.
 
-    `known` are the scene's modes, for a caller that asks often.
+    `known` are the scene's modes, for a caller that asks often.  Motion that leaves even the extended
+    range comes back infinite.
     """
     found = known or modes(scene)
     y0, v0 = found.into(scene.q, scene.p)
     centre = found.centre()
-    w = np.sqrt(np.abs(found.w2))
-    count = np.asarray(steps).astype(np.longdouble)[:, None]
-    phase = count * (np.longdouble(h) * w)
-    t = count * np.longdouble(h)
     u0 = y0 - centre
-    safe = np.where(w > 0, w, 1)
-    y = np.empty(phase.shape, dtype=np.longdouble)
+    count = np.asarray(steps).astype(np.longdouble)[:, None]
+    t = count * np.longdouble(h)
+    y = np.empty((len(count), len(u0)), dtype=np.longdouble)
     v = np.empty_like(y)
-    for kind, cosine, sine, sign in (
-        (found.w2 > 0, np.cos, np.sin, -1),
-        (found.w2 < 0, np.cosh, np.sinh, 1),
-    ):
-        if np.any(kind):
-            c, s = cosine(phase[:, kind]), sine(phase[:, kind])
-            y[:, kind] = centre[kind] + u0[kind] * c + v0[kind] / safe[kind] * s
-            v[:, kind] = v0[kind] * c + sign * safe[kind] * u0[kind] * s
-    free = found.w2 == 0
-    if np.any(free):
-        y[:, free] = y0[free] + v0[free] * t + found.pull[free] * t * t / 2
-        v[:, free] = v0[free] + found.pull[free] * t
-    return found.out_of(y, v)
+    w2, rate = found.w2, found.rate
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        for kind, motion in (
+            ((w2 != 0) & (rate == 0), _undamped),
+            ((w2 != 0) & (rate != 0), _damped),
+            ((w2 == 0) & (rate == 0), _free),
+            ((w2 == 0) & (rate != 0), _dragged),
+        ):
+            if np.any(kind):
+                y[:, kind], v[:, kind] = motion(
+                    u0[kind], v0[kind], t, _Law(w2=w2[kind], rate=rate[kind], pull=found.pull[kind])
+                )
+    return found.out_of(y + centre, v)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Law:
+    """u'' = -w2 u - rate u' + pull, the pull only where w2 = 0 (elsewhere u counts from the centre)."""
+
+    w2: Extended
+    rate: Extended
+    pull: Extended
+
+
+def _undamped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    w = np.sqrt(np.abs(law.w2))
+    phase = t * w
+    turning = law.w2 > 0
+    cosine = np.where(turning, np.cos(phase), np.cosh(np.where(turning, 0, phase)))
+    sine = np.where(turning, np.sin(phase), np.sinh(np.where(turning, 0, phase)))
+    sign = np.where(turning, -1, 1)
+    return np.asarray(u * cosine + v / w * sine), np.asarray(v * cosine + sign * w * u * sine)
+
+
+def _damped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    """With b = rate/2 and s**2 = w2 - b**2: exp(-b t) (u (cos st + b S) + v S), S = sin(st)/s.
+
+    Hyperbolic beyond critical damping.  There the slow root -b + s would cancel and exp(-b t) cosh(st)
+    would be 0 times infinity; from st = 1 on the two exponentials are taken apart, with the slow root
+    as -w2 / (b + s).  Near critical damping S -> t, and nothing is divided by s.
+    """
+    b = law.rate / 2
+    root = np.sqrt(np.abs(law.w2))
+    below = (root - b) * (root + b)
+    square = np.where(law.w2 > 0, below, law.w2 - b * b)
+    s = np.sqrt(np.abs(square))
+    angle = s * t
+    turning = square > 0
+    apart = ~turning & (np.abs(angle) > 1)
+    near = np.where(apart, 0, angle)
+    safe = np.where(s > 0, s, 1)
+    short = np.abs(near) < 2.0**-33
+    cosine = np.where(turning, np.cos(near), np.cosh(np.where(turning, 0, near)))
+    sine = np.where(turning, np.sin(near), np.sinh(np.where(turning, 0, near))) / safe
+    sine = np.where(short, t, sine)
+    decay = np.exp(-b * t)
+    y = decay * (u * (cosine + b * sine) + v * sine)
+    z = decay * (v * (cosine - b * sine) - law.w2 * u * sine)
+    if np.any(apart):
+        fast = -(b + s)
+        slow = -law.w2 / (b + s)
+        one, two = (v - fast * u) / (2 * safe), (v - slow * u) / (2 * safe)
+        early, late = np.exp(fast * t), np.exp(slow * t)
+        y = np.where(apart, one * late - two * early, y)
+        z = np.where(apart, slow * one * late - fast * two * early, z)
+    return np.asarray(y), np.asarray(z)
+
+
+def _free(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    return np.asarray(u + v * t + law.pull * t * t / 2), np.asarray(v + law.pull * t)
+
+
+def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    final = law.pull / law.rate
+    gone = -np.expm1(-law.rate * t)
+    return u + final * t + (v - final) * gone / law.rate, v - (v - final) * gone

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,13 +17,27 @@ import numpy as np
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
 
 
+@lru_cache(maxsize=64)
+def _kind(index: bytes) -> str:
+    """Whether an index array counts 0, 1, 2 ..., names particles once each, or repeats some."""
+    numbers = np.frombuffer(index, dtype=np.int64)
+    if np.array_equal(numbers, np.arange(len(numbers))):
+        return "counting"
+    return "distinct" if len(np.unique(numbers)) == len(numbers) else "repeated"
+
+
+def gather(q: Reals, index: Integers) -> Reals:
+    """Values (..., s) of q (..., n) at index (s,); q itself where that is all of it."""
+    everything = len(index) == q.shape[-1] and _kind(index.tobytes()) == "counting"
+    return q if everything else np.asarray(q[..., index])
+
+
 def scatter(out: Reals, index: Integers, values: Reals) -> None:
     """Add values (..., s) to out (..., n) at index (s,), repeated indices included."""
-    if len(index) == 1:
-        out[..., index[0]] += values[..., 0]
-    elif len(index) == out.shape[-1] and np.array_equal(index, np.arange(len(index))):
+    kind = _kind(index.tobytes())
+    if kind == "counting" and len(index) == out.shape[-1]:
         out += values
-    elif len(np.unique(index)) == len(index):
+    elif kind != "repeated":
         out[..., index] += values
     else:
         where: Any = (..., index)
@@ -38,20 +53,22 @@ class WallSpring:
     i: Integers
     k: Floats
     at: Floats
+    fast: bool = False
+    """Whether a method of multiple time steps takes these springs in its short step."""
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
     def size(self, dq: Reals) -> Reals:
-        u = dq[..., self.i]
+        u = gather(dq, self.i)
         return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        scatter(out, self.i, -self.k * (q[..., self.i] - self.at))
+        scatter(out, self.i, -self.k * (gather(q, self.i) - self.at))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        scatter(out, self.i, np.abs(self.k) * (np.abs(q[..., self.i]) + np.abs(self.at)))
+        scatter(out, self.i, np.abs(self.k) * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
     def add_stiffness(self, q: Reals, out: Reals) -> None:
         np.add.at(out, (self.i, self.i), self.k)
@@ -67,22 +84,24 @@ class Spring:
     b: Integers
     k: Floats
     rest: Floats
+    fast: bool = False
+    """As in `WallSpring`."""
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.b] - q[..., self.a] - self.rest
+        u = gather(q, self.b) - gather(q, self.a) - self.rest
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
     def size(self, dq: Reals) -> Reals:
-        u = dq[..., self.b] - dq[..., self.a]
+        u = gather(dq, self.b) - gather(dq, self.a)
         return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        tension = self.k * (q[..., self.b] - q[..., self.a] - self.rest)
+        tension = self.k * (gather(q, self.b) - gather(q, self.a) - self.rest)
         scatter(out, self.a, tension)
         scatter(out, self.b, -tension)
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        size = np.abs(q[..., self.b]) + np.abs(q[..., self.a]) + np.abs(self.rest)
+        size = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
         scatter(out, self.a, np.abs(self.k) * size)
         scatter(out, self.b, np.abs(self.k) * size)
 
@@ -104,33 +123,94 @@ class Quartic:
     at: Floats
 
     def energy(self, q: Reals) -> Reals:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         return np.asarray(0.25 * np.sum(self.b * (u * u) * (u * u), axis=-1))
 
     def size(self, dq: Reals) -> Reals:
         return np.zeros(dq.shape[:-1], dtype=dq.dtype)
 
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        u = q[..., self.i] - self.at
+        u = gather(q, self.i) - self.at
         scatter(out, self.i, -self.b * (u * u * u))
 
     def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
         # a relative error of u counts threefold in u**3
-        u = np.abs(q[..., self.i] - self.at)
-        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(q[..., self.i]) + np.abs(self.at)))
+        u = np.abs(gather(q, self.i) - self.at)
+        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
     def add_stiffness(self, q: Reals, out: Reals) -> None:
         u = q[self.i] - self.at
         np.add.at(out, (self.i, self.i), 3 * self.b * u * u)
 
 
-TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic)
-LINEAR = frozenset({"wall-spring", "spring"})
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Damping:
+    """Friction of particles i: force -c p/m.  c [M/T], m their masses [M]."""
+
+    key: ClassVar[str] = "damping"
+    bodies: ClassVar[int] = 1
+    i: Integers
+    c: Floats
+    m: Floats
+
+    def energy(self, q: Reals) -> Reals:
+        return np.zeros(q.shape[:-1], dtype=q.dtype)
+
+    def size(self, dq: Reals) -> Reals:
+        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        scatter(out, self.i, -self.c * (p[..., self.i] / self.m))
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+        scatter(out, self.i, np.abs(self.c) * (np.abs(p[..., self.i]) / self.m))
+
+    def add_stiffness(self, q: Reals, out: Reals) -> None:
+        """Friction has no energy to differentiate."""
+
+
+TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Damping)
+LINEAR = frozenset({"wall-spring", "spring", "damping"})
 
 
 def is_linear(scene: Scene) -> bool:
-    """Whether every force of the scene is linear in q, so that steps are matrices."""
+    """Whether every force of the scene is linear in q and p, so that steps are matrices."""
     return all(term.key in LINEAR for term in scene.terms)
+
+
+def rates(scene: Scene) -> Extended:
+    """Rates at which friction alone would slow each particle down, c/m (n,) [1/T], extended precision."""
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for term in scene.terms:
+        if isinstance(term, Damping):
+            np.add.at(out, term.i, term.c / term.m.astype(np.longdouble))
+    return out
+
+
+def is_damped(scene: Scene) -> bool:
+    """Whether any friction acts."""
+    return bool(np.any(rates(scene) != 0))
+
+
+def has_modes(scene: Scene) -> bool:
+    """Whether the motion falls apart into modes: linear, and friction that couples none of them.
+
+    Friction does not couple modes where no term joins two particles, or where every particle is slowed
+    down at the same rate (to a rounding of c/m).
+    """
+    if not is_linear(scene):
+        return False
+    rate = rates(scene)
+    return is_separate(scene) or bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
+
+
+def split(terms: Iterable[Term]) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
+    """The slow and the fast terms: fast are the springs that the scene marks so."""
+    parts = tuple(terms)
+    return (
+        tuple(term for term in parts if not getattr(term, "fast", False)),
+        tuple(term for term in parts if getattr(term, "fast", False)),
+    )
 
 
 def is_separate(scene: Scene) -> bool:
@@ -152,7 +232,8 @@ def in_single(scene: Scene) -> Scene:
             },
         )
 
-    return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
+    with np.errstate(over="ignore", under="ignore"):
+        return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
 
 
 def force(terms: Iterable[Term]) -> Force:
@@ -189,6 +270,19 @@ def stiffness(scene: Scene, q: Reals) -> Extended:
     out = np.zeros((scene.n, scene.n), dtype=np.longdouble)
     for term in scene.terms:
         term.add_stiffness(np.asarray(q, dtype=np.longdouble), out)
+    return out
+
+
+def own_stiffness(scene: Scene, q: Reals) -> Extended:
+    """Diagonal of `stiffness` (n,), for scenes of many particles that nothing joins."""
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    wide = np.asarray(q, dtype=np.longdouble)
+    for term in scene.terms:
+        if isinstance(term, WallSpring):
+            np.add.at(out, term.i, term.k.astype(np.longdouble))
+        elif isinstance(term, Quartic):
+            u = wide[term.i] - term.at
+            np.add.at(out, term.i, 3 * term.b * u * u)
     return out
 
 

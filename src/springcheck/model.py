@@ -114,6 +114,8 @@ class Method:
     adaptive: bool = False
     terms: frozenset[str] = frozenset({"spring"})
     kinds: frozenset[str] = frozenset({"particles"})
+    requires: frozenset[str] = frozenset()
+    """What a scene must have for the method to be worth running: term keys, or "springs marked fast"."""
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
 
@@ -217,6 +219,17 @@ class Trajectory:
     """Largest |y| or |z| seen, for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Comparison:
+    """Largest difference of each pair of trajectories over all frames, (l, l), symmetric.
+
+    In units of the start (`mechanics.Norm`); NaN where one of the two runs did not complete.
+    """
+
+    labels: tuple[str, ...]
+    max_difference: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,12 +34,16 @@ class ParticleTable(_Table, frozen=True):
 
 
 class SpringTable(_Table, frozen=True):
-    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L]."""
+    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L].
+
+    `fast` springs are taken in the short step of a method of multiple time steps.
+    """
 
     ends: tuple[End, End]
     stiffness: float
     rest: float = 0.0
     wall: float = 0.0
+    fast: bool = False
 
 
 class QuarticTable(_Table, frozen=True):
@@ -48,6 +52,13 @@ class QuarticTable(_Table, frozen=True):
     particle: int
     coefficient: float
     at: float = 0.0
+
+
+class DampingTable(_Table, frozen=True):
+    """Friction of one particle: force -coefficient p/mass, coefficient [M/T]."""
+
+    particle: int
+    coefficient: Annotated[float, msgspec.Meta(ge=0)]
 
 
 class TimeTable(_Table, frozen=True):
@@ -83,6 +94,7 @@ class SceneTable(_Table, frozen=True):
     kind: Kind = "particles"
     spring: tuple[SpringTable, ...] = ()
     quartic: tuple[QuarticTable, ...] = ()
+    damping: tuple[DampingTable, ...] = ()
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
 
@@ -167,6 +179,7 @@ _FIELDS: dict[str, type[_Table]] = {
     "particle": ParticleTable,
     "spring": SpringTable,
     "quartic": QuarticTable,
+    "damping": DampingTable,
     "time": TimeTable,
     "methods": MethodsTable,
     "record": RecordTable,
@@ -233,8 +246,8 @@ def _particle(value: int, n: int, field: str) -> int:
 
 
 def _terms(table: SceneTable, n: int) -> Iterator[Term]:
-    walls: list[tuple[int, float, float]] = []
-    pairs: list[tuple[int, int, float, float]] = []
+    walls: dict[bool, list[tuple[int, float, float]]] = {False: [], True: []}
+    pairs: dict[bool, list[tuple[int, int, float, float]]] = {False: [], True: []}
     for j, spring in enumerate(table.spring):
         field = f"spring[{j}].ends"
         for end in spring.ends:
@@ -244,21 +257,24 @@ def _terms(table: SceneTable, n: int) -> Iterator[Term]:
             case ("wall", "wall"):
                 raise _MistakeError(f"{field}: a spring between two walls moves nothing")
             case ("wall", int(particle)):
-                walls.append((particle, spring.stiffness, spring.wall + spring.rest))
+                walls[spring.fast].append((particle, spring.stiffness, spring.wall + spring.rest))
             case (int(particle), "wall"):
-                walls.append((particle, spring.stiffness, spring.wall - spring.rest))
+                walls[spring.fast].append((particle, spring.stiffness, spring.wall - spring.rest))
             case (int(one), int(other)):
                 if one == other:
                     raise _MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
                 if spring.wall:
                     raise _MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
-                pairs.append((one, other, spring.stiffness, spring.rest))
-    if walls:
-        i, k, at = zip(*walls, strict=True)
-        yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.array(at))
-    if pairs:
-        a, b, k, rest = zip(*pairs, strict=True)
-        yield mechanics.Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest))
+                pairs[spring.fast].append((one, other, spring.stiffness, spring.rest))
+    for fast in (False, True):
+        if walls[fast]:
+            i, k, at = zip(*walls[fast], strict=True)
+            yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.array(at), fast=fast)
+        if pairs[fast]:
+            a, b, k, rest = zip(*pairs[fast], strict=True)
+            yield mechanics.Spring(
+                a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest), fast=fast
+            )
     if table.quartic:
         yield mechanics.Quartic(
             i=np.array(
@@ -266,4 +282,11 @@ def _terms(table: SceneTable, n: int) -> Iterator[Term]:
             ),
             b=np.array([x.coefficient for x in table.quartic]),
             at=np.array([x.at for x in table.quartic]),
+        )
+    if table.damping:
+        braked = [_particle(x.particle, n, f"damping[{j}].particle") for j, x in enumerate(table.damping)]
+        yield mechanics.Damping(
+            i=np.array(braked),
+            c=np.array([x.coefficient for x in table.damping]),
+            m=np.array([table.particle[j].mass for j in braked]),
         )

@@ -1,9 +1,10 @@
 """The mathematics of the methods: one-step maps as data, and what follows from them exactly.
 
-A scheme is either a splitting (a sequence of kicks ``p += c h F(q)`` and drifts ``q += d h p/m``) or a
-Runge-Kutta tableau.  Coefficients are exact: fractions, or decimal strings of 40 digits where they are
-irrational.  `step` carries out a scheme in the width of the numbers it is given; everything else
-(matrix, determinant, frequency, shadow energy, stability) is derived from that one definition.
+A scheme is either a splitting (a sequence of kicks ``p += c h F(q)``, drifts ``q += d h p/m`` and
+frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or
+decimal strings of 40 digits where they are irrational.  `step` carries out a scheme in the width of the
+numbers it is given; everything else (matrix, determinant, frequency, shadow energy, stability) is
+derived from that one definition.
 
 Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
 the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
@@ -19,10 +20,14 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.model import Extended, Floats, Force, Integers, Reals
+from springcheck import mechanics
+from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene
 
 Coefficient: TypeAlias = Fraction | str
-Stage: TypeAlias = tuple[Literal["kick", "drift"], Coefficient]
+Stage: TypeAlias = tuple[Literal["kick", "drift", "pull", "friction", "slow", "fast"], Coefficient]
+"""What is done for a fraction of the step: a kick by all forces at the present q and p, a drift, a pull
+by the forces of the potential alone, the exact decay of p by friction alone, or a kick by the slow or
+by the fast springs alone."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -32,7 +37,8 @@ class Scheme:
     """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
 
     `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.
-    A scheme with neither stages nor tableau has no one-step map: an adaptive solver.
+    A scheme with neither stages nor tableau has no step: an adaptive solver, or the exact flow (`flow`),
+    which has a matrix on linear scenes and nothing else.
     """
 
     name: str
@@ -43,6 +49,7 @@ class Scheme:
     stages: tuple[Stage, ...] = ()
     a: tuple[tuple[Fraction, ...], ...] = ()
     b: tuple[Fraction, ...] = ()
+    flow: bool = False
     source: str = ""
 
     @property
@@ -51,8 +58,13 @@ class Scheme:
         return any(x for i, row in enumerate(self.a) for x in row[i:])
 
     @property
+    def mixes(self) -> bool:
+        """Whether slow and fast springs act at different times, so that no normal mode stays by itself."""
+        return any(kind in ("slow", "fast") for kind, _ in self.stages)
+
+    @property
     def one_step(self) -> bool:
-        """Whether the scheme is a map from one state to the next."""
+        """Whether `step` can carry the scheme out."""
         return bool(self.stages or self.b)
 
 
@@ -66,6 +78,9 @@ _X1 = "1.351207191959657634047687808971460826922"
 _X0 = "-1.702414383919315268095375617942921653844"
 _HALF_X1 = "0.675603595979828817023843904485730413461"
 _HALF_X0_X1 = "-0.175603595979828817023843904485730413461"
+
+
+_EIGHT: tuple[Stage, ...] = 8 * _mirrored(("fast", Fraction(1, 16)), ("drift", Fraction(1, 8)))
 
 
 def _row(*numbers: int | Fraction) -> tuple[Fraction, ...]:
@@ -214,6 +229,44 @@ _ALL = (
         source="Yoshida 1990",
     ),
     Scheme(
+        name="langevin-middle",
+        title="Langevin middle scheme at T = 0: half pull, half drift, friction, half drift, half pull",
+        order=2,
+        limit=2.0,
+        symplectic=True,
+        stages=_mirrored(("pull", HALF), ("drift", HALF), ("friction", ONE)),
+        source="Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; Zhang et al., "
+        "J. Phys. Chem. A 123 (2019) 6056",
+    ),
+    Scheme(
+        name="respa8",
+        title="r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones",
+        order=2,
+        limit=16.0,
+        symplectic=True,
+        stages=(("slow", HALF), *_EIGHT, ("slow", HALF)),
+        source="Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990; the limit is that of a fast "
+        "spring alone, in company it resonates from h w = 16 sin(pi/16) on",
+    ),
+    Scheme(
+        name="langevin-middle-early",
+        title="Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
+        order=1,
+        limit=2.0,
+        symplectic=True,
+        stages=(("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
+        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; as OpenMM's integrator stores it",
+    ),
+    Scheme(
+        name="exact",
+        title="exact flow",
+        order=0,
+        limit=np.inf,
+        symplectic=True,
+        flow=True,
+        source="the solution of the equation of motion",
+    ),
+    Scheme(
         name="adams",
         title="CVODE Adams-Moulton, orders 1-12",
         order=0,
@@ -247,23 +300,38 @@ def _sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
 
 
 def step(
-    scheme: Scheme, q: Reals, p: Reals, *, h: Any, m: Reals, force: Force, stiffness: Reals | None = None
+    scheme: Scheme,
+    q: Reals,
+    p: Reals,
+    *,
+    h: Any,
+    m: Reals,
+    force: Force,
+    stiffness: Reals | None = None,
+    rate: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
-    Implicit schemes need `stiffness`, the second derivatives of the potential, (n, n) or (..., n, n);
-    double precision is enough, because it only steers an iteration whose residual has the full width.
+    Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
+    particle is joined to another; double precision is enough, because it only steers an iteration whose
+    residual has the full width.  `rate` is `mechanics.rates`, left out where nothing is damped; `parts`
+    are the forces of the slow and the fast springs, for the schemes that part them.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
         for kind, c in scheme.stages:
             ch = number(c, width) * h
-            if kind == "kick":
-                p = p + ch * force(q, p)
-            else:
+            if kind == "drift":
                 q = q + ch * (p / m)
+            elif kind == "friction":
+                p = p if rate is None else p * np.exp(-ch * rate.astype(width))
+            else:
+                p = p + ch * _acting(kind, force, parts)(q, p)
         return q, p
+    if not scheme.b:
+        raise ValueError(f"{scheme.name} has no step that a force alone defines")
     forces: list[Reals] = []
     velocities: list[Reals] = []
     for row in scheme.a:
@@ -274,7 +342,7 @@ def step(
         if own:
             if stiffness is None:
                 raise ValueError(f"{scheme.name} needs the stiffness of the scene")
-            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness)
+            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate)
         forces.append(force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]
@@ -284,23 +352,43 @@ def step(
     )
 
 
+def _acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:
+    """The force behind a stage."""
+    if kind == "kick":
+        return force
+    if kind == "pull":
+        return lambda q, p: force(q, np.zeros_like(p))
+    if parts is None:
+        raise ValueError("this scheme needs the slow and the fast force apart")
+    return parts[kind == "fast"]
+
+
 def _implicit_stage(
-    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals
+    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals, rate: Reals | None
 ) -> tuple[Reals, Reals]:
-    """Solve Q = q + x P/m, P = p + x F(Q) by Newton's iteration."""
-    matrix = np.asarray(stiffness, dtype=np.float64) * (float(x) ** 2 / m.astype(np.float64))[:, None]
-    matrix = matrix + np.eye(len(m))
+    """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
+
+    Friction is linear in P: P (1 + x rate) = p + x F(Q, 0), so it needs no iteration of its own.
+    """
+    none = np.zeros_like(p)
+    slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
+    factor = x * x / (m * slowed)
+    diagonal = stiffness.ndim == 1
+    if diagonal:
+        matrix = 1 + np.asarray(stiffness, q.dtype) * factor
+    else:
+        matrix = np.eye(len(m)) + np.asarray(stiffness, np.float64) * factor.astype(np.float64)[:, None]
     guess = q
     for _ in range(50):
-        residual = guess - q - x * (p + x * force(guess, p)) / m
-        if matrix.shape == (1, 1):
-            change = residual / matrix[0, 0]
+        residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
+        if diagonal:
+            change = residual / matrix
         else:
             change = np.linalg.solve(matrix, residual.astype(np.float64)[..., None])[..., 0]
         guess = guess - change
         if not np.any(np.abs(change) > np.finfo(q.dtype).eps * np.abs(guess)):
             break
-    return guess, p + x * force(guess, p)
+    return guess, np.asarray((p + x * force(guess, none)) / slowed)
 
 
 def magnitude_step(
@@ -312,20 +400,28 @@ def magnitude_step(
     m: Reals,
     magnitude: Force,
     stiffness: Reals | None = None,
+    rate: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` is `mechanics.magnitude`.  An implicit scheme's is carried through the
+    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
     solution of its equation.
     """
+    direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
         for kind, c in stages:
-            if kind == "kick":
-                p = p + c * h * magnitude(q, p)
-            else:
+            if kind == "drift":
                 q = q + c * h * p / m
+            elif kind == "friction":
+                # a rounding of x in exp(-x) costs x exp(-x) p, and the decayed p is exp(-x) p: the sum is
+                # below p forwards in time; backwards p grows first
+                x = np.zeros_like(m) if rate is None else -c * np.sign(direction) * h * rate
+                p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
+            else:
+                p = p + c * h * _acting(kind, magnitude, parts)(q, p)
         return q, p
     rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
     forces: list[Reals] = []
@@ -335,8 +431,10 @@ def magnitude_step(
         ps = _sum(list(zip(row, forces, strict=False)), p)
         own = row[len(forces)]
         if own:
-            qs = _solved(qs + own * (ps + own * magnitude(qs, ps)) / m, own, m, stiffness)
-            ps = ps + own * magnitude(qs, ps)
+            slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
+            kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
+            qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
+            ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
     weights = [abs(float(c)) * h for c in scheme.b]
@@ -346,63 +444,106 @@ def magnitude_step(
     )
 
 
-def _solved(given: Reals, own: float, m: Reals, stiffness: Reals | None) -> Reals:
-    """What bounds the rounding of the solution of an implicit stage whose right side is made of `given`.
+def _solved(given: Reals, factor: Reals, stiffness: Reals | None) -> Reals:
+    """What bounds the rounding of the solution of (1 + factor * stiffness) x = b, `given` bounding b.
 
     Componentwise backward error: |A^-1| (|A| |x| + |b|) with |x| <= |A^-1| |b| (Higham, Accuracy and
     Stability of Numerical Algorithms, 7.2).
     """
     if stiffness is None:
         return given
-    change = own**2 * np.asarray(stiffness, dtype=np.float64) / m.astype(np.float64)[:, None]
-    inverse = np.abs(np.linalg.inv(np.eye(len(m)) + change))
-    size = np.eye(len(m)) + np.abs(change)
-    solution = given @ inverse.T
-    return np.asarray((solution @ size.T + given) @ inverse.T)
+    if stiffness.ndim == 1:
+        change = factor * stiffness
+        inverse = 1 / np.abs(1 + change)
+        return np.asarray(((1 + np.abs(change)) * (inverse * given) + given) * inverse)
+    matrix = np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
+    inverse = np.abs(np.linalg.inv(np.eye(len(matrix)) + matrix)).T
+    return np.asarray(((given @ inverse) @ (np.eye(len(matrix)) + np.abs(matrix)).T + given) @ inverse)
 
 
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4."""
+    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4.
+
+    Friction takes 3: its exponent, the exponential and the product.
+    """
     if scheme.stages:
-        return 4 + sum(6 if kind == "kick" else 3 for kind, _ in scheme.stages)
+        return 4 + sum(3 if kind in ("drift", "friction") else 6 for kind, _ in scheme.stages)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)
 
 
 def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
-    Found by stepping the two unit vectors, so the scheme is written down once.
+    Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
+    from fast takes each spring for a fast one; the exact flow is the exponential.
     """
-    m, k = np.atleast_1d(np.asarray(m, np.longdouble)), np.atleast_1d(np.asarray(k, np.longdouble))
-    m, k = np.broadcast_arrays(m, k)
-    friction = np.asarray(c, np.longdouble)
+    m, k, friction = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    if scheme.flow:
+        return _exponential(m, k, friction, h)
 
     def force(q: Reals, p: Reals) -> Reals:
         return np.asarray(-k * q - friction * (p / m))
 
+    def none(q: Reals, p: Reals) -> Reals:
+        return np.zeros_like(q)
+
     out = np.empty((len(m), 2, 2), dtype=np.longdouble)
-    if scheme.implicit:
-        for j in range(len(m)):
-            mj, kj = m[j : j + 1], k[j : j + 1]
-
-            def pull(q: Reals, p: Reals, kj: Reals = kj) -> Reals:
-                return np.asarray(-kj * q)
-
-            columns = step(
-                scheme,
-                np.eye(2, dtype=np.longdouble)[0][:, None],
-                np.eye(2, dtype=np.longdouble)[1][:, None],
-                h=h,
-                m=mj,
-                force=pull,
-                stiffness=kj[:, None],
-            )
-            out[j, 0], out[j, 1] = columns[0][:, 0], columns[1][:, 0]
-        return out
     ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
-    q, p = step(scheme, np.stack([ones, zeros]), np.stack([zeros, ones]), h=h, m=m, force=force)
+    q, p = step(
+        scheme,
+        np.stack([ones, zeros]),
+        np.stack([zeros, ones]),
+        h=h,
+        m=m,
+        force=force,
+        stiffness=k,
+        rate=friction / m if np.any(friction) else None,
+        parts=(none, force),
+    )
     out[:, 0, :], out[:, 1, :] = q.T, p.T
     return out
+
+
+def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
+    """The exact flow (n, 2, 2), of any damping: of exp(h L) with L = N - g I, N**2 is a multiple of I."""
+    eye = np.eye(2, dtype=np.longdouble)
+    t = np.longdouble(h)
+    generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
+    generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
+    g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
+    traceless = generator + g[:, None, None] * eye
+    w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
+    w = np.sqrt(np.abs(w2))
+    safe = np.where(w == 0, 1, w)
+    even = np.where(w2 >= 0, np.cos(w * t), np.cosh(np.where(w2 < 0, w, 0) * t))
+    odd = np.where(w2 >= 0, np.sin(w * t), np.sinh(np.where(w2 < 0, w, 0) * t)) / safe
+    odd = np.where(w == 0, t, odd)
+    decay = np.exp(-g * t)
+    return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
+
+
+def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
+    """One-step matrix (2n, 2n) on (q - q*, p - p*) of a linear scene, q* and p* a state that stays.
+
+    Found by stepping the unit vectors and taking off what the state 0 becomes; it serves scenes whose
+    modes a scheme mixes.
+    """
+    n = scene.n
+    z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
+    slow, fast = mechanics.split(scene.terms)
+    q, p = step(
+        scheme,
+        z[:, :n],
+        z[:, n:],
+        h=h,
+        m=scene.m.astype(np.longdouble),
+        force=mechanics.force(scene.terms),
+        stiffness=mechanics.stiffness(scene, scene.q) if scheme.implicit else None,
+        rate=mechanics.rates(scene),
+        parts=(mechanics.force(slow), mechanics.force(fast)),
+    )
+    after = np.concatenate([q, p], axis=1)
+    return np.asarray((after[1:] - after[0]).T, np.longdouble)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -420,7 +561,10 @@ class Rotation:
 
 
 def rotation(matrices: Extended) -> Rotation:
-    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2)."""
+    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2).
+
+    Where the determinant is not positive a step turns area over and has neither.
+    """
     a, b = matrices[:, 0, 0], matrices[:, 0, 1]
     c, d = matrices[:, 1, 0], matrices[:, 1, 1]
     determinant = a * d - b * c
@@ -508,9 +652,17 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     worst mode counts; (f,) each.  At the edge of stability |M**i| grows with i, and the sum with j**2.
     """
     turn = rotation(matrices)
-    d = np.abs(turn.determinant)
-    root = np.sqrt(d)
-    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(turn.growth))
+    half = (matrices[:, 0, 0] + matrices[:, 1, 1]) / 2
+    split = np.sqrt(np.maximum(half * half - turn.determinant, 0))
+    larger = half + np.where(half < 0, -split, split)
+    # where area turns over or vanishes the eigenvalues are real and of unlike sign: powers are bounded by
+    # the larger one, x**i (1 + 2 |M - x| / |x - y|), instead of by the root of the determinant
+    over = turn.determinant <= 0
+    root = np.where(over, np.abs(larger), np.sqrt(np.abs(turn.determinant)))
+    root = np.where(root > 0, root, 1)
+    growth = np.where(over, 0, turn.growth)
+    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(growth))
+    near = np.where(over, larger / root, near)
     rest = np.stack(
         [
             np.stack([matrices[:, 0, 0] / root - near, w * matrices[:, 0, 1] / root], axis=-1),
@@ -519,9 +671,10 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
         axis=-2,
     )
     size = np.sqrt(np.sum(rest * rest, axis=(-2, -1)))
-    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(turn.growth))
+    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(growth))
+    sine = np.where(over, split / root, sine)
     longest = np.where(sine > 0, 1 / np.where(sine > 0, sine, 1), np.inf)
-    radius = np.maximum(root * np.exp(turn.growth), 1)
+    radius = np.maximum(root * np.exp(growth), 1)
     j = np.asarray(steps).astype(np.longdouble)[:, None]
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):

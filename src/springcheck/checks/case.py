@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,23 @@ class Case:
 
     @cached_property
     def linear(self) -> bool:
-        return mechanics.is_linear(self.scene)
+        """Whether each normal mode has a one-step matrix of its own."""
+        return mechanics.has_modes(self.scene) and not self.scheme.mixes
+
+    @property
+    def area_preserving(self) -> bool:
+        """Whether every step keeps area: a symplectic scheme, and no friction."""
+        return self.scheme.symplectic and not mechanics.is_damped(self.scene)
+
+    @cached_property
+    def law(self) -> dict[str, Any]:
+        """What `schemes.step` and `schemes.magnitude_step` need beside the forces."""
+        scene = self.judged
+        stiff: Extended | None = None
+        if self.scheme.implicit:
+            of = mechanics.own_stiffness if mechanics.is_separate(scene) else mechanics.stiffness
+            stiff = of(scene, scene.q)
+        return {"stiffness": stiff, "rate": mechanics.rates(scene) if mechanics.is_damped(scene) else None}
 
     @cached_property
     def modes(self) -> exact.Modes:
@@ -50,7 +67,7 @@ class Case:
     def matrices(self) -> Extended:
         """One-step matrices of the modes, on (y, v)."""
         one = np.ones(1, dtype=np.longdouble)
-        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2)
+        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2, c=self.modes.rate)
 
     @cached_property
     def w(self) -> Extended:
@@ -78,9 +95,10 @@ class Case:
         q, p = np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
         sizes = mechanics.magnitude(scene.terms)
-        stiff = mechanics.stiffness(scene, scene.q) if self.scheme.implicit else None
+        slow, fast = mechanics.split(scene.terms)
+        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
         size_q, size_p = schemes.magnitude_step(
-            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, stiffness=stiff
+            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
         )
         # an engine may count positions from where the springs rest, and so round those
         size_q = size_q + np.abs(self.rest_positions)
@@ -175,11 +193,14 @@ def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended,
     """So many steps of the scheme from states (f, n), in extended precision."""
     scene = case.judged
     force = mechanics.force(scene.terms)
+    slow, fast = mechanics.split(scene.terms)
+    parts = mechanics.force(slow), mechanics.force(fast)
     m = scene.m.astype(np.longdouble)
     a: Reals = q
     b: Reals = p
-    stiff = mechanics.stiffness(scene, scene.q) if case.scheme.implicit else None
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(steps):
-            a, b = schemes.step(case.scheme, a, b, h=case.trajectory.step, m=m, force=force, stiffness=stiff)
+            a, b = schemes.step(
+                case.scheme, a, b, h=case.trajectory.step, m=m, force=force, parts=parts, **case.law
+            )
     return np.asarray(a), np.asarray(b)

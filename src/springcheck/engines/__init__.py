@@ -157,4 +157,10 @@ def refusal(scene: Scene, label: Label) -> str | None:
     missing = sorted({term.key for term in scene.terms} - what.terms)
     if missing:
         return f"it has no {' and no '.join(missing)} term"
+    here = {term.key for term in scene.terms}
+    if any(getattr(term, "fast", False) for term in scene.terms):
+        here.add("springs marked fast")
+    needed = sorted(what.requires - here)
+    if needed:
+        return f"it is for scenes with {' and '.join(needed)}"
     return None

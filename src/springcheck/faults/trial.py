@@ -213,7 +213,11 @@ def clean_engine(run: Run, label: str, seed: int) -> Clean:
     return _judged(where, label, run, seed, _QUICK)
 
 
-_FIXED = tuple(name for name, scheme in schemes.SCHEMES.items() if scheme.one_step)
+_FIXED = tuple(
+    name
+    for name, scheme in schemes.SCHEMES.items()
+    if scheme.one_step and not scheme.flow and not scheme.mixes
+)
 _QUICK = tuple(check for check in checks.THOROUGH if checks.name(check) not in SLOW)
 
 

@@ -104,7 +104,9 @@ def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
     axes = figure.add_subplot()
     truth = _truth(scene, groups)
     if truth is not None:
-        axes.plot(truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion")
+        axes.plot(
+            truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion"
+        )
     _overlay(axes, groups, lambda run: (run.q[:, 0], run.p[:, 0]))
     axes.plot(*[[float(x[0])] for x in (scene.q, scene.p)], "k+", markersize=10, label="start")
     axes.set_xlabel(f"{_q(scene)}{q_unit}")
@@ -132,25 +134,32 @@ def _position(scene: Scene, groups: Sequence[Group]) -> Figure:
 
 
 def _energy(scene: Scene, groups: Sequence[Group]) -> Figure:
-    _, _, t_unit, _ = _units(scene)
-    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
-    axes = figure.add_subplot()
+    """Energy over time, and below it how far it is from the start's on a logarithmic scale."""
+    _, _, t_unit, e_unit = _units(scene)
+    figure = Figure(figsize=(7.6, 6.2), layout="constrained")
+    upper, lower = figure.subplots(2, sharex=True)
     start = float(mechanics.energy(scene, scene.q, scene.p))
+    unit = abs(start) or 1.0
 
-    def pick(run: Trajectory) -> tuple[Floats, Floats]:
+    def energies(run: Trajectory) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            energy = np.asarray(mechanics.energy(scene, run.q, run.p), np.float64)
-        return run.t, energy / start if start else energy
+            return np.asarray(mechanics.energy(scene, run.q, run.p), np.float64)
 
-    axes.axhline(1.0 if start else 0.0, color="#999999", linewidth=4, alpha=0.6, label="true motion")
-    _overlay(axes, groups, pick)
-    low, high = axes.get_ylim()
+    upper.axhline(start / unit, color="#999999", linewidth=4, alpha=0.6, label="true motion")
+    _overlay(upper, groups, lambda run: (run.t, energies(run) / unit))
+    low, high = upper.get_ylim()
     if low > 0 and high / low > 20:
-        axes.set_yscale("log")
-    axes.set_xlabel(f"time t{t_unit}")
-    axes.set_ylabel("energy / energy of the start" if start else "energy")
-    axes.set_title(f"{scene.title}: energy")
-    _legend(figure, axes)
+        upper.set_yscale("log")
+    upper.set_ylabel("energy / energy of the start" if start else f"energy{e_unit}")
+    upper.set_title(f"{scene.title}: energy")
+
+    # below one unit in the last place there is nothing to see: such points stand on the lower edge
+    floor = 2.0**-53
+    _overlay(lower, groups, lambda run: (run.t, np.maximum(np.abs(energies(run) - start) / unit, floor)))
+    lower.set_yscale("log")
+    lower.set_xlabel(f"time t{t_unit}")
+    lower.set_ylabel("|energy - start| / start" if start else f"|energy - start|{e_unit}")
+    _legend(figure, upper)
     return figure
 
 

@@ -27,10 +27,9 @@ from springcheck.store.reading import (
     verdicts,
     windows,
 )
-from springcheck.store.tables import Comparison, Table
+from springcheck.store.tables import Table
 
 __all__ = [
-    "Comparison",
     "Draft",
     "Finding",
     "Foreign",

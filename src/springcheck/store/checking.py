@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import files, foreign, layout, reading, seal, tables
+from springcheck.store import files, layout, reading, seal, tables, trust
 from springcheck.store.draft import combined
 from springcheck.store.layout import Column
 
@@ -68,9 +69,8 @@ def check_file(path: Path) -> list[Finding]:
                     place="/", what="bytes of groups, attributes or tables have changed since it was written"
                 )
             )
-        limit = 30 + path.stat().st_size / 5e6
     try:
-        said = foreign.guarded("springcheck.store.checking", path, limit)
+        said = trust.guarded(trust.OURS, path)
         found += [Finding(place=place, what=what) for place, what in json.loads(said)]
     except StoreError as error:
         found.append(Finding(place="/", what=str(error)))
@@ -162,8 +162,6 @@ def _particles(file: Any, label: str, quantities: list[str], frames: int, n: int
 
 
 def _digest(dataset: Any) -> str:
-    import hashlib
-
     total = hashlib.sha256()
     rows = max(1, PIECE // max(1, int(np.prod(dataset.shape[1:]))))
     for start in range(0, len(dataset), rows):

@@ -10,13 +10,12 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import h5py
 import numpy as np
 
 from springcheck.model import Floats, Scene
@@ -41,14 +40,15 @@ class Draft:
         self._hash = {name: hashlib.sha256() for name in self._columns}
         widest = max(column.size for column in self._columns.values()) // scene.frames
         length = max(1, min(scene.frames, BUFFER // widest))
-        self._buffer = {
-            name: np.empty((length, *column.shape[1:]), column.dtype)
-            for name, column in self._columns.items()
-        }
+        self._buffer, self._spare = (
+            {name: np.empty((length, *c.shape[1:]), c.dtype) for name, c in self._columns.items()}
+            for _ in range(2)
+        )
         self._held, self._length = 0, length
         self._offsets: dict[str, int] = {}
         self._file: Any = None
         self._threads: ThreadPoolExecutor | None = None
+        self._running: list[Future[None]] = []
 
     def append(self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None) -> None:
         """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies.
@@ -73,7 +73,8 @@ class Draft:
                 if name in self._columns and values is not None:
                     self._buffer[name][into] = values[rows]
             if "velocity" in self._columns:
-                np.divide(p[rows], self.scene.m, out=self._buffer["velocity"][into])
+                with np.errstate(over="ignore"):
+                    np.divide(p[rows], self.scene.m, out=self._buffer["velocity"][into])
             first = self.rows + done
             self._buffer["step"][into] = np.arange(first, first + count) * self.scene.every
             self._held += count
@@ -93,6 +94,7 @@ class Draft:
             if self._file is None:
                 self._create(self.rows)
             self._flush()
+            self._wait()
             self._close()
             if self.rows < self._columns["time"].shape[0]:
                 self._shorten()
@@ -106,22 +108,32 @@ class Draft:
         self._file = self._temporary.open("rb+", buffering=0)
 
     def _flush(self) -> None:
+        """Write what is held: at once where it is all there is, else behind the caller's back."""
         if not self._held:
             return
         with files.told(self.path.parent, "write into"):
+            self._wait()
             if self._file is None:
                 self._create(self.scene.frames)
             first = self._written
             filled = {name: buffer[: self._held] for name, buffer in self._buffer.items()}
             if self._held == self._length < self.scene.frames:
-                if self._threads is None:
-                    self._threads = ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1))
-                list(self._threads.map(lambda name: self._write(name, filled[name], first), filled))
+                self._threads = self._threads or ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1))
+                self._running = [
+                    self._threads.submit(self._write, name, values, first) for name, values in filled.items()
+                ]
+                self._buffer, self._spare = self._spare, self._buffer
             else:
                 for name, values in filled.items():
                     self._write(name, values, first)
         self._written += self._held
         self._held = 0
+
+    def _wait(self) -> None:
+        """Until the last buffers are written; raises what went wrong there."""
+        running, self._running = self._running, []
+        for done in running:
+            done.result()
 
     def _write(self, name: str, values: np.ndarray, first: int) -> None:
         self._hash[name].update(values.data)
@@ -150,10 +162,12 @@ class Draft:
         digests = {name: total.hexdigest() for name, total in self._hash.items()}
         digest = combined(digests, self._columns)
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        with h5py.File(self._temporary, "r+", libver=layout.LIBVER, locking=False) as file:
-            layout.begin(file, {"part": self.label})
+        given = {name: value for name, value in attributes.items() if value is not None}
+        text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.text])
+        with layout.reopened(self._temporary, text) as file:
+            layout.begin(file)
+            layout.write_attributes(file, {"part": self.label})
             parameters = file.create_group(f"parameters/{self.label}")
-            given = {name: value for name, value in attributes.items() if value is not None}
             known: dict[str, Scalar] = {
                 "scene": self.scene.text,
                 "scene_name": self.scene.name,
@@ -212,10 +226,5 @@ def _lay_out(
     path: Path, label: str, scene: Scene, frames: int, columns: Mapping[str, Column]
 ) -> dict[str, int]:
     total = sum(column.size for column in columns.values())
-    files.room(path, total + layout.MARGIN)
-    path.unlink(missing_ok=True)
-    with h5py.File(path, "x", libver=layout.LIBVER, locking=False) as file:
-        offsets = layout.skeleton(file, label, scene, frames)
-    with path.open("rb+") as file:
-        files.reserve(file, file.seek(0, os.SEEK_END) + layout.MARGIN + len(scene.text.encode()))
-    return offsets
+    with layout.fresh(path, total) as file:
+        return layout.skeleton(file, label, scene, frames)

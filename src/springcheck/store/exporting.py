@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import h5py
-
 from springcheck.errors import StoreError
 from springcheck.store import files, layout, reading
 
@@ -30,7 +28,6 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
         if group is None:
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
         total = sum(group[name]["value"].size * 8 for name in _ELEMENTS if name in group)
-        files.room(out, total + layout.MARGIN)
         temporary = out.with_name(out.name + ".new")
         with files.told(out, "write"):
             try:
@@ -41,13 +38,8 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
 
 
 def _write(path: Path, file: Any, group: Any, label: str, total: int) -> None:
-    path.unlink(missing_ok=True)
-    with h5py.File(path, "x", libver=layout.LIBVER, locking=False):
-        pass
-    with path.open("rb+") as raw:
-        files.reserve(raw, 2 * total + layout.MARGIN)
-    with h5py.File(path, "r+", libver=layout.LIBVER, locking=False) as out:
-        layout.begin(out, {})
+    with layout.fresh(path, 2 * total) as out:
+        layout.begin(out)
         target = out.create_group("particles/trajectory")
         file.copy(group["box"], target, "box")
         first: Any = None

@@ -1,12 +1,10 @@
 """Trajectories that other programs wrote: any H5MD file with positions and velocities.
 
-libhdf5 can crash on a damaged file, so a file that does not carry our seal is first read by a process of
-its own (`guarded`); what survives that is read again here.
+Run as a program on a file, it says what is wrong with it, and nothing where it can be read.
 """
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.model import Floats
-from springcheck.store import files, seal
+from springcheck.store import files, trust
 
 EXPANSION = 1100
 """More than deflate can expand (1032); an array that claims more than this times the file is damaged."""
@@ -48,41 +46,8 @@ def read_foreign(path: str | Path) -> dict[str, Foreign]:
     file is no H5MD, holds no velocities, or is damaged.
     """
     path = Path(path)
-    trust(path, "springcheck.store.foreign")
+    trust.trust(path, trust.FOREIGN)
     return _load(path)
-
-
-def trust(path: Path, module: str) -> None:
-    """Return when libhdf5 can read a file without harm to this process: sealed, or tried by another."""
-    with files.told(path, "read"):
-        found = seal.find(path)
-        if found is not None and seal.is_whole(path, found):
-            return
-        size = path.stat().st_size
-    said = guarded(module, path, limit=30 + size / 5e6)
-    if said:
-        raise StoreError(said)
-
-
-def guarded(module: str, path: Path, limit: float) -> str:
-    """Run a module of ours on a file in a process of its own, `limit` seconds -> what it printed.
-
-    Raises StoreError when it crashes or takes longer.
-    """
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", module, str(path)],
-            capture_output=True,
-            text=True,
-            timeout=limit,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
-    except subprocess.TimeoutExpired:
-        raise StoreError(f"cannot read {path}: it is damaged, reading it does not end") from None
-    if done.returncode:
-        raise StoreError(f"cannot read {path}: it is damaged, reading it crashes the HDF5 library")
-    return done.stdout.strip()
 
 
 def _load(path: Path) -> dict[str, Foreign]:

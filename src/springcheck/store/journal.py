@@ -17,13 +17,17 @@ from pathlib import Path
 from types import TracebackType
 from urllib.parse import quote
 
+import h5py
+
 from springcheck.errors import StoreError
-from springcheck.model import Scene, Trajectory, Verdict
-from springcheck.store import files, layout, merge, reading, tables
+from springcheck.model import Comparison, Scene, Trajectory, Verdict
+from springcheck.store import adopt, files, layout, merge, reading, tables
 from springcheck.store.draft import Draft
 from springcheck.store.layout import Scalar
 from springcheck.store.reading import Parts, parts_folder
-from springcheck.store.tables import Comparison, Table
+from springcheck.store.tables import Table
+
+COLLECTION = "collection.new"
 
 
 def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
@@ -61,6 +65,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     known = reading.claim(parts)
     if known is not None and not force:
         if known["command"] == command:
+            adopt.recover(parts, parts / COLLECTION)
             for left in parts.glob("*.new*"):
                 left.unlink()
             return known["run"]
@@ -84,6 +89,18 @@ def _leave(parts: Path) -> None:
     with contextlib.suppress(OSError):
         if {entry.name for entry in parts.iterdir()} <= {"lock"}:
             shutil.rmtree(parts)
+
+
+def _give_up(temporary: Path) -> None:
+    """After a commit that failed: the adopted part goes back, the disk is free again.
+
+    Not while libhdf5 still holds the file, which it might write to later; then the next writer does it.
+    """
+    held = h5py.h5f.get_obj_ids(h5py.h5f.OBJ_ALL, h5py.h5f.OBJ_FILE)
+    if not any(Path(h5py.h5f.get_name(one).decode()) == temporary for one in held):
+        with contextlib.suppress(OSError):
+            adopt.recover(temporary.parent, temporary)
+            temporary.unlink(missing_ok=True)
 
 
 class Journal:
@@ -149,15 +166,17 @@ class Journal:
         if scene is not None:
             root |= {"scene": scene.text, "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)
-        temporary = self.folder / "collection.new"
+        temporary = self.folder / COLLECTION
         with files.told(self.path, "write"):
             try:
                 merge.collection(temporary, found, root, extra, documents or {})
-                files.put(temporary, self.path)
-            finally:
-                temporary.unlink(missing_ok=True)
+            except BaseException:
+                _give_up(temporary)
+                raise
+            files.put(temporary, self.path)
+            adopt.settled(self.folder)
             for part in found.parts:
-                part.unlink()
+                part.unlink(missing_ok=True)
             if final:
                 self._end()
 

@@ -17,10 +17,14 @@ y and z are a fill value, so it costs no bytes.  `time` and `step` are hard link
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
@@ -28,6 +32,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.model import Scene
+from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool
 
@@ -120,20 +125,43 @@ def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
             node.attrs[name] = value
 
 
-def begin(file: Any, root: Mapping[str, Scalar]) -> None:
+def begin(file: Any) -> None:
     """The head of every file of ours: /h5md and what it is."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        ours = version("springcheck")
-    except PackageNotFoundError:
-        ours = "unknown"
-    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT, **root})
+    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
-    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": ours})
+    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": _ours()})
     head.create_group("modules/units").attrs["version"] = np.array([1, 0], dtype=np.int32)
+
+
+@lru_cache(maxsize=1)
+def _empty() -> bytes:
+    with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+@contextlib.contextmanager
+def fresh(path: Path, size: int) -> Iterator[Any]:
+    """A new HDF5 file, open for writing, with room for `size` bytes taken up on the disk beforehand.
+
+    libhdf5 cannot close a file whose last write failed, and crashes the interpreter at its end: so it is
+    never the one to find the disk full.
+    """
+    files.room(path, size)
+    path.write_bytes(_empty())
+    with reopened(path, size) as file:
+        yield file
+
+
+@contextlib.contextmanager
+def reopened(path: Path, size: int) -> Iterator[Any]:
+    """A file of ours, open for writing, with room for `size` more bytes taken up beforehand."""
+    with path.open("rb+") as raw:
+        files.reserve(raw, raw.seek(0, os.SEEK_END) + size + MARGIN)
+    with h5py.File(path, "r+", libver=LIBVER, locking=False) as file:
+        yield file
 
 
 def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]:
@@ -201,9 +229,17 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
     write_attributes(group["mass"], {"unit": unit["mass"], "units": unit["mass"]})
 
 
+def _ours() -> str:
+    try:
+        return version("springcheck")
+    except PackageNotFoundError:
+        return "unknown"
+
+
 def machine() -> dict[str, Scalar]:
-    """What ran the program."""
+    """What ran, and on what."""
     return {
+        "springcheck": _ours(),
         "machine": platform.machine(),
         "processor": _processor(),
         "cores": os.cpu_count() or 0,

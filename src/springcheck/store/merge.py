@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import files, layout, seal, tables
+from springcheck.store import adopt, files, layout, seal, tables
 from springcheck.store.layout import Scalar
 from springcheck.store.reading import Parts
 from springcheck.store.tables import Table
@@ -26,19 +26,27 @@ def collection(
     extra: Sequence[Table],
     documents: Mapping[str, str],
 ) -> None:
-    """Write a sealed file of everything in `found`, of the tables in `extra` and of the documents."""
-    sources = found.parts + ([found.collection] if found.collection else [])
+    """Write a sealed file of everything in `found`, of the tables in `extra` and of the documents.
+
+    The largest part, if it is large, is renamed to `path` instead of copied (see `adopt`).
+    """
+    base = adopt.choice(found.parts)
+    sources = [*(part for part in found.parts if part != base), *found.collections]
     total = sum(source.stat().st_size for source in sources)
     text = sum(len(document.encode()) for document in documents.values())
     margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
-    files.room(path, total + margin)
-    path.unlink(missing_ok=True)
-    with h5py.File(path, "x", libver=layout.LIBVER, locking=False):
-        pass
-    with path.open("rb+") as file:
-        files.reserve(file, total + margin)
-    with h5py.File(path, "r+", libver=layout.LIBVER, locking=False) as file:
-        layout.begin(file, root)
+    if base is None:
+        kept: tuple[seal.Extent, ...] = ()
+        made = layout.fresh(path, total + margin)
+    else:
+        files.room(path, total + margin)
+        kept = adopt.adopt(base, path)
+        made = layout.reopened(path, total + margin)
+    with made as file:
+        if base is None:
+            layout.begin(file)
+        file.attrs.pop("part", None)
+        layout.write_attributes(file, root)
         for source in sources:
             with h5py.File(source, "r", locking="best-effort") as part:
                 _take(file, part)
@@ -51,9 +59,12 @@ def collection(
         _plots(file)
         extents = _extents(file)
         _check_tables(file, path)
-    with path.open("rb") as file:
+    there = {(extent.offset, extent.sha256) for extent in kept}
+    with path.open("rb") as raw:
         for extent in extents:
-            if seal.digest(file, extent.offset, extent.size) != extent.sha256:
+            if (extent.offset, extent.sha256) in there:
+                continue
+            if seal.digest(raw, extent.offset, extent.size) != extent.sha256:
                 raise StoreError(f"{extent.name} was damaged on its way into {path}: check disk and memory")
     seal.attach(path, extents)
 
@@ -61,7 +72,8 @@ def collection(
 def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
     """A small sealed file of tables, as bytes."""
     with h5py.File("image", "w", driver="core", backing_store=False, libver=layout.LIBVER) as file:
-        layout.begin(file, root)
+        layout.begin(file)
+        layout.write_attributes(file, root)
         for table in content:
             tables.write(file, table)
         file.flush()

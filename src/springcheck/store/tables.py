@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from springcheck.model import Floats, Verdict
+from springcheck.model import Comparison, Verdict
 from springcheck.store.layout import RESERVED, Scalar, write_attributes
 
 _PASSED = {None: -1, False: 0, True: 1}
@@ -30,16 +30,6 @@ class Table:
     attributes: Mapping[str, Scalar] = field(default_factory=dict)
     signal: str = ""
     axes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison:
-    """Largest difference between every two trajectories, (labels, labels), in one unit."""
-
-    labels: tuple[str, ...]
-    max_difference: Floats
-    unit: str = "1"
-    about: str = ""
 
 
 def write(file: Any, table: Table) -> None:
@@ -166,8 +156,8 @@ def of_comparison(comparison: Comparison) -> Table:
     return Table(
         name="comparison",
         columns={"labels": list(comparison.labels), "max_difference": comparison.max_difference},
-        units={"max_difference": comparison.unit},
-        attributes={"about": comparison.about},
+        units={"max_difference": "1"},
+        attributes={"about": "largest difference over all frames, in units of the start"},
         signal="max_difference",
     )
 
@@ -177,6 +167,4 @@ def to_comparison(table: Table) -> Comparison:
     return Comparison(
         labels=tuple(str(label) for label in table.columns["labels"]),
         max_difference=np.asarray(table.columns["max_difference"], dtype=np.float64),
-        unit=table.units.get("max_difference", "1"),
-        about=str(table.attributes.get("about", "")),
     )

@@ -12,9 +12,17 @@ _PRECISIONS = ("", "-single", "-mixed", "-double")
 _PLATFORMS = ("Reference", "CPU", *(name + precision for name in _GPU for precision in _PRECISIONS))
 
 
-def _method(name: str, scheme: str, about: str, *, rebuilds: bool = False) -> Method:
+def _method(
+    name: str, scheme: str, about: str, *, rebuilds: bool = False, terms: str = "", requires: str = ""
+) -> Method:
     return Method(
-        engine="openmm", name=name, scheme=scheme, about=about, terms=_TERMS, rebuilds_velocity=rebuilds
+        engine="openmm",
+        name=name,
+        scheme=scheme,
+        about=about,
+        terms=_TERMS | ({terms} if terms else set()),
+        requires=frozenset({requires} if requires else ()),
+        rebuilds_velocity=rebuilds,
     )
 
 
@@ -33,6 +41,16 @@ ENGINE = Engine(
             _method("leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", rebuilds=True),
             _method("euler", "explicit-euler", "explicit Euler by CustomIntegrator"),
             _method("semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator"),
+            _method(
+                "langevin-middle",
+                "langevin-middle",
+                "LangevinMiddleIntegrator at T = 0, started and read synchronised",
+                terms="damping",
+                requires="damping",
+            ),
+            _method(
+                "mts", "respa8", "MTSIntegrator, fast springs 8 times a step", requires="springs marked fast"
+            ),
         )
     },
 )

@@ -7,6 +7,14 @@ where the spring is at rest: a bond of rest length 0 works through q = 0 and cos
 `VerletIntegrator` is a leapfrog: the velocity that it stores belongs to t - h/2, and it takes the one
 that it is handed for that.  Handed v0 it is the kick-drift Euler ("leapfrog" here).  Handed
 v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("verlet" here).
+
+`LangevinMiddleIntegrator` kicks, drifts half a step, lets friction and noise act on the velocity,
+and drifts the other half.  At T = 0 there is no noise, and read like "verlet" it is the symmetric
+scheme pull-drift-friction-drift-pull.  Its friction is one rate c/m for all particles.
+
+OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every
+scheme here turns into its own -h under that reflection, because the force does not depend on p.
+Friction does, and goes forwards only.
 """
 
 from __future__ import annotations
@@ -16,7 +24,7 @@ import openmm as mm
 
 from springcheck import mechanics
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
 from springcheck.schemes import SCHEMES
 
 FIXED_POINT = 2.0**-32
@@ -41,7 +49,15 @@ _PRECISIONS = {
 }
 """Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
-displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
+displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference.
+
+The sums are read back times 2**-32 by VerletIntegrator; CustomIntegrator's kernel (8.6.1,
+customIntegratorPerDof.cc) divides by 0xFFFFFFFF, so that its forces are too large by 2.3e-10.  That is
+not the arithmetic it claims, and the checks reject it."""
+
+
+SHIFTED = frozenset({"verlet", "langevin-middle"})
+"""Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
 
 
 def version() -> dict[str, str]:
@@ -58,7 +74,7 @@ def arithmetic(label: Label) -> Arithmetic:
 
 def convention(method: Method) -> str:
     """How the stored velocities were read."""
-    if method.name == "verlet":
+    if method.name in SHIFTED:
         return "stored half a step early by OpenMM; started half a kick back and read half a kick on"
     if method.name == "leapfrog":
         return "as OpenMM stores them, taken for synchronised"
@@ -66,23 +82,30 @@ def convention(method: Method) -> str:
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """Build system, integrator and context.  MethodError: the platform is not here, or the step negative."""
-    if step < 0:
-        raise MethodError(f"{label}: OpenMM takes no negative step; flip the momenta instead")
+    """Build system, integrator and context.  MethodError: the platform is not here."""
     if arithmetic(label).parameters == "single":
         # the half kicks below must be those of the springs that OpenMM feels
         scene = mechanics.in_single(scene)
     origins = _origins(scene, method)
     system, positions = _system(scene, origins)
-    integrator = _integrator(method.name, step)
+    integrator = _integrator(scene, method.name, step)
     context = _context(system, integrator, label)
-    force = mechanics.force(scene.terms)
-    early = 0.5 * step if method.name == "verlet" else 0.0
+    force = _pull(scene)
+    early = 0.5 * step if method.name in SHIFTED else 0.0
+    m = np.copysign(scene.m, step)
     velocities = np.zeros_like(positions)
-    velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / scene.m
+    with np.errstate(all="ignore"):
+        velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
     context.setPositions(positions)
     context.setVelocities(velocities)
-    return _Context(scene=scene, origins=origins, context=context, integrator=integrator, half_kick=early)
+    return _Context(
+        scene=scene, m=m, origins=origins, context=context, integrator=integrator, half_kick=early
+    )
+
+
+def _pull(scene: Scene) -> Force:
+    """The force that OpenMM computes: all but friction."""
+    return mechanics.force(term for term in scene.terms if not isinstance(term, mechanics.Damping))
 
 
 def _origins(scene: Scene, method: Method) -> Floats:
@@ -95,9 +118,9 @@ def _origins(scene: Scene, method: Method) -> Floats:
     """
     origins = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
-    stiffnesses = [k for term in scene.terms for k in term.k.tolist()]  # type: ignore[attr-defined]
+    springs = [t for t in scene.terms if isinstance(t, mechanics.WallSpring | mechanics.Spring)]
     hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
-    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and min(stiffnesses, default=0.0) >= 0
+    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
@@ -134,8 +157,10 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for m in scene.m.tolist():
         system.addParticle(m)
     x = (scene.q - origins).tolist()
-    bonds = mm.HarmonicBondForce()
+    fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
+    fast.setForceGroup(1)
     for term in scene.terms:
+        bonds = fast if getattr(term, "fast", False) else slow
         if isinstance(term, mechanics.WallSpring):
             anchors: dict[float, int] = {}
             for i, k, at in zip(
@@ -151,16 +176,32 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
             ):
                 bonds.addBond(a, b, length, k)
-    if bonds.getNumBonds():
-        system.addForce(bonds)
+    for bonds in (slow, fast):
+        if bonds.getNumBonds():
+            system.addForce(bonds)
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
 
 
-def _integrator(name: str, step: float) -> mm.Integrator:
+def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
+    if name == "langevin-middle" and step < 0:
+        raise MethodError(
+            f"openmm:langevin-middle: time.step = {step:g}: OpenMM's friction goes forwards in time only"
+        )
+    step = abs(step)
     if name in ("verlet", "leapfrog"):
         return mm.VerletIntegrator(step)
+    if name == "mts":
+        return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
+    if name == "langevin-middle":
+        rate = mechanics.rates(scene).astype(np.float64)
+        if np.ptp(rate) > 2.0**-52 * np.max(rate):
+            raise MethodError(
+                "openmm:langevin-middle has one friction rate for all particles, and damping/mass of scene "
+                f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}; leave the method out"
+            )
+        return mm.LangevinMiddleIntegrator(0.0, float(rate[0]), step)
     integrator = mm.CustomIntegrator(step)
     if name == "euler":
         integrator.addPerDofVariable("v0", 0)
@@ -192,6 +233,7 @@ class _Context:
         self,
         *,
         scene: Scene,
+        m: Floats,
         origins: Floats,
         context: mm.Context,
         integrator: mm.Integrator,
@@ -201,9 +243,9 @@ class _Context:
         self.off_axis = 0.0
         self._context = context
         self._integrator = integrator
-        self._m = scene.m
+        self._m = m
         self._origins = origins if np.any(origins) else None
-        self._force = mechanics.force(scene.terms)
+        self._force = _pull(scene)
         self._half_kick = half_kick
         self._x = np.zeros((context.getSystem().getNumParticles(), 3))
         self._v = np.zeros_like(self._x)

@@ -6,7 +6,7 @@ from springcheck.engines import Engine
 from springcheck.model import Method
 
 _KINDS = frozenset({"particles", "circuit", "rotor"})
-_LINEAR = frozenset({"wall-spring", "spring"})
+_LINEAR = frozenset({"wall-spring", "spring", "damping"})
 _TERMS = _LINEAR | {"quartic"}
 
 

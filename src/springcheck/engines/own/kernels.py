@@ -5,11 +5,12 @@ they overflow); compiled, they are arrays.  So no kernel may contain what rounds
 there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
 
 Every kernel takes `(every, h, *constants, q, p, qs, ps)`, fills row after row of qs and ps (f, n) with
-the state `every` steps later, and returns the last state.  There are three layouts:
+the state `every` steps later, and returns the last state.  There are four layouts:
 
 one     a single particle on one spring at rest in 0; its state stays in two registers
 many    particles side by side, each on one wall spring: n systems in one
 joined  any terms; forces are summed over the terms in the order of `forces`, then over each term's list
+chain   springs between neighbours, for implicit Euler: its equations are tridiagonal then
 
 To add a term to `joined`: write its loop, add it to `HELPERS` and `forces`, and name its fields in
 `simulation.FIELDS`.
@@ -22,17 +23,27 @@ from typing import Any, TypeAlias
 
 Row: TypeAlias = Any
 """A list of numbers, or a one-dimensional array of them."""
+Rows: TypeAlias = Any
+"""A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
 Terms: TypeAlias = Any
 """One tuple of rows for each kind of term, in the order of `simulation.FIELDS`."""
 State: TypeAlias = Any
 Kernel: TypeAlias = Callable[..., State]
 
+FLAGS = {"error_model": "numpy"}
+"""How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
+would contract and reorder.  They stand in this file because numba takes saved code for its own as long
+as this file has not changed, whatever the flags.
+"""
+
 BLOCK = 512
 """Particles of `many` that are carried through all steps before the next ones: 5 rows of 4 KiB stay in
-the first-level cache.  They do not act on each other, so the order changes no number."""
+the first-level cache.  They do not act on each other, so the order changes no number.  The rows of
+`many` are therefore cut into blocks of equal width, (blocks, width), the last one padded; and indices
+count from 0 within a block, because LLVM vectorises no loop in which an index might be negative."""
 
 
-def one_euler(every: int, h: float, m: float, k: float, q: float, p: float, qs: Row, ps: Row) -> State:
+def one_euler(every: int, h: float, m: float, k: float, q: float, p: float, qs: Rows, ps: Rows) -> State:
     """Explicit Euler: both from the old state."""
     for row in range(len(qs)):
         for _ in range(every):
@@ -68,55 +79,64 @@ def one_implicit_euler(
     return q, p
 
 
-def many_euler(every: int, h: float, m: Row, k: Row, at: Row, q: Row, p: Row, qs: Row, ps: Row) -> State:
+def many_euler(
+    every: int, h: float, m: Rows, k: Rows, at: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
+) -> State:
     """Explicit Euler of independent wall springs."""
-    for first in range(0, len(m), BLOCK):
-        last = min(first + BLOCK, len(m))
+    for block in range(len(m)):
+        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
+        first = block * len(mb)
         for row in range(len(qs)):
             for _ in range(every):
-                for i in range(first, last):
-                    x = q[i]
-                    q[i] = x + (p[i] / m[i]) * h
-                    p[i] = p[i] + (-k[i] * (x - at[i])) * h
-            for i in range(first, last):
-                qs[row, i] = q[i]
-                ps[row, i] = p[i]
+                for i in range(len(mb)):
+                    x = qb[i]
+                    qb[i] = x + (pb[i] / mb[i]) * h
+                    pb[i] = pb[i] + (-kb[i] * (x - ab[i])) * h
+            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
+            for i in range(len(out_q)):
+                out_q[i] = qb[i]
+                out_p[i] = pb[i]
     return q, p
 
 
 def many_semi_implicit_euler(
-    every: int, h: float, m: Row, k: Row, at: Row, q: Row, p: Row, qs: Row, ps: Row
+    every: int, h: float, m: Rows, k: Rows, at: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
 ) -> State:
     """Semi-implicit Euler of independent wall springs."""
-    for first in range(0, len(m), BLOCK):
-        last = min(first + BLOCK, len(m))
+    for block in range(len(m)):
+        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
+        first = block * len(mb)
         for row in range(len(qs)):
             for _ in range(every):
-                for i in range(first, last):
-                    x = p[i] + (-k[i] * (q[i] - at[i])) * h
-                    p[i] = x
-                    q[i] = q[i] + (x / m[i]) * h
-            for i in range(first, last):
-                qs[row, i] = q[i]
-                ps[row, i] = p[i]
+                for i in range(len(mb)):
+                    x = pb[i] + (-kb[i] * (qb[i] - ab[i])) * h
+                    pb[i] = x
+                    qb[i] = qb[i] + (x / mb[i]) * h
+            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
+            for i in range(len(out_q)):
+                out_q[i] = qb[i]
+                out_p[i] = pb[i]
     return q, p
 
 
 def many_implicit_euler(
-    every: int, h: float, m: Row, k: Row, at: Row, inverse: Row, q: Row, p: Row, qs: Row, ps: Row
+    every: int, h: float, m: Rows, k: Rows, at: Rows, inverse: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
 ) -> State:
     """Implicit Euler of independent wall springs, each as in `one_implicit_euler`."""
-    for first in range(0, len(m), BLOCK):
-        last = min(first + BLOCK, len(m))
+    for block in range(len(m)):
+        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
+        db = inverse[block]
+        first = block * len(mb)
         for row in range(len(qs)):
             for _ in range(every):
-                for i in range(first, last):
-                    x = (p[i] + (-k[i] * (q[i] - at[i])) * h) * inverse[i]
-                    p[i] = x
-                    q[i] = q[i] + (x / m[i]) * h
-            for i in range(first, last):
-                qs[row, i] = q[i]
-                ps[row, i] = p[i]
+                for i in range(len(mb)):
+                    x = (pb[i] + (-kb[i] * (qb[i] - ab[i])) * h) * db[i]
+                    pb[i] = x
+                    qb[i] = qb[i] + (x / mb[i]) * h
+            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
+            for i in range(len(out_q)):
+                out_q[i] = qb[i]
+                out_p[i] = pb[i]
     return q, p
 
 
@@ -141,14 +161,21 @@ def quartics(i: Row, b: Row, at: Row, q: Row, f: Row) -> None:
         f[i[s]] += -b[s] * (u * u * u)
 
 
+def dampings(i: Row, c: Row, m: Row, p: Row, f: Row) -> None:
+    """Add -c p/m to f."""
+    for s in range(len(i)):
+        f[i[s]] += -c[s] * (p[i[s]] / m[s])
+
+
 def forces(terms: Terms, q: Row, p: Row, f: Row) -> None:
     """Fill f with the force on every particle."""
-    walls, pairs, wells = terms
+    walls, pairs, wells, brakes = terms
     for i in range(len(f)):
         f[i] = 0.0
     wall_springs(walls[0], walls[1], walls[2], q, f)
     springs(pairs[0], pairs[1], pairs[2], pairs[3], q, f)
     quartics(wells[0], wells[1], wells[2], q, f)
+    dampings(brakes[0], brakes[1], brakes[2], p, f)
 
 
 def joined_euler(
@@ -185,11 +212,12 @@ def joined_semi_implicit_euler(
 
 
 def joined_implicit_euler(
-    every: int, h: float, m: Row, terms: Terms, f: Row, inverse: Row, q: Row, p: Row, qs: Row, ps: Row
+    every: int, h: float, m: Row, terms: Terms, f: Row, inverse: Rows, q: Row, p: Row, qs: Row, ps: Row
 ) -> State:
     """Implicit Euler of linear terms: p' = inverse (p + h F(q)), then drift.
 
-    `inverse` holds the columns of (1 + h**2 K / m)**-1.  Column by column every p[i] is summed in the
+    `terms` hold no friction here: it is in the matrix.  `inverse` holds the columns of
+    (1 + h c/m + h**2 K / m)**-1.  Column by column every p[i] is summed in the
     same order as in a row-wise product, and the inner loop is free of dependences.
     """
     for row in range(len(qs)):
@@ -211,7 +239,45 @@ def joined_implicit_euler(
     return q, p
 
 
-HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, forces)
+def chain_implicit_euler(
+    every: int,
+    h: float,
+    m: Row,
+    terms: Terms,
+    f: Row,
+    lower: Row,
+    inverse: Row,
+    upper: Row,
+    q: Row,
+    p: Row,
+    qs: Rows,
+    ps: Rows,
+) -> State:
+    """Implicit Euler of neighbours: (1 + h**2 K / m) p' = p + h F(q) by its LU factors, then drift.
+
+    `lower` are the multipliers of the rows before, `inverse` 1 over the pivots, `upper` the elements to
+    the right of the diagonal.
+    """
+    for row in range(len(qs)):
+        for _ in range(every):
+            forces(terms, q, p, f)
+            x = 0.0
+            for i in range(len(m)):
+                x = (p[i] + f[i] * h) - lower[i] * x
+                f[i] = x
+            x = 0.0
+            for i in range(len(m) - 1, -1, -1):
+                x = (f[i] - upper[i] * x) * inverse[i]
+                p[i] = x
+            for i in range(len(m)):
+                q[i] = q[i] + (p[i] / m[i]) * h
+        for i in range(len(m)):
+            qs[row, i] = q[i]
+            ps[row, i] = p[i]
+    return q, p
+
+
+HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, dampings, forces)
 """What kernels call, each after what it calls itself."""
 
 ONE: dict[str, Kernel] = {
@@ -229,3 +295,4 @@ JOINED: dict[str, Kernel] = {
     "semi-implicit-euler": joined_semi_implicit_euler,
     "implicit-euler": joined_implicit_euler,
 }
+CHAIN: dict[str, Kernel] = {"implicit-euler": chain_implicit_euler}

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from types import FunctionType
 from typing import Any, cast
@@ -22,16 +22,23 @@ from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Floats, Label, Method, Scene
 
 WORTH = 1_000_000
-"""Spring-steps from which compiling pays: importing numba takes 0.2 s and compiling 0.4 s, the time of
-1.5 million interpreted steps of one spring at 400 ns; less once the compiled code is cached."""
+"""Spring-steps from which compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
+takes 0.15 s, loading saved code 5 ms, compiling it the first time 0.2 to 0.8 s."""
 
 DENSE = 2000
-"""Joined particles that implicit Euler accepts: its matrix fills 8 n**2 bytes, 32 MB here."""
+"""Particles that implicit Euler accepts unless they form a chain: its matrix fills 8 n**2 bytes, 32 MB."""
+
+LANES = 8
+"""Numbers in a cache line of 64 bytes, and in the widest vector."""
+
+STAGGER = 9 * LANES
+"""Numbers left free between two rows of `many`; see `_blocks`."""
 
 FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "wall-spring": (("i",), ("k", "at")),
     "spring": (("a", "b"), ("k", "rest")),
     "quartic": (("i",), ("b", "at")),
+    "damping": (("i",), ("c", "m")),
 }
 """Indices and parameters of each kind of term, in the order in which `kernels.forces` takes them."""
 
@@ -41,6 +48,7 @@ class Layout:
     """A kernel and what it works on: floats, arrays, and tuples of them; `work` spring-steps a step."""
 
     kernel: kernels.Kernel
+    n: int
     constants: tuple[Any, ...]
     q: Any
     p: Any
@@ -114,31 +122,41 @@ def prepare(scene: Scene, method: str, step: float, *, compiled: bool | None = N
 def _layout(scene: Scene, method: str, h: float) -> Layout:
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
     implicit = method == "implicit-euler"
+    # friction is part of what implicit Euler solves for: 1 + h c/m stands where 1 does without it
+    slowed = 1 + h * mechanics.rates(scene).astype(np.float64)
+    if implicit:
+        scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, mechanics.Damping)))
     walls = _single_walls(scene)
     if walls is not None:
         k, at = walls
-        inverse = (1 / (1 + h * h * (k / m)),) if implicit else ()
+        inverse = (1 / (slowed + h * h * (k / m)),) if implicit else ()
         if scene.n == 1 and at[0] == 0:
             constants = tuple(float(x[0]) for x in (m, k, *inverse))
             return Layout(
-                kernel=kernels.ONE[method], constants=constants, q=float(q[0]), p=float(p[0]), work=1
+                kernel=kernels.ONE[method], n=1, constants=constants, q=float(q[0]), p=float(p[0]), work=1
             )
+        q, p, *rows = _blocks((q, p, m, k, at, *inverse))
         return Layout(
-            kernel=kernels.MANY[method], constants=(m, k, at, *inverse), q=q, p=p, work=float(scene.n)
+            kernel=kernels.MANY[method],
+            n=scene.n,
+            constants=tuple(rows),
+            q=q,
+            p=p,
+            work=scene.n,
         )
     terms = tuple(_rows(scene, key) for key in FIELDS)
+    kernel = kernels.JOINED[method]
+    solver: tuple[Floats, ...] = ()
     work = float(scene.n + sum(len(rows[0]) for rows in terms))
-    inverse = ()
-    if implicit:
-        inverse = (_inverse(scene, h),)
+    if implicit and _is_chain(scene):
+        kernel, solver = kernels.CHAIN[method], _factors(scene, h, slowed)
+        work += scene.n
+    elif implicit:
+        solver = (_inverse(scene, h, slowed),)
         # one product and sum of the matrix costs about an eighth of a spring
         work += scene.n**2 / 8
     return Layout(
-        kernel=kernels.JOINED[method],
-        constants=(m, terms, np.zeros(scene.n), *inverse),
-        q=q,
-        p=p,
-        work=work,
+        kernel=kernel, n=scene.n, constants=(m, terms, np.zeros(scene.n), *solver), q=q, p=p, work=work
     )
 
 
@@ -153,6 +171,28 @@ def _single_walls(scene: Scene) -> tuple[Floats, Floats] | None:
     return (k, at) if np.all(count <= 1) else None
 
 
+def _blocks(rows: Sequence[Floats]) -> list[Floats]:
+    """Rows (n,) cut into (blocks, width), the last block filled up with copies of the last particle.
+
+    Every block begins on a cache line: a vector that lies across two of them takes up to three times as
+    long.  And no two rows begin at the same place within a page of 4 KiB, because the processor takes a
+    load for dependent on a recent store to that place in another page.
+    """
+    n = len(rows[0])
+    count = -(-n // kernels.BLOCK)
+    width = n if count == 1 else -(-n // (count * LANES)) * LANES
+    room = -(-count * width // LANES) * LANES + STAGGER
+    memory = np.empty(len(rows) * room + LANES)
+    begin = -(memory.ctypes.data // memory.itemsize) % LANES
+    out = []
+    for row in rows:
+        cut = memory[begin : begin + count * width]
+        cut[:n], cut[n:] = row, row[-1]
+        out.append(cut.reshape(count, width))
+        begin += room
+    return out
+
+
 def _rows(scene: Scene, key: str) -> tuple[Any, ...]:
     """Indices and parameters of all terms of one kind, each (s,); s is 0 where the scene has none."""
     indices, parameters = FIELDS[key]
@@ -164,16 +204,44 @@ def _rows(scene: Scene, key: str) -> tuple[Any, ...]:
     )
 
 
-def _inverse(scene: Scene, h: float) -> Floats:
-    """Columns of (1 + h**2 K / m)**-1, as rows (n, n); not a number throughout where there is none."""
+def _is_chain(scene: Scene) -> bool:
+    """Whether springs join neighbours only and none repels: elimination needs no pivoting then.
+
+    1 + h**2 K / m is tridiagonal, and every diagonal element exceeds the sum of the others in its column.
+    """
+    walls, springs = _rows(scene, "wall-spring"), _rows(scene, "spring")
+    neighbours = np.all(np.abs(springs[0] - springs[1]) == 1)
+    return bool(neighbours and np.all(springs[2] >= 0) and np.all(walls[1] >= 0))
+
+
+def _factors(scene: Scene, h: float, slowed: Floats | float = 1.0) -> tuple[Floats, Floats, Floats]:
+    """LU factors of slowed + h**2 K / m of a chain: multipliers, 1 / pivots, upper diagonal, each (n,)."""
+    (i, k_wall, _), (a, b, k, _) = _rows(scene, "wall-spring"), _rows(scene, "spring")
+    total, link = np.zeros(scene.n), np.zeros(scene.n + 1)
+    np.add.at(total, i, k_wall)
+    np.add.at(total, a, k)
+    np.add.at(total, b, k)
+    np.add.at(link, np.maximum(a, b), k)
+    scale = h * h / scene.m
+    upper = np.append(-link[1:-1] * scale[1:], 0.0)
+    below = np.append(0.0, -link[1:-1] * scale[:-1])
+    lower, pivot = np.zeros(scene.n), slowed + total * scale
+    for j in range(1, scene.n):
+        lower[j] = below[j] / pivot[j - 1]
+        pivot[j] -= lower[j] * upper[j - 1]
+    return lower, 1 / pivot, upper
+
+
+def _inverse(scene: Scene, h: float, slowed: Floats | float = 1.0) -> Floats:
+    """Columns of (slowed + h**2 K / m)**-1, as rows (n, n); not a number throughout where there is none."""
     if scene.n > DENSE:
         raise MethodError(
-            f"own:implicit-euler solves for at most {DENSE} joined particles; scene {scene.name!r} has "
-            f"{scene.n}; leave the method out"
+            f"own:implicit-euler serves at most {DENSE} particles joined other than as a chain; "
+            f"scene {scene.name!r} has {scene.n}; leave the method out"
         )
     k = np.asarray(mechanics.stiffness(scene, scene.q), dtype=np.float64)
     try:
-        return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) + h * h * (k / scene.m)).T)
+        return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) * slowed + h * h * (k / scene.m)).T)
     except np.linalg.LinAlgError:
         return np.full((scene.n, scene.n), np.nan)
 
@@ -197,7 +265,7 @@ def _try_to_compile(layout: Layout, h: float) -> kernels.Kernel | None:
 
 def _compile(layout: Layout, h: float) -> kernels.Kernel:
     """The layout's kernel, compiled for its types by a call that fills no row, so that `advance` does not."""
-    none = np.empty((0, np.size(layout.q)))
+    none = np.empty((0, layout.n))
     arguments = (1, h, *layout.constants, layout.q, layout.p, none, none.copy())
     for saved in (True, False):
         try:
@@ -214,10 +282,10 @@ def _compile(layout: Layout, h: float) -> kernels.Kernel:
 
 @cache
 def _jit(kernel: kernels.Kernel, saved: bool) -> kernels.Kernel:
-    """numba's version of a kernel, without fastmath: that would contract and reorder."""
+    """numba's version of a kernel."""
     import numba
 
-    jit: Callable[[FunctionType], Any] = numba.njit(cache=saved, error_model="numpy")
+    jit: Callable[[FunctionType], Any] = numba.njit(cache=saved, **kernels.FLAGS)
     names: dict[str, Any] = dict(vars(kernels))
     for helper in kernels.HELPERS:
         names[helper.__name__] = jit(_with_names(helper, names))

@@ -49,6 +49,31 @@ def absolute_tolerance(scene: Scene) -> Floats:
     return np.asarray(scene.tolerance * np.concatenate([q, p]))
 
 
+MOST_ALIKE = 1e3
+"""Ratio of stiffnesses up to which they may be added up in one matrix: three digits are lost then.  A
+soft spring beside a stiff one would lose more, and is evaluated spring by spring."""
+
+
+def _suits_matrix(scene: Scene) -> bool:
+    """Whether the right-hand side may be one matrix product, five times as fast for a few particles."""
+    if not mechanics.is_linear(scene) or scene.n > 32:
+        return False
+    k = np.abs(np.concatenate([term.k for term in scene.terms if hasattr(term, "k")] or [np.ones(1)]))
+    return bool(np.max(k) <= MOST_ALIKE * np.min(k))
+
+
+def _matrix(scene: Scene) -> tuple[Floats, Floats]:
+    """Slope (2n, 2n) and constant part (2n,) of the right-hand side of a linear scene."""
+    n = scene.n
+    zero = np.zeros(n)
+    slope, pull = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
+    slope[:n, n:] = np.diag(1 / scene.m)
+    slope[n:, :n] = -mechanics.stiffness(scene, zero)
+    slope[n:, n:] = -np.diag(mechanics.rates(scene))
+    pull[n:] = mechanics.force(scene.terms)(zero, zero)
+    return slope, pull
+
+
 class _Solver:
     """CVODE, stepped from output to output.  Outputs between internal steps are interpolated by CVODE."""
 
@@ -56,19 +81,33 @@ class _Solver:
         self.force_calls = 0
         n, m = scene.n, scene.m
         force = mechanics.force(scene.terms)
+        as_matrix = _suits_matrix(scene)
+        slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
+        pulled = bool(np.any(pull))
+        friction = np.diag(mechanics.rates(scene).astype(np.float64))
 
-        def derivative(t: float, y: Floats, yp: Floats) -> None:
+        def by_terms(t: float, y: Floats, yp: Floats) -> None:
             self.force_calls += 1
             q, p = y[:n], y[n:]
             yp[:n] = p / m
             yp[n:] = force(q, p)
 
+        def by_matrix(t: float, y: Floats, yp: Floats) -> None:
+            self.force_calls += 1
+            np.dot(slope, y, out=yp)
+            if pulled:
+                np.add(yp, pull, out=yp)
+
         def jacobian(t: float, y: Floats, yp: Floats, jacobian: Floats) -> None:
-            jacobian[:n, n:] = np.diag(1 / m)
-            jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
+            if as_matrix:
+                jacobian[:] = slope
+            else:
+                jacobian[:n, n:] = np.diag(1 / m)
+                jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
+                jacobian[n:, n:] = -friction
 
         self._solver = CVODE(
-            derivative,
+            by_matrix if as_matrix else by_terms,
             method=method,
             rtol=scene.tolerance,
             atol=absolute_tolerance(scene),

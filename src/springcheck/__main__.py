@@ -1,0 +1,7 @@
+"""``python -m springcheck``."""
+
+import sys
+
+from springcheck.cli import main
+
+sys.exit(main())

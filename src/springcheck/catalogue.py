@@ -1,0 +1,59 @@
+"""What springcheck has: scenes, engines and checks, found in their folders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from springcheck import checks, engines, scenes, schemes
+
+
+def catalogue() -> dict[str, Any]:
+    """Scenes, engines with versions or the reason of their absence, and checks, as plain data."""
+    return {
+        "scenes": [{"name": name, "title": scenes.load_scene(name).title} for name in scenes.names()],
+        "engines": [_engine(name) for name in engines.names()],
+        "checks": [
+            {"name": check.__name__.replace("_", "-"), "sentence": (check.__doc__ or "").partition("\n")[0]}
+            for check in checks.CHECKS
+        ],
+    }
+
+
+def _engine(name: str) -> dict[str, Any]:
+    found = engines.engine(name)
+    absence = engines.absence(name)
+    return {
+        "name": name,
+        "title": found.title,
+        "version": None if absence else engines.installed_version(name),
+        "absence": absence,
+        "platforms": list(found.platforms),
+        "methods": [
+            {
+                "method": f"{name}:{method.name}",
+                "scheme": schemes.SCHEMES[method.scheme].title,
+                "about": method.about,
+            }
+            for method in found.methods.values()
+        ],
+    }
+
+
+def lines(found: dict[str, Any]) -> Iterator[str]:
+    """The catalogue as text of 80 columns."""
+    yield "Scenes"
+    width = max(len(scene["name"]) for scene in found["scenes"])
+    for scene in found["scenes"]:
+        yield f"  {scene['name']:{width}}  {scene['title']}"
+    yield "Engines and methods"
+    for engine in found["engines"]:
+        yield f"  {engine['title']} {engine['version']}" if engine["version"] else f"  {engine['absence']}"
+        for method in engine["methods"]:
+            yield f"    {method['method']:26}  {method['about']}"
+        if engine["platforms"]:
+            yield f"    platforms, as METHOD@PLATFORM: {', '.join(engine['platforms'][:4])}"
+            yield f"      {', '.join(engine['platforms'][4:])}"
+    yield "Checks"
+    for check in found["checks"]:
+        yield f"  {check['name']:14}  {check['sentence']}"

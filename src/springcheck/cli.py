@@ -1,0 +1,258 @@
+"""The command line: parses, calls, prints, and answers mistakes with one line and exit status 2.
+
+Heavy modules are imported by the command that needs them: `--help` and `list` import no engine, no
+HDF5 and no NumPy that they do not use.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from springcheck.errors import SpringcheckError
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 a mistake."""
+    options = _parser().parse_args(arguments)
+    command: Callable[[argparse.Namespace], int] = options.command
+    try:
+        return command(options)
+    except SpringcheckError as error:
+        print(f"springcheck: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(
+            "springcheck: interrupted; what was finished is kept, the same command goes on", file=sys.stderr
+        )
+        return INTERRUPTED
+    except BrokenPipeError:
+        # whoever read our output has closed it; nothing is left to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="springcheck",
+        description="Simulation engines judged to rounding by a mass on a spring.",
+        epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
+        "2 bad input, or nothing was measured.",
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="run a scene by every method, compare, store, judge")
+    run.add_argument(
+        "scene", metavar="SCENE", nargs="?", help="a shipped scene's name, or the path of a scene file"
+    )
+    _scene_options(run)
+    run.add_argument(
+        "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
+    )
+    run.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
+    run.set_defaults(command=_run)
+
+    inspect = commands.add_parser("inspect", help="what is in a store")
+    inspect.add_argument("file", metavar="FILE")
+    inspect.add_argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory")
+    inspect.add_argument(
+        "--rows", type=int, default=20, metavar="N", help="how many frames of it (default 20)"
+    )
+    inspect.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
+    inspect.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    inspect.set_defaults(command=_inspect)
+
+    plot = commands.add_parser("plot", help="draw what is in a store, as PNG and SVG")
+    plot.add_argument("file", metavar="FILE")
+    plot.add_argument("-o", "--output", metavar="FOLDER", default="figures", help="default: figures")
+    plot.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    plot.set_defaults(command=_plot)
+
+    check = commands.add_parser("check", help="is a store whole: digests, completeness, structure")
+    check.add_argument("file", metavar="FILE")
+    check.set_defaults(command=_check)
+
+    export = commands.add_parser("export", help="one trajectory as a file of its own, for other tools")
+    export.add_argument("file", metavar="FILE")
+    export.add_argument("label", metavar="LABEL")
+    export.add_argument("output", metavar="OUT.h5md")
+    export.set_defaults(command=_export)
+
+    listing = commands.add_parser("list", help="scenes, engines with their versions, checks")
+    listing.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    listing.set_defaults(command=_list)
+    return parser
+
+
+def _scene_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-o", "--output", metavar="FILE", help="the store (default: SCENE.h5)")
+    parser.add_argument(
+        "--method",
+        action="append",
+        default=[],
+        metavar="LABEL",
+        help="engine:method[@platform[-precision]] or a glob such as 'own:*'; repeatable",
+    )
+    parser.add_argument("--force", action="store_true", help="write an existing store anew")
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+
+
+class _Version(argparse.Action):
+    """Reads the version only when it is asked for: importlib.metadata takes longer than the rest."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"springcheck {version('springcheck')}")
+        parser.exit()
+
+
+def _console(quiet: bool = False) -> Console:
+    from rich.console import Console
+
+    # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
+    return Console(quiet=quiet, highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 100)
+
+
+def _show(lines: Sequence[RenderableType], *, quiet: bool = False) -> None:
+    console = _console(quiet)
+    for line in lines:
+        console.print(line)
+
+
+def _document(data: Any) -> None:
+    print(json.dumps(data, allow_nan=False, indent=2))
+
+
+def _run(options: argparse.Namespace) -> int:
+    from springcheck import report, scenes, session
+
+    if (options.scene is None) == (options.source is None):
+        raise SpringcheckError(
+            "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
+        )
+    if options.source is not None:
+        return _repeat(options)
+    scene = scenes.load_scene(options.scene)
+    path = Path(options.output or f"{scene.name}.h5")
+    with _progress(options) as started:
+        found = session.run(scene, path, methods=options.method, force=options.force, started=started)
+    if options.json:
+        _document(session.document(found))
+    else:
+        lines: list[RenderableType] = list(report.run_report(found))
+        if options.verdicts:
+            lines.append(report.verdicts_table(found.verdicts))
+        _show(lines, quiet=options.quiet)
+    return found.status
+
+
+def _repeat(options: argparse.Namespace) -> int:
+    from springcheck import report, session
+
+    with _progress(options) as started:
+        found = session.repeat(Path(options.source), methods=options.method, started=started)
+    if options.json:
+        _document(session.repeat_document(found))
+    else:
+        _show([report.repeat_line(one) for one in found], quiet=options.quiet)
+    return 0 if all(one.equal for one in found) else 1
+
+
+@contextmanager
+def _progress(options: argparse.Namespace) -> Iterator[Any]:
+    """Progress bars on a terminal, nothing in a pipe."""
+    if options.quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    bars = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+
+    def started(label: object, steps: int) -> Callable[[int], None]:
+        task = bars.add_task(str(label), total=steps)
+        return lambda done: bars.advance(task, done)
+
+    with bars:
+        yield started
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from springcheck import inspection
+
+    if options.rows < 1:
+        raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
+    found = inspection.look(Path(options.file), trajectory=options.trajectory, rows=options.rows)
+    if options.json:
+        _document(inspection.document(found))
+    else:
+        _show(inspection.lines(found, verdicts=options.verdicts))
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from springcheck import inspection
+    from springcheck.figures import trajectories
+
+    scene, runs, notes = inspection.drawable(Path(options.file))
+    written = trajectories.draw(scene, runs, Path(options.output))
+    if not options.quiet:
+        for line in notes:
+            print(line)
+        for path in written:
+            print(path)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from springcheck import store
+
+    findings = store.check(Path(options.file))
+    for finding in findings:
+        print(finding)
+    if not findings:
+        print(f"{options.file}: whole; every digest matches")
+    return 1 if findings else 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    from springcheck import store
+
+    store.export(Path(options.file), options.label, Path(options.output))
+    print(f"{options.output}: {options.label}")
+    return 0
+
+
+def _list(options: argparse.Namespace) -> int:
+    from springcheck import catalogue
+
+    found = catalogue.catalogue()
+    if options.json:
+        _document(found)
+    else:
+        for line in catalogue.lines(found):
+            print(line)
+    return 0

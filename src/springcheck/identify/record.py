@@ -1,0 +1,189 @@
+"""What was recorded: states at a constant interval, and how finely their numbers were written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springcheck.errors import IdentificationError
+from springcheck.model import Extended, Floats
+
+FEWEST = 5
+"""Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
+
+SAMPLE = 500
+"""Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Storage:
+    """How numbers were written down: `name` ("double", "single", "text, 6 digits"), and how finely."""
+
+    name: str = "double"
+    digits: int = 0
+    """Significant decimal digits; 0 where the numbers are not decimal text of that kind."""
+    decimals: int | None = None
+    """Digits after the point, where that is what is constant."""
+
+    def quantum(self, x: Floats) -> Floats:
+        """Distance of neighbouring numbers around x that the storage can hold."""
+        if self.decimals is not None:
+            return np.full(x.shape, 10.0**-self.decimals)
+        if self.digits:
+            size = np.where(x == 0, 1.0, np.abs(x))
+            return np.where(x == 0, 0.0, 10.0 ** (np.floor(np.log10(size)) - self.digits + 1))
+        if self.name == "single":
+            return np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
+        return np.asarray(np.spacing(np.abs(x)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Record:
+    """Positions q and velocities v (f, n) of n oscillators, one interval apart.
+
+    Where only momenta are known and no mass is, v holds the momenta and `mass` is None with `momenta` set.
+    """
+
+    interval: np.longdouble
+    jitter: float
+    """Relative uncertainty of the interval, from the rounding of the recorded times."""
+    clock: float
+    """Rounding of the recorded times, in intervals."""
+    q: Extended
+    v: Extended
+    q_quantum: Floats
+    v_quantum: Floats
+    q_storage: Storage
+    v_storage: Storage
+    mass: Floats | None
+    momenta: bool
+
+
+def storage(x: Floats) -> Storage:
+    """How x was written down, from the numbers themselves."""
+    values = np.ravel(x)
+    values = values[values != 0]
+    if len(np.unique(np.abs(values))) < FEWEST - 1:
+        return Storage()
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = values.astype(np.float32).astype(np.float64)
+    # a unit conversion in double precision leaves the numbers within an ulp of single ones
+    single = bool(np.all(np.abs(rounded - values) <= 2.0**-51 * np.abs(values)))
+    sample = [float(y) for y in values[np.linspace(0, len(values) - 1, min(len(values), SAMPLE)).astype(int)]]
+
+    def same(text: str, y: float) -> bool:
+        return bool(np.float32(text) == np.float32(y)) if single else float(text) == y
+
+    most = 7 if single else 9
+    digits = next((d for d in range(1, most + 1) if all(same(f"{y:.{d - 1}e}", y) for y in sample)), 0)
+    decimals = next((d for d in range(most) if all(same(f"{y:.{d}f}", y) for y in sample)), None)
+    found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
+    if decimals is not None:
+        found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
+    # text that is finer than the numbers around it says nothing: every number has such a decimal form
+    values = np.array(sample)
+    binary = Storage(name="single" if single else "double").quantum(values)
+    found = [text for text in found if np.all(text.quantum(values) >= 2 * binary)]
+    if found:
+        # both can hold the numbers; the coarser of the two leaves less to chance
+        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(values)))))
+    return Storage(name="single") if single else Storage()
+
+
+def _interval(t: Floats) -> tuple[np.longdouble, float, float]:
+    """The constant interval of times t (f,), its relative uncertainty, and the rounding of t in intervals."""
+    wide = t.astype(np.longdouble)
+    interval = (wide[-1] - wide[0]) / (len(t) - 1)
+    if interval == 0:
+        raise IdentificationError("all times are equal: the interval between the states is unknown")
+    quantum = float(np.max(storage(t).quantum(t)))
+    off = np.abs(np.diff(wide) - interval)
+    worst = int(np.argmax(off))
+    # two rounded times make a difference, and a clock that adds its step up rounds once more each time
+    if off[worst] > 4 * quantum:
+        raise IdentificationError(
+            f"the states are not at a constant interval: frames {worst} and {worst + 1} are "
+            f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
+            "give a part of the trajectory with one interval"
+        )
+    return interval, quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53, quantum / abs(float(interval))
+
+
+def _states(x: ArrayLike, name: str, frames: int) -> Floats:
+    out = np.asarray(x, dtype=np.float64)
+    if out.ndim == 1:
+        out = out[:, None]
+    if out.ndim != 2 or out.shape[0] != frames:
+        raise IdentificationError(f"{name} has shape {np.shape(x)}, but there are {frames} times")
+    if not np.all(np.isfinite(out)):
+        frame = int(np.argmin(np.all(np.isfinite(out), axis=1)))
+        raise IdentificationError(f"{name} is not finite in frame {frame}; give the part before it")
+    return out
+
+
+def _masses(mass: ArrayLike | None, n: int) -> Floats | None:
+    if mass is None:
+        return None
+    out = np.asarray(mass, dtype=np.float64)
+    if out.size not in {1, n} or not np.all(np.isfinite(out)) or np.any(out <= 0):
+        raise IdentificationError(f"mass must be one positive number, or {n}; found {mass!r}")
+    return np.broadcast_to(out.ravel(), (n,)).copy()
+
+
+def read(
+    t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None
+) -> Record:
+    """Check and order what a caller has: times (f,), positions, and momenta or velocities or both (f, n)."""
+    times = np.asarray(t, dtype=np.float64)
+    if times.ndim != 1 or not np.all(np.isfinite(times)):
+        raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
+    if len(times) < FEWEST:
+        raise IdentificationError(
+            f"{len(times)} states are too few to read a map from; give {FEWEST} or more"
+        )
+    if p is None and v is None:
+        raise IdentificationError(
+            "positions alone do not show the scheme; give momenta or velocities as well"
+        )
+    positions = _states(q, "q", len(times))
+    given = [_states(x, name, len(times)) for name, x in (("p", p), ("v", v)) if x is not None]
+    for x in given:
+        if x.shape != positions.shape:
+            raise IdentificationError(
+                f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
+            )
+    interval, jitter, clock = _interval(times)
+    masses = _masses(mass, positions.shape[1])
+    if p is not None and v is not None and masses is None:
+        weight = np.sum(given[1] ** 2, axis=0)
+        masses = np.sum(given[0] * given[1], axis=0) / np.where(weight == 0, 1.0, weight)
+        masses = np.where(weight == 0, 1.0, masses)
+        if np.any(masses <= 0):
+            raise IdentificationError("momenta and velocities point opposite ways: one of them is wrong")
+    moving = given[-1]
+    unit = np.ones(positions.shape[1], dtype=np.longdouble)
+    if v is None and masses is not None:
+        unit = masses.astype(np.longdouble)
+    q_storage, v_storage = storage(positions), storage(moving)
+    if v is None and masses is not None and v_storage.name == "double":
+        # momenta made as m v from single-precision velocities are single only after the division
+        velocities = storage(moving / masses)
+        v_storage = velocities if velocities.name == "single" else v_storage
+        quantum = v_storage.quantum(moving / masses)
+    else:
+        quantum = v_storage.quantum(moving) / unit.astype(np.float64)
+    return Record(
+        interval=interval,
+        jitter=jitter,
+        clock=clock,
+        q=positions.astype(np.longdouble),
+        v=moving.astype(np.longdouble) / unit,
+        q_quantum=q_storage.quantum(positions),
+        v_quantum=quantum,
+        q_storage=q_storage,
+        v_storage=v_storage,
+        mass=masses,
+        momenta=v is None and masses is None,
+    )

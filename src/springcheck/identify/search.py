@@ -1,0 +1,164 @@
+"""The search: every known scheme and stride against the maps of all oscillators together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from springcheck.identify.fit import ROUNDING, Map
+from springcheck.identify.match import ONE_STEP, OWN_FRICTION, STRIDES, Match, Terms, match, unit_matrix
+from springcheck.identify.record import Record
+from springcheck.model import Floats
+from springcheck.schemes import SCHEMES, roundings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """One scheme and stride for all oscillators together."""
+
+    scheme: str
+    stride: int
+    parts: tuple[Match, ...]
+
+    @property
+    def accepted(self) -> bool:
+        return all(part.accepted for part in self.parts)
+
+    @property
+    def chi2(self) -> float:
+        return sum(part.chi2 for part in self.parts)
+
+    @property
+    def plainness(self) -> tuple[int, int, int]:
+        """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
+        return (
+            max(part.turns for part in self.parts),
+            self.stride,
+            -1 if self.scheme == "exact" else list(SCHEMES).index(self.scheme),
+        )
+
+    def __str__(self) -> str:
+        steps = "" if self.stride == 1 else f", {self.stride} steps a frame"
+        return self.scheme + steps
+
+
+@cache
+def aliases(name: str) -> tuple[str, ...]:
+    """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
+    a = np.array([0.3, 1.1, 2.9], dtype=np.longdouble)
+    friction = np.array([0, 0.2, 0.5], dtype=np.longdouble)
+    own = unit_matrix(SCHEMES[name], a, friction)
+    return tuple(
+        scheme.name
+        for scheme in ONE_STEP
+        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, friction) - own)) < 1e-15
+    )
+
+
+@cache
+def distinct() -> tuple[str, ...]:
+    """One name of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
+    out: list[str] = []
+    for scheme in ONE_STEP:
+        if not set(aliases(scheme.name)) & set(out):
+            out.append(scheme.name)
+    return tuple(out)
+
+
+def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
+    """Every scheme and stride against every oscillator; what fails one is not tried on the next."""
+    without = {scheme.name for scheme in OWN_FRICTION}
+    names = [name for name in distinct() if terms[0].damped or name not in without]
+    keys: dict[tuple[str, int], list[Match]] = {}
+    for i, (found, what) in enumerate(zip(maps, terms, strict=True)):
+        best: dict[tuple[str, int], Match] = {}
+        for name in names:
+            wanted = sorted({key[1] for key in keys if key[0] == name}) if i else []
+            if i and not wanted:
+                continue
+            within = range(wanted[0], wanted[-1] + 1) if i else strides
+            for m in match(SCHEMES[name], found, what, within):
+                key = name, m.stride
+                old = best.get(key)
+                if old is None or (not m.accepted, m.turns, m.chi2) < (not old.accepted, old.turns, old.chi2):
+                    best[key] = m
+        merged = {
+            key: [*keys.get(key, []), m]
+            for key, m in best.items()
+            if not i or (key in keys and len(keys[key]) == i)
+        }
+        passing = {key: ms for key, ms in merged.items() if all(m.accepted for m in ms)}
+        keys = passing if passing and i + 1 < len(maps) else merged
+    return [
+        Joint(scheme=k[0], stride=k[1], parts=tuple(ms)) for k, ms in keys.items() if len(ms) == len(maps)
+    ]
+
+
+def find(
+    record: Record, maps: list[Map], base: list[Terms], stride: int | None
+) -> tuple[list[Joint], Joint | None, list[Terms]]:
+    """All accepted schemes, and the plainest; without friction first, and with it where nothing fits.
+
+    Coefficients are taken as rounded in double precision first.  Where the states are coarser than that
+    the arithmetic may have been so too, and a second round allows coefficients of single precision.
+    """
+    coarse = max(float(np.max(found.residual)) for found in maps) > 2.0**-40
+    tried: list[Joint] = []
+    first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
+    few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
+    for damped, ranges in ((False, [*first, few]), (True, [*first, few]), (False, [many])):
+        for rounding in (ROUNDING, 2.0**-24) if coarse else (ROUNDING,):
+            terms = [replace(what, damped=damped, rounding=rounding) for what in base]
+            for strides in ranges:
+                joints = search(maps, terms, strides)
+                accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
+                if accepted:
+                    # what is 25 worse in chi-squared than the best, five standard errors, is excluded too
+                    best = min(x.chi2 for x in accepted)
+                    accepted = [x for x in accepted if x.chi2 <= best + 25]
+                    return accepted, accepted[0], terms
+                tried += joints if not damped and strides is not many else []
+    return tried, None, base
+
+
+def numbers(
+    record: Record, moving: list[int], chosen: Joint
+) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
+    """Frequency, stiffness and friction rate of each oscillator."""
+    h = float(record.interval) / chosen.stride
+    omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
+    friction = tuple(m.friction / h for m in chosen.parts)
+    stiffness: tuple[float, ...] | None = None
+    if record.mass is not None:
+        stiffness = tuple(
+            float(record.mass[j]) * m.a / h**2 for j, m in zip(moving, chosen.parts, strict=True)
+        )
+    elif record.momenta:
+        stiffness = tuple(math.exp(m.log_mass) * m.a / h**2 for m in chosen.parts)
+    return omega, stiffness, friction
+
+
+def disagreements(record: Record, moving: list[int], joint: Joint, stated: Floats) -> list[str]:
+    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding."""
+    _, stiffness, _ = numbers(record, moving, joint)
+    path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
+    out = []
+    for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
+        error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        off = k / float(stated[j]) - 1 if stated[j] else math.inf
+        if not abs(off) <= error:
+            out.append(
+                f"the stated stiffness {stated[j]:.9g} does not fit: the states show {k:.9g} "
+                f"(relative difference {off:+.2e}, known to {error:.0e})"
+            )
+    return out
+
+
+def difference(found: Map, part: Match) -> tuple[float, ...]:
+    """Measured less predicted entries on (q, v T)."""
+    off = found.entries.reshape(4) - np.array(part.predicted, dtype=np.longdouble)
+    ratio = float(found.size[0] / found.size[1])
+    return tuple(float(x) * y for x, y in zip(off, (1, ratio, 1 / ratio, 1), strict=True))

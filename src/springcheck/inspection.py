@@ -1,0 +1,192 @@
+"""What is in a store, for reading and for drawing, in bounded memory however long its runs are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from springcheck import report, session, store
+from springcheck.errors import SpringcheckError
+from springcheck.model import Comparison, Scene, Trajectory, Verdict
+
+MOST_FRAMES = 20_000
+"""Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What `springcheck inspect` shows."""
+
+    summary: store.Summary
+    verdicts: tuple[Verdict, ...]
+    comparison: Comparison | None
+    frames: Trajectory | None
+    """Some frames of the trajectory asked for, all over its length."""
+    stride: int = 1
+
+
+def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
+    """Read what is in a store.  StoreError where it cannot be read or holds no such trajectory."""
+    summary = store.summary(path)
+    frames, stride = store.strided(path, trajectory, rows) if trajectory else (None, 1)
+    return Found(
+        summary=summary,
+        verdicts=store.verdicts(path),
+        comparison=store.comparison(path),
+        frames=frames,
+        stride=stride,
+    )
+
+
+def drawable(path: Path) -> tuple[Scene, dict[str, Trajectory], list[str]]:
+    """Scene and trajectories of a store to draw, and what was left out of them."""
+    scene = session.stored_scene(path)
+    runs: dict[str, Trajectory] = {}
+    notes = []
+    for run in store.summary(path).runs:
+        runs[run.label], stride = store.strided(path, run.label, MOST_FRAMES)
+        if stride > 1:
+            notes.append(f"{run.label}: every {stride}th of {run.frames} frames is drawn")
+    if not runs:
+        raise SpringcheckError(f"{path}: holds no trajectory to draw")
+    return scene, runs, notes
+
+
+def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
+    """The store as text."""
+    summary = found.summary
+    out: report.Lines = [report.plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
+    if not summary.complete:
+        out.append(report.plain("unfinished: the command that writes it has not ended", "bold red"))
+    if summary.runs:
+        known = summary.runs[0].parameters
+        out.append(report.plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"))
+        out.append(
+            report.plain(
+                f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
+                f"{known.get('cores')} cores, {known.get('system')}"
+            )
+        )
+        out.append(
+            report.plain(
+                f"  python {known.get('python')}, numpy {known.get('numpy')}, "
+                f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
+            )
+        )
+    out.append(_runs(summary))
+    for name in summary.tables:
+        out.append(report.plain(f"table {name}"))
+    if found.verdicts:
+        out += [report.plain(), report.plain("Largest value of each check, as a fraction of its bound:")]
+        out.append(report.verdict_matrix(found.verdicts))
+        out += report.failures(found.verdicts)
+        if verdicts:
+            out.append(report.verdicts_table(found.verdicts))
+    if found.comparison is not None:
+        out += [
+            report.plain(),
+            report.plain("Largest differences, in units of the start:"),
+        ]
+        out.append(_comparison(found.comparison))
+    if found.frames is not None:
+        out += [report.plain(), _frames(found.frames, found.stride)]
+    return out
+
+
+def _runs(summary: store.Summary) -> Table:
+    table = report.grid()
+    for name in ("trajectory", "frames", "n", "outcome", "versions", "sha256"):
+        table.add_column(name, justify="right" if name in ("frames", "n") else "left", overflow="fold")
+    for run in summary.runs:
+        known = run.parameters
+        versions = ", ".join(
+            f"{key[7:]} {known[key]}"
+            for key in known
+            if key.startswith("origin.") and key[7:] not in ("engine", "method", "velocity")
+        )
+        table.add_row(
+            report.plain(run.label),
+            str(run.frames),
+            str(run.n),
+            report.plain(str(known.get("outcome", ""))),
+            report.plain(versions),
+            report.plain(str(known.get("sha256", ""))[:12]),
+        )
+    return table
+
+
+def _comparison(comparison: Comparison) -> Table:
+    table = report.grid()
+    table.add_column("", no_wrap=True)
+    for i in range(len(comparison.labels)):
+        table.add_column(str(i), justify="right")
+    for i, label in enumerate(comparison.labels):
+        cells = [_short(x) for x in comparison.max_difference[i]]
+        table.add_row(report.plain(f"{i} {label}"), *cells[: i + 1])
+    return table
+
+
+def _short(x: float) -> str:
+    if np.isnan(x):
+        return "-"
+    if x == 0:
+        return "0"
+    return f"{x:.0e}".replace("e-0", "e-").replace("e+00", "").replace("e+0", "e")
+
+
+def _frames(run: Trajectory, stride: int) -> Table:
+    n = run.q.shape[1]
+    shown = min(n, 3)
+    title = f"{run.label}" + (f", every {stride}th frame" if stride > 1 else "")
+    if n > shown:
+        title += f", the first {shown} of {n} particles"
+    table = report.grid()
+    table.title = title
+    table.title_justify = "left"
+    table.add_column("t", justify="right")
+    for name in ("q", "p"):
+        for i in range(shown):
+            table.add_column(f"{name}{i}" if n > 1 else name, justify="right")
+    for t, q, p in zip(run.t, run.q, run.p, strict=True):
+        table.add_row(*(repr(float(x)) for x in (t, *q[:shown], *p[:shown])))
+    return table
+
+
+def document(found: Found) -> dict[str, Any]:
+    """The store as plain data for JSON."""
+    frames = found.frames
+    return {
+        "store": str(found.summary.path),
+        "bytes": found.summary.size,
+        "complete": found.summary.complete,
+        "root": {key: _json(value) for key, value in found.summary.root.items()},
+        "trajectories": [
+            {
+                "label": run.label,
+                "frames": run.frames,
+                "particles": run.n,
+                "quantities": list(run.quantities),
+                "parameters": {key: _json(value) for key, value in run.parameters.items()},
+            }
+            for run in found.summary.runs
+        ],
+        "tables": list(found.summary.tables),
+        "verdicts": [session.verdict_document(verdict) for verdict in found.verdicts],
+        "trajectory": None
+        if frames is None
+        else {
+            "label": frames.label,
+            "stride": found.stride,
+            "t": frames.t.tolist(),
+            "q": frames.q.tolist(),
+            "p": frames.p.tolist(),
+        },
+    }
+
+
+def _json(value: Any) -> Any:
+    return session.number(value) if isinstance(value, float) else value

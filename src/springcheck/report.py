@@ -1,0 +1,201 @@
+"""Reports as text for a terminal of 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from springcheck.model import Verdict
+from springcheck.schemes import SCHEMES
+from springcheck.session import LeftOut, Repeat, Report, Run
+
+Lines = list[Table | Text]
+
+
+def plain(text: str = "", style: str = "") -> Text:
+    """A line of text that is never taken for markup."""
+    return Text(text, style=style)
+
+
+def run_report(report: Report) -> Lines:
+    """The whole report of `springcheck run`."""
+    out: Lines = [headline(report), plain(), runs_table(report.runs)]
+    out.append(plain("error: farthest from the true motion; energy: (H - H0)/H0 where largest", "dim"))
+    out += [plain(f"  {run.method}: {run.message}") for run in report.runs if run.message]
+    out += same_motions(report)
+    out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
+    out += [verdict_matrix(report.verdicts)]
+    out += failures(report.verdicts)
+    out += left_out(report.left_out)
+    if report.judged_frames < report.scene.frames:
+        share = f"{report.judged_frames} of {report.scene.frames} frames"
+        out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
+    out += [plain(), summary(report)]
+    return out
+
+
+def headline(report: Report) -> Text:
+    """Title, grid and start of a scene."""
+    scene = report.scene
+    size = "" if scene.n == 1 else f", {scene.n} particles"
+    return plain(f"{scene.title}: {scene.steps} steps of {scene.step:g}{size}", "bold")
+
+
+def grid() -> Table:
+    """A table without lines, as narrow as its words."""
+    return Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False, header_style="")
+
+
+def seconds(value: float) -> str:
+    """A time with three digits and its unit."""
+    if not np.isfinite(value):
+        return "-"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value / 1e-9:.0f} ns"
+
+
+def runs_table(runs: Sequence[Run]) -> Table:
+    """One line a method, under the scheme that it runs."""
+    table = grid()
+    for name in ("method", "error", "energy", "start", "run", "outcome"):
+        table.add_column(name, justify="left" if name in ("method", "outcome") else "right", no_wrap=True)
+    for scheme in dict.fromkeys(run.scheme for run in runs):
+        table.add_row(plain(SCHEMES[scheme].title, "italic"))
+        for run in runs:
+            if run.scheme != scheme:
+                continue
+            good = run.outcome == "complete"
+            table.add_row(
+                plain(f"  {run.method}"),
+                "-" if np.isnan(run.max_error) else f"{run.max_error:.2e}",
+                f"{run.energy_drift:+.1e}",
+                seconds(run.timing.start),
+                seconds(run.timing.run),
+                plain("complete" if good else f"{run.outcome}, step {run.step}", "" if good else "red"),
+            )
+    return table
+
+
+def same_motions(report: Report) -> Lines:
+    """Which trajectories are one motion, and how closely."""
+    if not report.same:
+        return []
+    out: Lines = [plain(), plain("The same motion, to rounding or tolerance:")]
+    for same in report.same:
+        names = " = ".join("true motion" if label == "exact" else label for label in same.labels)
+        out.append(plain(f"  {names}"))
+        far = f"differ by at most {same.difference:.1e} of the start ({same.allowed:.1e} allowed)"
+        out.append(plain(f"    {far if same.difference else 'equal bit for bit'}"))
+    return out
+
+
+SHORT = {
+    "step-defect": "step",
+    "arithmetic": "arith",
+    "closed-form": "closed",
+    "shadow-energy": "shadow",
+    "frequency": "freq",
+    "momentum": "moment",
+    "tolerance": "toler",
+}
+
+
+def ratio(verdict: Verdict) -> float:
+    """Value as a fraction of the bound; infinite where an exact bound is missed."""
+    if verdict.value == 0:
+        return 0.0
+    return verdict.value / verdict.bound if verdict.bound else float("inf")
+
+
+def verdict_matrix(verdicts: Sequence[Verdict]) -> Table:
+    """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
+    checks = [c for c in dict.fromkeys(v.check for v in verdicts) if c in SHORT]
+    table = grid()
+    table.add_column("method", no_wrap=True)
+    shown = [c for c in checks if any(v.check == c and v.passed is not None for v in verdicts)]
+    for check in shown:
+        table.add_column(SHORT[check], justify="right", no_wrap=True)
+    table.add_column("exact", justify="right", no_wrap=True)
+    for method in dict.fromkeys(v.method for v in verdicts):
+        mine = {v.check: v for v in verdicts if v.method == method}
+        cells = [_cell(mine.get(check)) for check in shown]
+        rest = [v for name, v in mine.items() if name not in SHORT and v.passed is not None]
+        good = sum(1 for v in rest if v.passed)
+        cells.append(plain(f"{good}/{len(rest)}", "" if good == len(rest) else "bold red"))
+        table.add_row(plain(method), *cells)
+    return table
+
+
+def _cell(verdict: Verdict | None) -> Text:
+    if verdict is None or verdict.passed is None:
+        return plain("-", "dim")
+    value = ratio(verdict)
+    text = f"{value:.2f}" if 0.01 <= value < 100 else f"{value:.0e}"
+    return plain(text if verdict.passed else text + "!", "" if verdict.passed else "bold red")
+
+
+def failures(verdicts: Iterable[Verdict]) -> Lines:
+    """Every failed verdict with value, bound, ratio and why."""
+    out: Lines = []
+    for v in verdicts:
+        if v.passed is False:
+            out.append(plain(f"FAILED {v.method} {v.check}: {verdict_line(v)}", "bold red"))
+    return out
+
+
+def verdict_line(v: Verdict) -> str:
+    """Value, bound, ratio and why."""
+    if v.passed is None:
+        return f"not applicable: {v.why}"
+    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.why}"
+
+
+def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
+    """Every verdict in full."""
+    table = grid()
+    table.add_column("method")
+    table.add_column("check", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("value, bound, ratio, why")
+    for v in verdicts:
+        word, style = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}[v.passed]
+        table.add_row(plain(v.method), plain(v.check), plain(word, style), plain(verdict_line(v), style))
+    return table
+
+
+def repeat_line(one: Repeat) -> Text:
+    """One line for a repeated trajectory."""
+    if one.equal:
+        return plain(f"{one.method}: equal bit for bit")
+    why = f"; {', '.join(one.changed)}" if one.changed else ""
+    return plain(
+        f"{one.method}: NOT equal, differs by up to {one.difference:.1e} of the start{why}", "bold red"
+    )
+
+
+def left_out(left: Sequence[LeftOut]) -> Lines:
+    """One line for each reason."""
+    if not left:
+        return []
+    reasons: dict[str, list[str]] = {}
+    for one in left:
+        reasons.setdefault(one.reason, []).append(one.method)
+    return [plain(), *(plain(f"Left out {', '.join(names)}: {why}") for why, names in reasons.items())]
+
+
+def summary(report: Report) -> Text:
+    """How many verdicts passed, and where the store is."""
+    passed = sum(1 for v in report.verdicts if v.passed)
+    failed = sum(1 for v in report.verdicts if v.passed is False)
+    skipped = len(report.verdicts) - passed - failed
+    taken = f"; taken up from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
+    return plain(
+        f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}\n"
+        f"Stored in {report.path}",
+        "bold red" if failed else "bold green",
+    )

@@ -1,0 +1,154 @@
+"""A user's mistake gets one clear line and exit status 2; nothing is lost or overwritten."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from springcheck.cli import main
+from springcheck.scenes import folder
+
+SPRING = (folder() / "spring.toml").read_text()
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1, captured.err
+    assert "Traceback" not in captured.err
+    for word in words:
+        assert word in captured.err
+
+
+SCENES = {
+    "an unknown key": (("mass = 1.0", "mass = 1.0\ncolour = 3"), ("particle[0]", "colour", "mass, position")),
+    "a misspelt table": (("[time]", "[tiem]"), ("tiem",)),
+    "a wrong type": (("mass = 1.0", 'mass = "heavy"'), ("particle[0].mass", "heavy", "float")),
+    "nan": (("mass = 1.0", "mass = nan"), ("particle[0].mass", "nan", "finite")),
+    "infinity": (("momentum = 1.0", "momentum = inf"), ("particle[0].momentum", "inf", "finite")),
+    "a mass of zero": (("mass = 1.0", "mass = 0.0"), ("particle[0].mass", "0.0", "> 0")),
+    "a negative mass": (("mass = 1.0", "mass = -2.0"), ("particle[0].mass", "-2.0", "> 0")),
+    "an end that does not exist": (('["wall", 0]', '["wall", 7]'), ("spring[0].ends", "7", "particles")),
+    "an end that is no end": (('["wall", 0]', '["floor", 0]'), ("spring[0].ends[0]", "floor")),
+    "two walls": (('["wall", 0]', '["wall", "wall"]'), ("spring[0].ends", "two walls")),
+    "one end twice": (('["wall", 0]', "[0, 0]"), ("spring[0].ends", "same particle")),
+    "no steps": (("steps = 200", "steps = 0"), ("time.steps", "0", ">= 1")),
+    "half a step": (("steps = 200", "steps = 2.5"), ("time.steps", "2.5", "int")),
+    "a step of zero": (("step = 0.1", "step = 0.0"), ("time.step", "0")),
+    "no time at all": (("[time]\nstep = 0.1\nsteps = 200\ntolerance = 1e-12", ""), ("time",)),
+    "a tolerance of zero": (("tolerance = 1e-12", "tolerance = 0.0"), ("time.tolerance", "0.0")),
+    "1e12 frames": (("steps = 200", "steps = 1_000_000_000_000"), ("GB", "free")),
+    "a record that misses the end": (("steps = 200", "steps = 200\nevery = 7"), ("every", "7", "200")),
+    "an unknown unit": (('units = "reduced"', 'units = "parsec"'), ("units", "parsec")),
+    "broken TOML": (("[time]", "[time"), ("TOML", "line")),
+    "a huge integer": (("steps = 200", "steps = " + "9" * 400), ("time.steps", "finite")),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_mistake_in_a_scene_is_named_with_its_file_and_field(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (old, new), words = SCENES[name]
+    assert old in SPRING
+    Path("bad.toml").write_text(SPRING.replace(old, new))
+    refused(capsys, ["run", "bad.toml", "--method", "own:euler"], *words)
+    assert {path.name for path in Path().iterdir()} == {"bad.toml"}
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("own:eular", ("own:eular", "own:euler")),
+        ("opemm:verlet", ("opemm", "openmm")),
+        ("verlet", ("engine:method",)),
+        ("openmm:verlet@GPU", ("GPU", "Reference", "CUDA-double")),
+        ("own:euler@CPU", ("CPU", "none")),
+        ("openmm:verlet@CUDA", ("CUDA",)),
+        ("no*:such", ("no*:such", "springcheck list")),
+        ("", ("engine:method",)),
+    ],
+)
+def test_a_method_that_is_not_there_is_named_with_those_that_are(
+    method: str, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, ["run", "spring", "--method", method], *words)
+    assert not list(Path().glob("*.h5"))
+
+
+def test_a_scene_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    refused(capsys, ["run", "sprong"], "sprong", "spring-uneven")
+    refused(capsys, ["run", "missing.toml"], "missing.toml", "No such file")
+    refused(capsys, ["run", "."], ".")
+
+
+def test_an_existing_store_is_kept_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("spring.h5").write_text("not to be lost")
+    refused(capsys, ["run", "spring", "--method", "own:euler"], "spring.h5", "exists", "--force")
+    assert Path("spring.h5").read_text() == "not to be lost"
+    assert main(["run", "spring", "--method", "own:euler", "--force", "--quiet"]) == 0
+    assert main(["check", "spring.h5"]) == 0
+
+
+def test_a_forced_run_that_fails_leaves_the_old_store(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from springcheck.engines.own import simulation
+    from springcheck.errors import MethodError
+
+    assert main(["run", "spring", "--method", "own:euler", "--quiet"]) == 0
+    before = Path("spring.h5").read_bytes()
+
+    def broken(*_: object) -> None:
+        raise MethodError("the engine would not start")
+
+    monkeypatch.setattr(simulation, "start", broken)
+    refused(capsys, ["run", "spring", "--method", "own:euler", "--force"], "would not start")
+    assert Path("spring.h5").read_bytes() == before
+
+
+def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    refused(capsys, ["run", "spring", "--method", "own:euler", "-o", "no/where.h5"], "no folder")
+    Path("file").write_text("")
+    refused(capsys, ["run", "spring", "--method", "own:euler", "-o", "file/x.h5"], "file")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("locked").mkdir(mode=0o500)
+    refused(capsys, ["run", "spring", "--method", "own:euler", "-o", "locked/x.h5"], "locked")
+
+
+@pytest.mark.parametrize("command", ["inspect", "plot"])
+def test_a_file_that_is_no_store(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(capsys, [command, "missing.h5"], "missing.h5")
+    refused(capsys, ["check", "missing.h5"], "missing.h5")
+    Path("text.h5").write_text("this is no HDF5 file")
+    refused(capsys, [command, "text.h5"], "text.h5")
+    Path("empty.h5").write_bytes(b"")
+    refused(capsys, [command, "empty.h5"], "empty.h5")
+
+
+def test_a_truncated_store(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", "--method", "own:euler", "--quiet"])
+    whole = Path("spring.h5").read_bytes()
+    for part in (len(whole) * 9 // 10, len(whole) // 2, 600, 9):
+        Path("cut.h5").write_bytes(whole[:part])
+        refused(capsys, ["inspect", "cut.h5"], "cut.h5")
+        refused(capsys, ["plot", "cut.h5"], "cut.h5")
+
+
+def test_a_trajectory_that_is_not_in_the_store(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", "--method", "own:euler", "--quiet"])
+    refused(capsys, ["inspect", "spring.h5", "--trajectory", "own:verlet"], "own:verlet", "own:euler")
+    refused(capsys, ["export", "spring.h5", "own:verlet", "x.h5md"], "own:verlet")
+    refused(capsys, ["export", "spring.h5", "own:euler", "x.xyz"], ".h5md")
+    refused(capsys, ["inspect", "spring.h5", "--trajectory", "own:euler", "--rows", "0"], "--rows")

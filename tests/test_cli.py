@@ -1,0 +1,189 @@
+"""The command line: what it prints, what it writes, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import scenes
+from springcheck.cli import main
+
+OWN = ["--method", "own:*"]
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def document(capsys: pytest.CaptureFixture[str]) -> dict:
+    found = json.loads(capsys.readouterr().out)
+    assert isinstance(found, dict)
+    return found
+
+
+def test_the_main_job_runs_every_engine_and_passes(
+    capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+) -> None:
+    for label in ("openmm:verlet", "ase:velocity-verlet", "sundials:adams"):
+        need(label)
+    assert main(["run", "spring", "--json"]) == 0
+    found = document(capsys)
+    assert found["scene"] == "spring"
+    assert Path(found["store"]).is_file()
+    methods = {run["method"]: run for run in found["runs"]}
+    assert {
+        "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:verlet", "openmm:leapfrog",
+        "openmm:euler", "openmm:semi-implicit-euler", "ase:velocity-verlet", "sundials:adams", "sundials:bdf",
+    } <= set(methods)  # fmt: skip
+    assert set(methods["own:euler"]) >= {
+        "method", "scheme", "outcome", "max_error", "energy_drift", "start_seconds", "run_seconds",
+        "force_calls",
+    }  # fmt: skip
+    # with the blog's numbers explicit Euler multiplies the energy by 1.01**200 = 7.316
+    assert methods["own:euler"]["energy_drift"] == pytest.approx(1.01**200 - 1, rel=1e-12)
+    labels = found["comparison"]["labels"]
+    difference = np.array(found["comparison"]["max_difference"])
+    assert labels[0] == "exact"
+    assert difference.shape == (len(labels), len(labels))
+    assert np.array_equal(difference, difference.T)
+    where = {label: i for i, label in enumerate(labels)}
+    assert difference[where["openmm:leapfrog"], where["own:semi-implicit-euler"]] <= 1e-13
+    assert difference[where["openmm:verlet"], where["ase:velocity-verlet"]] <= 1e-13
+    assert difference[where["sundials:adams"], where["exact"]] <= 1e-9
+    verdicts = found["verdicts"]
+    assert {"method", "check", "value", "bound", "unit", "passed", "why"} <= set(verdicts[0])
+    assert all(v["passed"] is not False for v in verdicts)
+    assert sum(v["passed"] is True for v in verdicts) > 60
+
+
+def test_the_text_names_methods_motions_and_the_store(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", *OWN, "-o", "some.h5"]) == 0
+    text = capsys.readouterr().out
+    for word in ("own:euler", "own:semi-implicit-euler", "complete", "0 failed", "some.h5"):
+        assert word in text
+    assert max(len(line) for line in text.splitlines()) <= 80
+
+
+def test_quiet_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", *OWN, "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_a_scene_of_ones_own_runs_by_its_path(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (scenes.folder() / "spring-uneven.toml").read_text()
+    Path("mine.toml").write_text(text.replace("3.7", "4.9"))
+    assert main(["run", "mine.toml", *OWN, "--json"]) == 0
+    assert document(capsys)["scene"] == "mine"
+    assert Path("mine.h5").is_file()
+
+
+def test_what_is_stored_is_what_the_library_gives() -> None:
+    assert main(["run", "spring-uneven", *OWN, "--quiet"]) == 0
+    scene = springcheck.load_scene("spring-uneven")
+    stored = springcheck.read("spring-uneven.h5")
+    for label, run in stored.items():
+        again = springcheck.run(scene, label)
+        assert np.array_equal(run.t, again.t)
+        assert np.array_equal(run.q, again.q)
+        assert np.array_equal(run.p, again.p)
+        assert np.array_equal(run.energy, again.energy)
+
+
+def test_inspect_shows_the_store_and_the_numbers_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", *OWN, "--quiet"])
+    assert main(["inspect", "spring.h5", "--trajectory", "own:euler", "--rows", "3", "--verdicts"]) == 0
+    text = capsys.readouterr().out
+    for word in ("own:implicit-euler", "step-defect", "201", "one product, no accumulation"):
+        assert word in " ".join(text.split())
+    assert main(["inspect", "spring.h5", "--trajectory", "own:euler", "--rows", "201", "--json"]) == 0
+    found = document(capsys)
+    assert found["trajectory"]["q"] == springcheck.read("spring.h5")["own:euler"].q.tolist()
+    assert [run["label"] for run in found["trajectories"]] == [
+        "own:euler", "own:semi-implicit-euler", "own:implicit-euler",
+    ]  # fmt: skip
+
+
+def test_plot_draws_three_pictures_twice(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", *OWN, "--quiet"])
+    assert main(["plot", "spring.h5", "-o", "pictures"]) == 0
+    written = {Path(line).name for line in capsys.readouterr().out.splitlines()}
+    assert written == {f"{a}.{b}" for a in ("phase-portrait", "position", "energy") for b in ("png", "svg")}
+    assert all((Path("pictures") / name).stat().st_size > 10_000 for name in written)
+
+
+def test_list_names_every_scene_engine_and_check(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    text = capsys.readouterr().out
+    for word in (*scenes.names(), "own:euler", "openmm:verlet", "sundials:bdf", "step-defect"):
+        assert word in text
+    assert main(["list", "--json"]) == 0
+    assert {scene["name"] for scene in document(capsys)["scenes"]} == set(scenes.names())
+
+
+def test_check_and_export(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", *OWN, "--quiet"])
+    assert main(["check", "spring.h5"]) == 0
+    assert main(["export", "spring.h5", "own:euler", "euler.h5md"]) == 0
+    assert Path("euler.h5md").stat().st_size > 1000
+    damaged = bytearray(Path("spring.h5").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    Path("damaged.h5").write_bytes(damaged)
+    capsys.readouterr()
+    assert main(["check", "damaged.h5"]) == 1
+    assert capsys.readouterr().out.strip()
+
+
+def test_a_failed_verdict_is_exit_status_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from springcheck.engines.own import simulation
+
+    start = simulation.start
+
+    def wrong(scene, method, label, step):  # type: ignore[no-untyped-def]
+        return start(scene, method, label, step * (1 + 1e-12))
+
+    monkeypatch.setattr(simulation, "start", wrong)
+    assert main(["run", "spring-uneven", "--method", "own:semi-implicit-euler"]) == 1
+    text = capsys.readouterr().out
+    assert "FAILED own:semi-implicit-euler step-defect" in text
+
+
+def test_the_command_works_as_a_program(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "springcheck", "run", "spring", *OWN],
+        capture_output=True, text=True, check=False, cwd=tmp_path, env=os.environ | {"NO_COLOR": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "own:implicit-euler" in done.stdout
+    assert done.stderr == ""
+
+
+def test_a_stored_run_is_repeated_bit_for_bit(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    main(["run", "spring-uneven", *OWN, "--quiet"])
+    assert main(["run", "--from", "spring-uneven.h5"]) == 0
+    assert capsys.readouterr().out.count("equal bit for bit") == 3
+    from springcheck.engines.own import simulation
+
+    start = simulation.start
+
+    def wrong(scene, method, label, step):  # type: ignore[no-untyped-def]
+        return start(scene, method, label, step * (1 + 1e-14))
+
+    monkeypatch.setattr(simulation, "start", wrong)
+    assert main(["run", "--from", "spring-uneven.h5", "--method", "own:euler", "--json"]) == 1
+    (repeat,) = document(capsys)["repeats"]
+    assert repeat["equal"] is False
+    assert 1e-16 < repeat["difference"] < 1e-11
+    assert {path.name for path in Path().iterdir()} == {"spring-uneven.h5"}

@@ -1,0 +1,197 @@
+"""Every engine moves as its scheme does, and engines of one scheme move alike."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, engines, exact, mechanics, scenes
+from springcheck.errors import MethodError
+from springcheck.model import Scene, Trajectory
+
+Need = Callable[[str], None]
+
+SCENES = ("spring", "spring-uneven", "chain")
+
+PAIRS = [
+    ("openmm:leapfrog", "own:semi-implicit-euler", 1e-13),
+    ("openmm:semi-implicit-euler", "own:semi-implicit-euler", 1e-13),
+    ("openmm:euler", "own:euler", 1e-12),
+    ("openmm:verlet", "ase:velocity-verlet", 1e-13),
+    ("openmm:verlet@CPU", "openmm:verlet", 1e-13),
+    ("sundials:adams", "exact", 1e-9),
+    ("sundials:bdf", "exact", 1e-8),
+]
+
+
+def states(scene: Scene, label: str) -> tuple[np.ndarray, np.ndarray]:
+    if label == "exact":
+        q, p = exact.true_motion(scene, np.arange(scene.frames) * scene.every, scene.step)
+        return q, p
+    run = springcheck.run(scene, label)
+    assert run.outcome.status == "complete"
+    return run.q, run.p
+
+
+@pytest.mark.parametrize(("pair", "name"), list(itertools.product(PAIRS, SCENES)), ids=str)
+def test_two_engines_of_one_scheme_move_alike(pair: tuple[str, str, float], name: str, need: Need) -> None:
+    one, other, bound = pair
+    need(one)
+    if other != "exact":
+        need(other)
+    scene = scenes.load_scene(name)
+    (q1, p1), (q2, p2) = states(scene, one), states(scene, other)
+    norm = mechanics.norm(scene)
+    # relative to the amplitude that a growing motion has reached, and for stiff solvers to n components
+    grown = np.maximum.accumulate(np.maximum(norm(q2 - _rest(scene), p2), 1.0))
+    assert np.max(norm(q1 - q2, p1 - p2) / grown) <= bound * scene.n
+
+
+def _rest(scene: Scene) -> np.ndarray:
+    modes = exact.modes(scene)
+    q, _ = modes.out_of(modes.centre(), np.zeros_like(modes.w2))
+    return np.asarray(q, np.float64)
+
+
+FIXED = [
+    "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:verlet", "openmm:leapfrog",
+    "openmm:euler", "openmm:semi-implicit-euler", "ase:velocity-verlet",
+]  # fmt: skip
+
+
+def judged(scene: Scene, run: Trajectory) -> list[str]:
+    return [v.check for v in checks.judge(scene, run) if v.passed is False]
+
+
+@pytest.mark.parametrize("label", [*FIXED, "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed"])
+def test_an_uneven_spring_passes_every_check(label: str, need: Need) -> None:
+    need(label)
+    scene = scenes.load_scene("spring-uneven")
+    assert judged(scene, springcheck.run(scene, label)) == []
+
+
+@pytest.mark.parametrize("label", [*FIXED, "sundials:adams", "sundials:bdf"])
+def test_backwards_in_time_is_a_motion_like_any_other(label: str, need: Need) -> None:
+    need(label)
+    scene = replace(scenes.load_scene("spring-uneven"), step=-0.07)
+    run = springcheck.run(scene, label)
+    assert run.t[-1] == -0.07 * 200
+    assert judged(scene, run) == []
+
+
+@pytest.mark.parametrize("label", FIXED)
+def test_recording_every_twentieth_step_gives_every_twentieth_state(label: str, need: Need) -> None:
+    need(label)
+    scene = scenes.load_scene("spring-uneven")
+    all_frames, some = springcheck.run(scene, label), springcheck.run(replace(scene, every=20), label)
+    assert np.array_equal(all_frames.q[::20], some.q)
+    assert np.array_equal(all_frames.p[::20], some.p)
+    assert np.array_equal(all_frames.t[::20], some.t)
+
+
+@pytest.mark.parametrize("label", [*FIXED, "sundials:adams", "sundials:bdf"])
+def test_forces_are_counted(label: str, need: Need) -> None:
+    need(label)
+    run = springcheck.run(scenes.load_scene("spring"), label)
+    # ASE asks once more at the start; an adaptive solver needs at least one a step of its own
+    assert run.force_calls in (200, 201) or (run.tolerance is not None and run.force_calls > 200)
+
+
+@pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:verlet", "openmm:verlet@CPU",
+                                   "ase:velocity-verlet", "openmm:euler"])  # fmt: skip
+def test_a_step_beyond_the_limit_ends_as_diverged_at_its_step(label: str, need: Need) -> None:
+    need(label)
+    scene = replace(scenes.load_scene("spring-uneven"), step=30.0, steps=2000)
+    run = springcheck.run(scene, label)
+    assert run.outcome.status == "diverged"
+    assert np.isfinite(run.q).all()
+    assert np.isfinite(run.p).all()
+    assert run.outcome.step == len(run.t) - 1
+    # each step multiplies the state by about a = (h w)**2 or its root, so overflow comes at a known step;
+    # OpenMM squares the length of a bond and overflows at the root of the largest number
+    growth = 30.0**2 * 2.9 / 3.7 if label != "openmm:euler" else 30.0 * np.sqrt(2.9 / 3.7)
+    largest = np.log(np.finfo(float).max) / (2 if label.startswith("openmm") else 1)
+    expected = largest / np.log(growth)
+    assert 0.7 * expected < run.outcome.step < 1.3 * expected
+
+
+def test_openmm_counts_from_rest_where_a_bond_could_turn_over(need: Need) -> None:
+    need("openmm:euler")
+    scene = scenes.load_scene("chain")
+    run = springcheck.run(scene, "openmm:euler")
+    crossed = np.any(np.diff(run.q, axis=1) < 0)
+    assert crossed, "explicit Euler was to grow until particles pass one another"
+    assert judged(scene, run) == []
+
+
+def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
+    need("openmm:verlet")
+    scene = replace(
+        scenes.load_scene("chain"),
+        terms=(
+            mechanics.Spring(
+                a=np.array([0, 1, 0]),
+                b=np.array([1, 2, 2]),
+                k=np.full(3, 1.7),
+                rest=np.array([1.0, 1.0, 9.0]),
+            ),
+        ),
+    )
+    with pytest.raises(MethodError, match="no common rest"):
+        springcheck.run(scene, "openmm:verlet")
+
+
+def test_opencl_forces_are_kept_in_fixed_point(need: Need) -> None:
+    label = "openmm:verlet@OpenCL-double"
+    need(label)
+    scene = scenes.load_scene("spring")
+    run = springcheck.run(scene, label)
+    case = checks.Case(trajectory=run, scene=scene)
+    defect = np.max(np.abs(case.next_states[1] - run.p[1:]))
+    assert defect > 2.0**-34 * scene.step
+    assert judged(scene, run) == []
+
+
+def test_opencl_keeps_force_constants_in_single_precision(need: Need) -> None:
+    label = "openmm:verlet@OpenCL-double"
+    need(label)
+    scene = scenes.load_scene("spring-uneven")
+    run = springcheck.run(scene, label)
+    as_double = replace(run, arithmetic=replace(run.arithmetic, parameters="double"))
+    assert "step-defect" in judged(scene, as_double)
+    assert "step-defect" not in judged(scene, run)
+
+
+def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Need) -> None:
+    """OpenMM 8.6.1 divides the fixed-point force by 0xFFFFFFFF in CustomIntegrator's kernel, and by
+    0x100000000 in VerletIntegrator's: every force is too large by one part in 2**32 - 1."""
+    scene = replace(
+        scenes.load_scene("spring-uneven"),
+        q=np.array([1e6]),
+        p=np.zeros(1),
+        steps=3,
+        terms=(mechanics.WallSpring(i=np.array([0]), k=np.array([2.875]), at=np.zeros(1)),),
+    )
+    for method, factor in (("semi-implicit-euler", 1.0), ("leapfrog", 0.0)):
+        label = f"openmm:{method}@OpenCL-double"
+        need(label)
+        run = springcheck.run(scene, label)
+        kick = np.longdouble(scene.step) * np.longdouble(-2.875) * np.longdouble(1e6)
+        too_large = float(run.p[1, 0] / kick - 1) * 2.0**32
+        assert abs(too_large - factor) < 1e-5
+        assert ("step-defect" in judged(scene, run)) == bool(factor)
+
+
+def test_every_engine_has_methods_of_known_schemes() -> None:
+    from springcheck.schemes import SCHEMES
+
+    for name in engines.names():
+        for method in engines.engine(name).methods.values():
+            assert method.scheme in SCHEMES
+            assert method.engine == name
+            assert method.adaptive != SCHEMES[method.scheme].one_step

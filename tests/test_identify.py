@@ -1,0 +1,419 @@
+"""Of the four entries of the map between two states one fixes (h w)**2, and the scheme predicts the others.
+
+Trajectories are made by stepping each scheme in double precision over random springs; what comes back must
+be the scheme, its stride, its frequency and the arithmetic, or a plain statement that the states do not
+decide.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from springcheck.errors import IdentificationError, MethodError
+from springcheck.identify import NONE, Identification, identify, identify_stepper, load_stepper
+from springcheck.identify.search import aliases
+from springcheck.model import Floats, Force
+from springcheck.schemes import SCHEMES, matrix, step
+
+STEPPING = [s.name for s in SCHEMES.values() if s.one_step and not s.mixes]
+SPRINGS = 4
+"""Random springs per scheme; validation/identify_census.py takes 200."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    t: Floats
+    q: Floats
+    p: Floats
+    m: Floats
+    k: Floats
+    h: float
+    stride: int
+
+    @property
+    def names(self) -> dict[str, Floats]:
+        return {"mass": self.m, "stiffness": self.k}
+
+
+def case(
+    name: str,
+    rng: np.random.Generator,
+    *,
+    n: int = 1,
+    stride: int = 1,
+    frames: int = 101,
+    lowest: float = 0.02,
+    coarse: Force | None = None,
+    width: type = np.float64,
+) -> Case:
+    """Springs of uneven m and k, h w log-uniform from `lowest` to 1.5 or 0.95 of the scheme's limit."""
+    scheme = SCHEMES[name]
+    highest = min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0
+    m, h = 10 ** rng.uniform(-2, 2, n), float(10 ** rng.uniform(-3, 1))
+    x = np.exp(rng.uniform(np.log(lowest), np.log(highest), n))
+    k = m * (x / h) ** 2
+    q = rng.normal(size=n) * 10 ** rng.uniform(-1, 2)
+    p = m * x / h * np.abs(q[0]) * rng.normal(size=n)
+    force = coarse or (lambda q, p: np.asarray(-k.astype(q.dtype) * q))
+    damping = np.full(n, 0.07 / h) if name.startswith("langevin") else None
+    states = [(q.astype(width), p.astype(width))]
+    for _ in range(frames - 1):
+        now = states[-1]
+        for _ in range(stride):
+            now = step(scheme, *now, h=h, m=m, force=force, stiffness=np.diag(k), rate=damping)
+        states.append(now)
+    qs, ps = (np.array([s[i] for s in states], dtype=np.float64) for i in (0, 1))
+    return Case(t=np.arange(frames) * (stride * h), q=qs, p=ps, m=m, k=k, h=h, stride=stride)
+
+
+def single(x: Floats) -> Floats:
+    return x.astype(np.float32).astype(np.float64)
+
+
+def text(x: Floats, form: str = "%.6g") -> Floats:
+    return np.array([float(form % y) for y in x.ravel()]).reshape(x.shape)
+
+
+def right(found: Identification, name: str, made: Case) -> bool:
+    return name in (found.scheme, *found.aliases) and found.stride == made.stride
+
+
+@pytest.mark.parametrize("name", STEPPING)
+def test_a_scheme_is_named_with_its_stride_stiffness_and_precision(name: str) -> None:
+    rng = np.random.default_rng(len(name) + 1)
+    for i in range(SPRINGS):
+        made = case(name, rng, stride=1 + 2 * i)
+        found = identify(made.t, made.q, made.p, **made.names)
+        assert right(found, name, made), found
+        assert found.precision == "double"
+        assert found.fits
+        assert found.stiffness == pytest.approx(made.k, rel=1e-11)
+        assert found.omega == pytest.approx(np.sqrt(made.k / made.m), rel=1e-11)
+        assert found.step == pytest.approx(made.h, rel=1e-12)
+        if not name.startswith("langevin"):
+            expected = matrix(SCHEMES[name], h=made.h, m=made.m, k=made.k)[0].astype(float)
+            assert found.determinant[0] == pytest.approx(float(np.linalg.det(expected)), rel=1e-10)
+
+
+@pytest.mark.parametrize("name", STEPPING)
+def test_numbers_of_single_precision_are_told_from_arithmetic_of_single_precision(name: str) -> None:
+    made = case(name, np.random.default_rng(11), stride=2, frames=61, lowest=0.3)
+    found = identify(made.t, single(made.q), single(made.p), **made.names)
+    assert right(found, name, made), found
+    assert (found.precision, found.fits) == ("double, stored in single", True)
+
+
+@pytest.mark.parametrize("name", ["velocity-verlet", "semi-implicit-euler", "position-verlet", "rk2-heun"])
+def test_arithmetic_of_single_precision_is_called_single(name: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        made = case(name, rng, frames=201, lowest=0.1, width=np.float32)
+        mass = made.m.astype(np.float32).astype(np.float64)
+        found = identify(made.t, made.q, made.p, mass=mass)
+        assert right(found, name, made), found
+        assert found.precision == "single"
+        assert found.stiffness == pytest.approx(made.k, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", STEPPING)
+def test_text_of_six_digits_is_enough_to_name_a_scheme(name: str) -> None:
+    made = case(name, np.random.default_rng(3), stride=2, lowest=0.4)
+    found = identify(made.t, text(made.q), text(made.p), **made.names)
+    assert right(found, name, made), found
+    assert (found.precision, found.fits) == ("text, 6 digits", True)
+
+
+def test_text_with_a_fixed_number_of_decimals_is_seen() -> None:
+    made = case("velocity-verlet", np.random.default_rng(8), lowest=0.4)
+    size = np.max(np.abs(made.q))
+    found = identify(made.t, text(made.q / size, "%.4f"), text(made.p / size / made.m, "%.4f"), mass=1.0)
+    assert found.scheme == "velocity-verlet"
+    assert found.precision == "text, 4 decimals"
+
+
+def test_what_rounding_hides_is_said_and_not_guessed() -> None:
+    made = case("rk4", np.random.default_rng(4), lowest=0.02, frames=101)
+    x = 0.02 * np.sqrt(made.m / made.k) / made.h
+    slow = float(x[0]) * made.h
+    t = np.arange(101) * slow
+    w = np.sqrt(made.k / made.m)
+    q, p = np.cos(w * t[:, None] + 0.4), -made.m * w * np.sin(w * t[:, None] + 0.4)
+    found = identify(t, text(q), text(p), mass=made.m)
+    assert found.scheme == "exact"
+    assert "rk4" in found.candidates
+    assert any("no error of a step is visible" in note for note in found.notes)
+
+
+def test_the_exact_flow_is_no_scheme_with_an_error() -> None:
+    m, k, t = 3.7, 2.9, np.arange(101) * 0.31
+    w = np.sqrt(np.longdouble(k) / m)
+    q = (1.3 * np.cos(w * t) + 0.9 / (m * w) * np.sin(w * t)).astype(float)
+    p = (0.9 * np.cos(w * t) - 1.3 * m * w * np.sin(w * t)).astype(float)
+    found = identify(t, q, p, mass=m, stiffness=k)
+    assert (found.scheme, found.precision, found.fits) == ("exact", "double", True)
+    assert found.stiffness == pytest.approx((k,), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["velocity-verlet", "rk4", "implicit-midpoint", "semi-implicit-euler"])
+def test_independent_oscillators_share_one_scheme(name: str) -> None:
+    made = case(name, np.random.default_rng(6), n=5, stride=3)
+    q, p = np.c_[made.q, np.zeros(101)], np.c_[made.p, np.zeros(101)]
+    found = identify(made.t, q, p, mass=[*made.m, 1.0], stiffness=[*made.k, 1.0])
+    assert right(found, name, made), found
+    assert found.stiffness == pytest.approx(made.k, rel=1e-11)
+    assert any("at rest" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA", "RK45"])
+def test_an_adaptive_solver_is_not_forced_into_a_scheme(method: str) -> None:
+    m, k, t = 3.7, 2.9, np.arange(201) * 0.31
+    z = solve_ivp(
+        lambda t, z: [z[1] / m, -k * z[0]],
+        (0, t[-1]),
+        [1.3, 0.9],
+        method=method,
+        t_eval=t,
+        rtol=1e-8,
+        atol=1e-10,
+    ).y
+    found = identify(t, z[0], z[1], mass=m, stiffness=k)
+    assert (found.scheme, found.fits, found.nearest) == (NONE, False, "exact")
+    assert found.omega == pytest.approx((np.sqrt(k / m),), rel=1e-5)
+    assert any("adaptive" in note for note in found.notes)
+
+
+def test_leapfrog_velocities_half_a_step_early_or_late_are_said_to_be_so() -> None:
+    rng = np.random.default_rng(9)
+    early = case("semi-implicit-euler", rng)
+    late = case("semi-implicit-euler-drift-kick", rng)
+    assert identify(early.t, early.q, early.p, mass=early.m).velocity_offset == -0.5
+    assert identify(late.t, late.q, late.p, mass=late.m).velocity_offset == 0.5
+    assert any("leapfrog" in name for name in identify(early.t, early.q, early.p, mass=early.m).aliases)
+
+
+def test_velocities_serve_without_a_mass() -> None:
+    made = case("velocity-verlet", np.random.default_rng(10), stride=4)
+    found = identify(made.t, made.q, v=made.p / made.m)
+    assert right(found, "velocity-verlet", made)
+    assert found.stiffness is None
+    assert found.omega == pytest.approx(np.sqrt(made.k / made.m), rel=1e-9)
+
+
+def test_momenta_with_velocities_give_the_mass() -> None:
+    made = case("rk4", np.random.default_rng(12), n=2)
+    found = identify(made.t, made.q, made.p, v=made.p / made.m)
+    assert found.scheme == "rk4"
+    assert found.stiffness == pytest.approx(made.k, rel=1e-10)
+
+
+def test_momenta_alone_leave_symmetric_schemes_alike_and_the_stiffness_parts_them() -> None:
+    made = case("velocity-verlet", np.random.default_rng(13), lowest=0.2)
+    alone = identify(made.t, made.q, made.p)
+    assert {"velocity-verlet", "position-verlet", "implicit-midpoint", "exact"} <= set(alone.candidates)
+    assert any("give the mass" in note for note in alone.notes)
+    assert identify(made.t, made.q, made.p, stiffness=made.k).scheme == "velocity-verlet"
+
+
+def test_position_verlet_and_the_implicit_midpoint_rule_differ_by_the_stiffness_alone() -> None:
+    # a/4 of the one is (a/4)/(1 + a/4) of the other, and then all four entries agree
+    made = case("implicit-midpoint", np.random.default_rng(14), lowest=0.3)
+    free = identify(made.t, made.q, made.p, mass=made.m)
+    assert {"position-verlet", "implicit-midpoint"} <= set(free.candidates)
+    assert identify(made.t, made.q, made.p, **made.names).scheme == "implicit-midpoint"
+
+
+def test_a_stated_stiffness_or_step_that_is_wrong_is_refused() -> None:
+    made = case("velocity-verlet", np.random.default_rng(15), stride=2, lowest=0.2)
+    assert identify(made.t, made.q, made.p, **made.names, step=made.h).fits
+    wrong = identify(made.t, made.q, made.p, mass=made.m, stiffness=made.k * (1 + 1e-11))
+    assert not wrong.fits
+    assert any("stiffness" in note for note in wrong.notes)
+    for h in (2 * made.h, 0.7 * made.h):
+        other = identify(made.t, made.q, made.p, mass=made.m, step=h)
+        assert (other.scheme, other.stride, other.fits) == ("velocity-verlet", 2, False)
+
+
+def test_wrong_units_of_velocity_are_named() -> None:
+    made = case("semi-implicit-euler", np.random.default_rng(16), lowest=0.2)
+    found = identify(made.t, made.q, made.p, mass=made.m / 10)
+    assert not found.fits
+    assert any(
+        "semi-implicit-euler would fit if velocities were about 0.1 times" in note for note in found.notes
+    )
+
+
+def test_whole_turns_between_frames_are_counted() -> None:
+    made = case("velocity-verlet", np.random.default_rng(17), stride=9, lowest=1.2)
+    found = identify(made.t, made.q, made.p, mass=made.m)
+    assert right(found, "velocity-verlet", made)
+    assert any("whole turns" in note for note in found.notes)
+
+
+def test_an_equilibrium_away_from_zero_is_found() -> None:
+    made = case("velocity-verlet", np.random.default_rng(18), lowest=0.2)
+    found = identify(made.t, made.q + 7.25 * np.max(np.abs(made.q)), made.p, mass=made.m)
+    assert (found.scheme, found.precision) == ("velocity-verlet", "double")
+    assert found.stiffness == pytest.approx(made.k, rel=1e-10)
+
+
+def test_time_may_run_backwards() -> None:
+    made = case("semi-implicit-euler", np.random.default_rng(19), lowest=0.2)
+    found = identify(-made.t[::-1], made.q[::-1], made.p[::-1], mass=made.m)
+    back = identify(made.t[::-1], made.q[::-1], made.p[::-1], mass=made.m)
+    assert found.scheme != "semi-implicit-euler"
+    assert (back.scheme, back.step < 0) == ("semi-implicit-euler-drift-kick", True)
+
+
+@pytest.mark.parametrize("name", ["velocity-verlet", "semi-implicit-euler"])
+def test_coarse_forces_are_told_from_coarse_states(name: str) -> None:
+    m, k, h = np.array([3.7]), np.array([2.9]), 0.31
+
+    def run(force: Force) -> Identification:
+        q, p = [np.array([1.3])], [np.array([0.9])]
+        for _ in range(200):
+            a, b = step(SCHEMES[name], q[-1], p[-1], h=h, m=m, force=force)
+            q.append(a)
+            p.append(b)
+        return identify(h * np.arange(201), np.array(q), np.array(p), mass=m)
+
+    fixed = run(lambda q, p: np.rint(-k * q * 2.0**32) / 2.0**32)
+    mixed = run(lambda q, p: (-k * q).astype(np.float32).astype(np.float64))
+    assert (fixed.scheme, fixed.precision, fixed.fits) == (name, "fixed-point force", True)
+    assert (mixed.scheme, mixed.precision, mixed.fits) == (name, "mixed", True)
+    neither = run(lambda q, p: -k * q * (1 + 1e-11 * np.sin(1e6 * q)))
+    assert neither.precision == "coarse force"
+
+
+def test_anharmonic_and_coupled_motion_are_called_so() -> None:
+    scheme, m = SCHEMES["velocity-verlet"], np.array([1.3, 0.7])
+    runs = {
+        "anharmonic": lambda q, p: -2.1 * q**3,
+        "coupled": lambda q, p: -2.1 * q + 0.8 * (q[::-1] - q),
+    }
+    for word, force in runs.items():
+        q, p = [np.array([1.1, -0.4])], [np.array([0.4, 0.3])]
+        for _ in range(100):
+            a, b = step(scheme, q[-1], p[-1], h=0.07, m=m, force=force)
+            q.append(a)
+            p.append(b)
+        found = identify(0.07 * np.arange(101), np.array(q), np.array(p), mass=m)
+        assert not found.fits
+        assert any(word in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda c: (c.t[:4], c.q[:4], c.p[:4]), "too few"),
+        (lambda c: (c.t, 0 * c.q, 0 * c.p), "nothing moves"),
+        (lambda c: (c.t**1.01, c.q, c.p), "constant interval"),
+        (lambda c: (0 * c.t, c.q, c.p), "times are equal"),
+        (lambda c: (c.t, np.where(c.t[:, None] > c.t[7], np.nan, c.q), c.p), "frame 8"),
+        (lambda c: (c.t, c.q[:-1], c.p), "shape"),
+        (lambda c: (c.t, c.t[:, None] * 0.3 + 1, 0 * c.p + 0.3 * c.m), "do not span"),
+        (lambda c: (c.t, c.q, None), "positions alone"),
+    ],
+)
+def test_states_that_cannot_show_a_map_are_refused_with_a_reason(change, words: str) -> None:
+    made = case("velocity-verlet", np.random.default_rng(20))
+    t, q, p = change(made)
+    with pytest.raises(IdentificationError, match=words):
+        identify(t, q, p, mass=made.m)
+
+
+def test_the_document_is_json_with_the_fields_of_the_command() -> None:
+    made = case("velocity-verlet", np.random.default_rng(21))
+    found = identify(made.t, made.q, made.p, mass=made.m)
+    document = json.loads(json.dumps(found.document(), allow_nan=False))
+    wanted = {"scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"}
+    wanted |= {"symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"}
+    assert wanted <= set(document)
+    assert document["stiffness"] == pytest.approx(float(made.k[0]))
+    with pytest.raises(IdentificationError):
+        identify(made.t, made.q, made.p, mass=-1.0)
+
+
+def test_aliases_are_the_schemes_with_the_same_matrix() -> None:
+    assert aliases("implicit-midpoint") == ("trapezoidal",)
+    assert aliases("rk2-heun") == ("rk2-midpoint",)
+    assert aliases("velocity-verlet") == ()
+
+
+def heun(q, p, h, force, mass):
+    a, b = p / mass, force(q)
+    c, d = (p + h * b) / mass, force(q + h * a)
+    return q + h / 2 * (a + c), p + h / 2 * (b + d)
+
+
+def massless(q, p, h, force, mass):
+    p = p + h * force(q)
+    return q + h * p, p
+
+
+def forwards_only(q, p, h, force, mass):
+    h = abs(h)
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def linear_only(q, p, h, force, mass):
+    """RK4 on a spring: the derivatives are taken as if the force were linear."""
+    a, v = force(q) / mass, p / mass
+    j, s = force(v) / mass, force(a) / mass
+    return (
+        q + h * v + h**2 / 2 * a + h**3 / 6 * j + h**4 / 24 * s,
+        p + mass * (h * a + h**2 / 2 * j + h**3 / 6 * s + h**4 / 24 * force(j) / mass),
+    )
+
+
+def in_place(q, p, h, force, mass):
+    p[0] += h * force(q)[0]
+    q[0] += h * p[0] / mass[0]
+    return q, p
+
+
+def test_a_stepper_is_named_and_its_order_seen_on_an_anharmonic_well() -> None:
+    found = identify_stepper(heun)
+    assert ("rk2-heun" in (found.scheme, *found.aliases), found.fits) == (True, True)
+    assert any(note.startswith("order 2.0") for note in found.notes)
+    assert identify_stepper(in_place).scheme == "semi-implicit-euler"
+
+
+@pytest.mark.parametrize(
+    ("stepper", "words"),
+    [
+        (massless, "mass is left out"),
+        (forwards_only, "negative step goes forwards"),
+        (linear_only, "not on forces that are not linear"),
+    ],
+)
+def test_a_stepper_with_a_fault_is_told_which(stepper, words: str) -> None:
+    found = identify_stepper(stepper)
+    assert not found.fits
+    assert any(words in note for note in found.notes), found.notes
+
+
+def test_a_stepper_that_is_not_there_or_fails_is_one_clear_line(tmp_path, monkeypatch) -> None:
+    (tmp_path / "mine_7f3.py").write_text(
+        "import math\ndef good(q, p, h, force, mass):\n    return q, p\nx = 3\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert callable(load_stepper("mine_7f3:good"))
+    for spec, words in (
+        ("mine_7f3", "module:function"),
+        ("nowhere_7f3:f", "no module"),
+        ("mine_7f3:bad", "it has good"),
+        ("mine_7f3:x", "not a function"),
+    ):
+        with pytest.raises(MethodError, match=words):
+            load_stepper(spec)
+    with pytest.raises(MethodError, match="returns"):
+        identify_stepper(lambda q, p, h, force, mass: 3.0)
+    with pytest.raises(MethodError, match="nothing moves"):
+        identify_stepper(load_stepper("mine_7f3:good"))

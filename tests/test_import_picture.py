@@ -1,0 +1,96 @@
+"""A module imports only from rows above it, and a foreign library only where it belongs."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import springcheck
+
+HOME = Path(springcheck.__file__).parent
+
+ROWS = [
+    "errors", "model", "mechanics", "exact", "schemes", "scenes", "store", "engines", "simulate", "checks",
+    "compare", "identify", "faults", "studies", "figures", "session", "report", "inspection", "catalogue",
+    "cli", "__main__",
+]  # fmt: skip
+
+HOMES = {
+    "h5py": ("store",),
+    "matplotlib": ("figures",),
+    "openmm": ("engines/openmm/simulation.py",),
+    "ase": ("engines/ase/simulation.py",),
+    "sksundae": ("engines/sundials/simulation.py",),
+    "numba": ("engines/own",),
+    "rich": ("report.py", "inspection.py", "cli.py"),
+    "msgspec": ("scenes",),
+}
+
+
+def _modules() -> list[Path]:
+    return sorted(path for path in HOME.rglob("*.py") if path != HOME / "__init__.py")
+
+
+def _row(path: Path) -> str:
+    return path.relative_to(HOME).parts[0].removesuffix(".py")
+
+
+def _imports(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def test_every_module_has_a_row() -> None:
+    assert {_row(path) for path in _modules()} <= set(ROWS)
+
+
+@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(HOME)))
+def test_a_module_imports_only_from_rows_above_it(path: Path) -> None:
+    own = ROWS.index(_row(path))
+    for name in _imports(path):
+        parts = name.split(".")
+        if parts[0] == "springcheck" and len(parts) > 1 and parts[1] != _row(path):
+            assert parts[1] in ROWS, name
+            assert ROWS.index(parts[1]) < own, f"{path.name} imports {name}, which is not above it"
+
+
+@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(HOME)))
+def test_a_foreign_library_is_imported_only_where_it_belongs(path: Path) -> None:
+    place = path.relative_to(HOME).as_posix()
+    for name in _imports(path):
+        library = name.split(".")[0]
+        if library in HOMES:
+            assert place.startswith(HOMES[library]), f"{place} imports {name}"
+
+
+def _loaded(code: str) -> set[str]:
+    """Top-level modules that are loaded after running code in a fresh interpreter."""
+    script = f"import sys\n{code}\nimport json; print(json.dumps(sorted(sys.modules)), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return {name.split(".")[0] for name in json.loads(done.stderr.splitlines()[-1])}
+
+
+FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        ("import springcheck", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
+        ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
+        ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich"}),
+        ("import springcheck; springcheck.run(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
+    ],
+)
+def test_what_is_not_needed_is_not_imported(code: str, absent: set[str]) -> None:
+    assert not _loaded(code) & absent

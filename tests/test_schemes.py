@@ -1,0 +1,124 @@
+"""One-step maps against their published matrices, with no value equal to one."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+from springcheck import schemes
+from springcheck.schemes import SCHEMES, Scheme
+
+M, K, H = 3.7, 2.9, 0.31
+A = H * H * K / M
+ULP = 2.0**-52
+
+MATRICES = {
+    "explicit-euler": [[1, H / M], [-H * K, 1]],
+    "semi-implicit-euler": [[1 - A, H / M], [-H * K, 1]],
+    "semi-implicit-euler-drift-kick": [[1, H / M], [-H * K, 1 - A]],
+    "velocity-verlet": [[1 - A / 2, H / M], [-H * K * (1 - A / 4), 1 - A / 2]],
+    "position-verlet": [[1 - A / 2, H / M * (1 - A / 4)], [-H * K, 1 - A / 2]],
+    "implicit-euler": [[1 / (1 + A), H / M / (1 + A)], [-H * K / (1 + A), 1 / (1 + A)]],
+    "implicit-midpoint": [
+        [(1 - A / 4) / (1 + A / 4), H / M / (1 + A / 4)],
+        [-H * K / (1 + A / 4), (1 - A / 4) / (1 + A / 4)],
+    ],
+    "rk2-midpoint": [[1 - A / 2, H / M], [-H * K, 1 - A / 2]],
+    "rk2-heun": [[1 - A / 2, H / M], [-H * K, 1 - A / 2]],
+    "rk4": [
+        [1 - A / 2 + A * A / 24, H / M * (1 - A / 6)],
+        [-H * K * (1 - A / 6), 1 - A / 2 + A * A / 24],
+    ],
+}
+MATRICES["trapezoidal"] = MATRICES["implicit-midpoint"]
+
+ONE_STEP = [scheme for scheme in SCHEMES.values() if scheme.one_step]
+
+
+def one(scheme: Scheme, k: float = K, h: float = H) -> np.ndarray:
+    return schemes.matrix(scheme, h=h, m=np.array([M]), k=np.array([k]))
+
+
+@pytest.mark.parametrize("name", MATRICES)
+def test_a_scheme_has_the_matrix_of_the_textbooks(name: str) -> None:
+    expected = np.array(MATRICES[name])
+    # the expectation itself is rounded a few times in double precision
+    assert np.max(np.abs(one(SCHEMES[name])[0] - expected) / np.abs(expected)) <= 8 * ULP
+
+
+@pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda scheme: scheme.name)
+def test_the_order_of_a_scheme_is_that_of_its_matrix_against_the_flow(scheme: Scheme) -> None:
+    errors = []
+    for h in (0.02, 0.01):
+        w = mpmath.sqrt(mpmath.mpf(K) / mpmath.mpf(M))
+        c, s = mpmath.cos(w * mpmath.mpf(h)), mpmath.sin(w * mpmath.mpf(h))
+        flow = [[c, s / (M * w)], [-M * w * s, c]]
+        found = one(scheme, h=h)[0]
+        errors.append(max(abs(mpmath.mpf(str(found[i, j])) - flow[i][j]) for i in (0, 1) for j in (0, 1)))
+    order = float(mpmath.log(errors[0] / errors[1], 2)) - 1
+    # the next term of the local error shifts the slope by about h w / log 2
+    assert abs(order - scheme.order) < 0.02
+
+
+@pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda scheme: scheme.name)
+def test_the_limit_of_stability_is_where_powers_start_to_grow(scheme: Scheme) -> None:
+    def radius(hw: float) -> float:
+        found = one(scheme, k=(hw / H) ** 2 * M)[0].astype(float)
+        return float(np.max(np.abs(np.linalg.eigvals(found))))
+
+    if scheme.limit == 0:
+        assert radius(0.05) > 1 + 1e-8
+    elif np.isinf(scheme.limit):
+        assert max(radius(x) for x in (0.1, 1.0, 10.0, 1000.0)) <= 1 + 1e-7
+    else:
+        # eigenvalues that meet on the circle are known to the root of eps only
+        assert radius(scheme.limit * (1 - 1e-6)) <= 1 + 1e-7
+        assert radius(scheme.limit * (1 + 1e-6)) > 1 + 1e-7
+
+
+@pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda scheme: scheme.name)
+def test_the_shadow_energy_is_multiplied_by_the_determinant(scheme: Scheme) -> None:
+    found = one(scheme)
+    form = schemes.invariant(found, h=H)[0]
+    z = np.array([0.3, 0.7], dtype=np.longdouble)
+
+    def energy(z: np.ndarray) -> np.longdouble:
+        return np.longdouble(form[0] * z[0] ** 2 + form[1] * z[0] * z[1] + form[2] * z[1] ** 2)
+
+    expected = schemes.rotation(found).determinant[0] * energy(z)
+    assert abs(energy(found[0] @ z) - expected) <= 16 * np.finfo(np.longdouble).eps * abs(expected)
+
+
+@pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda scheme: scheme.name)
+@pytest.mark.parametrize("k", [K, -K, 0.0, 3.9 * M / H**2, 5.0 * M / H**2])
+def test_the_closed_form_is_what_stepping_gives(scheme: Scheme, k: float) -> None:
+    found = one(scheme, k=k)
+    if np.any(schemes.rotation(found).determinant <= 0):
+        pytest.skip("a step that turns area over has no closed form")
+    z = np.array([0.3, 0.7], dtype=np.longdouble)
+    walked = [z]
+    for _ in range(50):
+        walked.append(found[0] @ walked[-1])
+    y, v = schemes.propagate(found, z[:1], z[1:], np.arange(51), area_preserving=scheme.symplectic)
+    states = np.stack([y[:, 0], v[:, 0]], axis=1)
+    size = np.maximum.accumulate(np.max(np.abs(walked), axis=1))
+    # 50 steps of extended arithmetic, enlarged by the condition of a map near its limit
+    assert np.max(np.max(np.abs(states - walked), axis=1) / size) <= 1e5 * np.finfo(np.longdouble).eps
+
+
+def test_fractions_are_rounded_once() -> None:
+    third = schemes.number(Fraction(1, 3), np.longdouble)
+    assert third == np.longdouble(1) / np.longdouble(3)
+    assert schemes.number(Fraction(7, 24), np.float64) == 7 / 24
+
+
+def test_irrational_coefficients_are_those_of_the_cube_root_of_two() -> None:
+    with mpmath.workdps(40):
+        x1 = 1 / (2 - mpmath.cbrt(2))
+        expected = [x1 / 2, x1, (1 - x1) / 2, 1 - 2 * x1]
+        for name in ("forest-ruth", "yoshida4"):
+            for (_, c), value in zip(SCHEMES[name].stages, expected, strict=False):
+                assert abs(mpmath.mpf(str(c)) - value) < mpmath.mpf(10) ** -36

@@ -1,0 +1,354 @@
+"""What goes into the store comes out bit for bit, with all that is needed to repeat the run."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from springcheck import store
+from springcheck.errors import StoreError
+from springcheck.model import Arithmetic, Outcome, Scene, Timing, Trajectory, Verdict
+from springcheck.store import draft, reading
+
+LABELS = ["own:euler", "openmm:verlet@OpenCL-mixed", "sundials:adams"]
+
+
+def scene(n: int = 3, steps: int = 40, **changed: object) -> Scene:
+    m = np.array([3.7, 0.4, 1.9, 2.2, 8.0])[:n]
+    plain = Scene(
+        name="chain", title="A chain", source="", m=m, q=0.1 * m, p=m, terms=(), step=-0.3, steps=steps,
+        every=2, text='title = "A chain"\n# ½ of it\n', units="md",
+    )  # fmt: skip
+    return replace(plain, **changed)
+
+
+def trajectory(s: Scene, label: str, seed: int = 0, frames: int | None = None) -> Trajectory:
+    f = s.frames if frames is None else frames
+    rng = np.random.default_rng(seed)
+    return Trajectory(
+        label=label,
+        scheme="explicit-euler",
+        t=np.arange(f) * s.step * s.every,
+        q=rng.normal(size=(f, s.n)),
+        p=rng.normal(size=(f, s.n)),
+        energy=rng.normal(size=f) if "energy" in s.quantities else None,
+        step=s.step,
+        every=s.every,
+        outcome=Outcome(status="diverged", step=17, message="force is inf: Kraft ∞"),
+        timing=Timing(start=0.25, run=1.5),
+        force_calls=41,
+        tolerance=1e-12,
+        arithmetic=Arithmetic(
+            name="mixed", state=2.0**-24, force=2.0**-53, quantum=2.0**-32, overflow=2.0**31
+        ),
+        rebuilds_velocity=True,
+        origin={"openmm": "8.6.1", "platform": "OpenCL", "velocity": "full step"},
+    )
+
+
+def written(path: Path, s: Scene, labels: list[str] = LABELS) -> dict[str, Trajectory]:
+    made = {label: trajectory(s, label, seed) for seed, label in enumerate(labels)}
+    with store.open_new(path, "run") as journal:
+        for each in made.values():
+            journal.save(each, s)
+        journal.commit(s)
+    return made
+
+
+def assert_same(a: Trajectory, b: Trajectory) -> None:
+    for name in ("t", "q", "p", "energy"):
+        one, two = getattr(a, name), getattr(b, name)
+        assert (one is None) == (two is None)
+        assert one is None or one.tobytes() == np.ascontiguousarray(two).tobytes(), name
+    rest = {"t": np.empty(0), "q": np.empty(0), "p": np.empty(0), "energy": None}
+    plain = [
+        {k: getattr(replace(x, **rest), k) for k in Trajectory.__slots__ if k not in rest} for x in (a, b)
+    ]
+    assert plain[0] == plain[1]
+
+
+def test_trajectories_come_back_bit_for_bit_in_the_order_they_were_started(tmp_path: Path) -> None:
+    made = written(tmp_path / "s.h5", scene())
+    found = store.read(tmp_path / "s.h5")
+    assert list(found) == LABELS
+    for label, one in made.items():
+        assert_same(one, found[label])
+    assert store.check(tmp_path / "s.h5") == []
+
+
+def test_an_unfinished_store_is_read_from_its_journal(tmp_path: Path) -> None:
+    s = scene()
+    with store.open_new(tmp_path / "s.h5", "run") as journal:
+        journal.save(trajectory(s, "own:euler"), s)
+    assert_same(trajectory(s, "own:euler"), store.read(tmp_path / "s.h5")["own:euler"])
+    assert store.scene_text(tmp_path / "s.h5") == s.text
+    assert not store.summary(tmp_path / "s.h5").complete
+
+
+def test_a_run_that_stopped_early_is_stored_at_its_length(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(draft, "BUFFER", 128)
+    s = scene(steps=4000)
+    for frames in (1, 5, 6, 1999):
+        one = trajectory(s, f"own:{frames}", frames, frames)
+        with store.open_new(tmp_path / f"{frames}.h5", "run") as journal:
+            journal.save(one, s)
+            journal.commit(s)
+        assert_same(one, store.read(tmp_path / f"{frames}.h5")[one.label])
+        assert store.check(tmp_path / f"{frames}.h5") == []
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cuts=st.lists(st.integers(1, 400), max_size=6), buffer=st.sampled_from([24, 1000, 9600, 1 << 22]))
+def test_the_digest_and_the_bytes_do_not_depend_on_how_the_frames_arrive(
+    tmp_path_factory: pytest.TempPathFactory, cuts: list[int], buffer: int
+) -> None:
+    s = scene(steps=800)
+    one = trajectory(s, "own:euler")
+    edges = sorted({0, s.frames, *(cut for cut in cuts if cut < s.frames)})
+    path = tmp_path_factory.mktemp("cut") / "s.h5"
+    with pytest.MonkeyPatch.context() as patch, store.open_new(path, "run") as journal:
+        patch.setattr(draft, "BUFFER", buffer)
+        with journal.draft("own:euler", s) as made:
+            for a, b in itertools.pairwise(edges):
+                made.append(one.t[a:b], one.q[a:b], one.p[a:b], one.energy[a:b])
+            digest = made.finish(store.attributes(one))
+        journal.commit(s)
+    assert_same(one, store.read(path)["own:euler"])
+    lines = [
+        f"{name} {values.shape} {hashlib.sha256(values.tobytes()).hexdigest()}"
+        for name, values in (("time", one.t), ("q", one.q), ("p", one.p), ("energy", one.energy))
+    ]
+    assert digest == hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def test_two_runs_have_the_same_digest_exactly_when_their_numbers_agree(tmp_path: Path) -> None:
+    s = scene()
+    one = trajectory(s, "own:euler")
+    q = one.q.copy()
+    q[7, 1] = np.nextafter(q[7, 1], np.inf)
+    other = replace(one, timing=Timing(start=9, run=9), origin={"host": "another"})
+    with store.open_new(tmp_path / "s.h5", "run") as journal:
+        first = journal.save(one, s)
+        assert journal.save(replace(other, label="b"), s) == first
+        assert journal.save(replace(other, label="c", q=q), s) != first
+
+
+@pytest.mark.parametrize("kept", [("q",), ("p",), ("energy",), ("q", "p"), ("p", "energy")])
+def test_only_what_the_scene_asks_for_is_stored(tmp_path: Path, kept: tuple[str, ...]) -> None:
+    s = scene(quantities=kept)
+    written(tmp_path / "s.h5", s)
+    with h5py.File(tmp_path / "s.h5") as file:
+        names = set(file["observables/own:euler"]) - {"velocity"}
+        assert names == set(kept)
+        elements = set(file["particles/own:euler"]) if "particles" in file else set()
+        assert elements & {"position", "velocity"} == {
+            {"q": "position", "p": "velocity"}[x] for x in kept if x != "energy"
+        }
+    found = store.read(tmp_path / "s.h5")["own:euler"]
+    assert found.q.shape == ((s.frames, 3) if "q" in kept else (0, 3))
+    assert (found.energy is None) == ("energy" not in kept)
+    assert store.check(tmp_path / "s.h5") == []
+
+
+def test_a_scene_that_records_nothing_is_refused(tmp_path: Path) -> None:
+    s = scene(quantities=())
+    with (
+        store.open_new(tmp_path / "s.h5", "run") as journal,
+        pytest.raises(StoreError, match="records nothing"),
+    ):
+        journal.draft("own:euler", s)
+
+
+@pytest.mark.parametrize("kind", ["circuit", "rotor"])
+def test_charges_and_angles_are_no_positions(tmp_path: Path, kind: str) -> None:
+    written(tmp_path / "s.h5", scene(kind=kind, units="si"))
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert "particles" not in file
+        assert file["observables/own:euler/q/value"].attrs["unit"] == {"circuit": "C", "rotor": "rad"}[kind]
+
+
+def test_positions_and_velocities_cost_no_bytes_and_have_the_right_units(tmp_path: Path) -> None:
+    s = scene(steps=20_000)
+    made = written(tmp_path / "s.h5", s, ["own:euler"])["own:euler"]
+    with h5py.File(tmp_path / "s.h5") as file:
+        group = file["particles/own:euler"]
+        x = group["position/value"][()]
+        v = group["velocity/value"][()]
+        assert np.array_equal(x[..., 0], made.q)
+        assert np.array_equal(v[..., 0], made.p / s.m)
+        assert not x[..., 1:].any()
+        assert not v[..., 1:].any()
+        units = [group[name].attrs["unit"] for name in ("position/value", "velocity/value", "mass")]
+        assert [*units, group["position/time"].attrs["unit"]] == ["nm", "nm ps-1", "u", "ps"]
+        assert np.array_equal(group["position/step"], 2 * np.arange(s.frames))
+        assert group["position/time"] == file["observables/own:euler/p/time"]
+    arrays = s.frames * (8 * (1 + 3 * s.n + 1) + 4)
+    assert (tmp_path / "s.h5").stat().st_size < arrays + 50_000
+
+
+def test_a_reduced_scene_says_that_its_units_are_placeholders(tmp_path: Path) -> None:
+    written(tmp_path / "s.h5", scene(units="reduced"))
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file["observables/own:euler"].attrs["units_are"].startswith("reduced")
+        assert file["observables/own:euler/p/value"].attrs["unit"] == "u nm ps-1"
+
+
+def test_a_file_alone_tells_what_was_run_by_what_on_which_machine(tmp_path: Path) -> None:
+    s = scene()
+    written(tmp_path / "s.h5", s)
+    known = store.summary(tmp_path / "s.h5").runs[1].parameters
+    assert known["scene"] == s.text
+    assert known["method"] == "openmm:verlet@OpenCL-mixed"
+    assert known["origin.openmm"] == "8.6.1"
+    assert known["outcome"] == "diverged"
+    assert known["step"] == -0.3
+    for name in ("processor", "cores", "system", "python", "numpy", "springcheck", "sha256", "finished"):
+        assert known[name], name
+
+
+def test_an_existing_file_is_never_touched_unless_forced(tmp_path: Path) -> None:
+    path = tmp_path / "s.h5"
+    path.write_bytes(b"precious")
+    with pytest.raises(StoreError, match="exists"):
+        store.open_new(path, "run")
+    assert list(tmp_path.iterdir()) == [path]
+    s = scene()
+    with store.open_new(path, "run", force=True) as journal:
+        journal.save(trajectory(s, "own:euler"), s)
+        assert path.read_bytes() == b"precious"
+        journal.commit(s)
+    assert list(store.read(path)) == ["own:euler"]
+
+
+@pytest.mark.parametrize("label", ["", "a/b", ".", "..", "a\0b"])
+def test_a_label_that_cannot_name_a_group_is_refused(tmp_path: Path, label: str) -> None:
+    with store.open_new(tmp_path / "s.h5", "run") as journal, pytest.raises(StoreError, match="cannot name"):
+        journal.draft(label, scene())
+
+
+def test_frames_of_the_wrong_shape_or_number_are_refused(tmp_path: Path) -> None:
+    s = scene()
+    one = trajectory(s, "own:euler")
+    with store.open_new(tmp_path / "s.h5", "run") as journal, journal.draft("own:euler", s) as made:
+        with pytest.raises(ValueError, match="shape"):
+            made.append(one.t, one.q[:, :2], one.p, one.energy)
+        with pytest.raises(ValueError, match="shape None"):
+            made.append(one.t, one.q, one.p)
+        with pytest.raises(ValueError, match="without frames"):
+            made.finish({})
+        made.append(one.t, one.q, one.p, one.energy)
+        with pytest.raises(ValueError, match="more than"):
+            made.append(one.t[:1], one.q[:1], one.p[:1], one.energy[:1])
+
+
+def test_windows_overlap_by_one_frame_and_make_up_the_whole(tmp_path: Path) -> None:
+    s = scene(steps=222)
+    made = written(tmp_path / "s.h5", s)["sundials:adams"]
+    for rows in (1, 7, 110, 111, 112, 5000):
+        pieces = list(store.windows(tmp_path / "s.h5", "sundials:adams", rows))
+        assert all(len(piece.t) <= rows + 1 for piece in pieces)
+        assert all(np.array_equal(a.q[-1], b.q[0]) for a, b in itertools.pairwise(pieces))
+        joined = np.concatenate([pieces[0].p, *(piece.p[1:] for piece in pieces[1:])])
+        assert np.array_equal(joined, made.p)
+
+
+def test_a_strided_reading_takes_every_nth_frame_from_the_start(tmp_path: Path) -> None:
+    s = scene(steps=2000)
+    made = written(tmp_path / "s.h5", s)["own:euler"]
+    for most in (1, 10, 999, 1001, 5000):
+        found, stride = store.strided(tmp_path / "s.h5", "own:euler", most)
+        assert len(found.t) <= most
+        assert np.array_equal(found.q, made.q[::stride])
+        assert np.array_equal(found.energy, made.energy[::stride])
+        assert found.every == made.every * stride
+
+
+def test_long_arrays_are_mapped_and_equal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "MAPPED", 100)
+    made = written(tmp_path / "s.h5", scene())
+    found = store.read(tmp_path / "s.h5")
+    assert isinstance(found["own:euler"].q, np.memmap)
+    for label, one in made.items():
+        assert_same(one, found[label])
+
+
+def test_verdicts_comparison_tables_and_documents_come_back(tmp_path: Path) -> None:
+    verdicts = tuple(
+        Verdict(
+            method="own:euler",
+            check=f"c{passed}",
+            value=1e-16,
+            bound=np.inf,
+            unit="nm",
+            passed=passed,
+            why="¼",
+        )
+        for passed in (True, False, None)
+    )
+    comparison = store.Comparison(
+        labels=("a", "exact"), max_difference=np.array([[0, 2.5], [2.5, 0]]), unit="nm"
+    )
+    table = store.Table(
+        name="precision/own:euler",
+        columns={"h": [0.1, 0.2], "error": np.eye(2), "n": np.array([1, 2]), "ok": np.array([True, False]),
+                 "note": ["", "α"]},
+        units={"h": "ps"}, attributes={"order": 1.02, "by": "slope"}, signal="error", axes=("h", "."),
+    )  # fmt: skip
+    s = scene()
+    with store.open_new(tmp_path / "s.h5", "run") as journal:
+        journal.add(table)
+        assert list(journal.tables()) == ["precision/own:euler"]
+        journal.save(trajectory(s, "own:euler"), s)
+        journal.commit(s, comparison=comparison, verdicts=verdicts, documents={"report": "all\nwell"})
+    path = tmp_path / "s.h5"
+    assert store.verdicts(path) == verdicts
+    found = store.comparison(path)
+    assert found is not None
+    assert (found.labels, found.unit) == (comparison.labels, "nm")
+    assert np.array_equal(found.max_difference, comparison.max_difference)
+    assert store.document(path, "report") == "all\nwell"
+    back = store.read_tables(path)["precision/own:euler"]
+    for name, column in table.columns.items():
+        assert np.array_equal(back.columns[name], np.asarray(column)), name
+    assert (back.units, back.attributes, back.signal, back.axes) == (
+        table.units, table.attributes, table.signal, table.axes,
+    )  # fmt: skip
+    assert store.summary(path).tables == ("precision/own:euler",)
+    assert store.check(path) == []
+
+
+def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
+    with store.open_new(tmp_path / "s.h5", "stability") as journal:
+        journal.add(store.Table(name="stability/own:euler", columns={"a": [1.0]}, signal="a"))
+        journal.commit()
+    assert store.read(tmp_path / "s.h5") == {}
+    assert store.verdicts(tmp_path / "s.h5") == ()
+    assert store.comparison(tmp_path / "s.h5") is None
+    assert store.check(tmp_path / "s.h5") == []
+
+
+def test_a_recording_that_would_not_fit_is_told_before_it_starts(tmp_path: Path) -> None:
+    s = scene(steps=10**13, every=1)
+    with pytest.raises(StoreError, match=r"would take 960 TB; .* are free in"):
+        store.room(tmp_path / "s.h5", store.size(s))
+
+
+def test_importing_the_store_imports_no_engine_and_no_plots() -> None:
+    code = (
+        "import sys, springcheck.store; "
+        "print([m for m in ('matplotlib', 'openmm', 'ase', 'sksundae', 'numba', 'rich') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
