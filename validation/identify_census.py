@@ -69,7 +69,9 @@ def main() -> None:
     """Print, scheme by scheme, what the springs were taken for."""
     form = sys.argv[1] if len(sys.argv) > 1 else "double"
     count = int(sys.argv[2]) if len(sys.argv) > 2 else 200
-    names = [scheme.name for scheme in SCHEMES.values() if (scheme.one_step and not scheme.mixes) or scheme.flow]
+    names = [
+        scheme.name for scheme in SCHEMES.values() if (scheme.one_step and not scheme.mixes) or scheme.flow
+    ]
     for number, name in enumerate(names):
         rng = np.random.default_rng([number, 2026])
         seen: Counter[str] = Counter()

@@ -64,6 +64,15 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
     run.set_defaults(command=_run)
 
+    precision = commands.add_parser("precision", help="error against run time, down to rounding")
+    precision.add_argument("scene", metavar="SCENE", help="a shipped scene's name, or a scene file's path")
+    _scene_options(precision)
+    precision.add_argument(
+        "--budget", type=float, metavar="SECONDS", help="time to spend, shared fairly (default 75)"
+    )
+    precision.add_argument("--points", action="store_true", help="print every point")
+    precision.set_defaults(command=_precision)
+
     inspect = commands.add_parser("inspect", help="what is in a store")
     inspect.add_argument("file", metavar="FILE")
     inspect.add_argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory")
@@ -172,6 +181,48 @@ def _repeat(options: argparse.Namespace) -> int:
     return 0 if all(one.equal for one in found) else 1
 
 
+def _precision(options: argparse.Namespace) -> int:
+    import math
+
+    from springcheck import report, scenes, session
+    from springcheck.studies import precision
+
+    budget = precision.BUDGET if options.budget is None else options.budget
+    if not (math.isfinite(budget) and budget > 0):
+        raise SpringcheckError(f"--budget {budget}: a number of seconds above 0 is needed")
+    scene = scenes.load_scene(options.scene)
+    labels, left = session.choose(scene, options.method)
+    path = Path(options.output or f"{scene.name}-precision.h5")
+    with _progress(options) as started:
+        found = precision.record(
+            scene, labels, path, budget=budget, force=options.force, progress=_spending(started, budget)
+        )
+    if options.json:
+        _document(found.document())
+    else:
+        lines = [*report.precision_report(found, points=options.points), *report.left_out(left)]
+        _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
+    if found.interrupted:
+        return INTERRUPTED
+    return 0 if any(point.complete for point in found.points) else 2
+
+
+def _spending(started: Any, budget: float) -> Callable[[float, str], None] | None:
+    """A progress bar over a budget of seconds."""
+    if started is None:
+        return None
+    hundredths = started("error against run time", round(100 * budget))
+    shown = 0
+
+    def spent(seconds: float, what: str) -> None:
+        nonlocal shown
+        now = min(round(100 * seconds), round(100 * budget))
+        hundredths(now - shown)
+        shown = now
+
+    return spent
+
+
 @contextmanager
 def _progress(options: argparse.Namespace) -> Iterator[Any]:
     """Progress bars on a terminal, nothing in a pipe."""
@@ -215,10 +266,15 @@ def _inspect(options: argparse.Namespace) -> int:
 
 def _plot(options: argparse.Namespace) -> int:
     from springcheck import inspection
-    from springcheck.figures import trajectories
+    from springcheck.figures import precision, trajectories
 
-    scene, runs, notes = inspection.drawable(Path(options.file))
-    written = trajectories.draw(scene, runs, Path(options.output))
+    path, folder = Path(options.file), Path(options.output)
+    study = inspection.studied(path)
+    written = [] if study is None else precision.draw(study, folder)
+    notes: list[str] = []
+    if study is None or inspection.has_trajectories(path):
+        scene, runs, notes = inspection.drawable(path)
+        written += trajectories.draw(scene, runs, folder)
     if not options.quiet:
         for line in notes:
             print(line)

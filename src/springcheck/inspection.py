@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ import numpy as np
 from rich.table import Table
 
 from springcheck import report, session, store
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, StoreError
 from springcheck.model import Comparison, Scene, Trajectory, Verdict
+from springcheck.studies import precision
 
 MOST_FRAMES = 20_000
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
@@ -54,6 +56,22 @@ def drawable(path: Path) -> tuple[Scene, dict[str, Trajectory], list[str]]:
     if not runs:
         raise SpringcheckError(f"{path}: holds no trajectory to draw")
     return scene, runs, notes
+
+
+def has_trajectories(path: Path) -> bool:
+    """Whether a store holds trajectories; one of a study alone holds none."""
+    return bool(store.summary(path).runs)
+
+
+def studied(path: Path) -> dict[str, Any] | None:
+    """The document of a study of precision in a store, or None."""
+    if not path.is_file():
+        return None
+    try:
+        found: dict[str, Any] = json.loads(store.document(path, precision.DOCUMENT))
+    except StoreError:
+        return None
+    return found
 
 
 def lines(found: Found, *, verdicts: bool = False) -> report.Lines:

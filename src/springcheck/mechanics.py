@@ -236,6 +236,17 @@ def in_single(scene: Scene) -> Scene:
         return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
 
 
+def stiffened(scene: Scene, factor: float) -> Scene:
+    """The scene with every force of its potential multiplied by a factor."""
+
+    def scaled(term: Any) -> Any:
+        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b")}
+        # the b of a spring is the index of an end
+        return replace(term, **{name: x * factor for name, x in found.items() if x.dtype == np.float64})
+
+    return replace(scene, terms=tuple(scaled(term) for term in scene.terms))
+
+
 def force(terms: Iterable[Term]) -> Force:
     """The force of these terms as a function of (q, p), each (..., n) -> (..., n) [M L/T2]."""
     parts = tuple(terms)

@@ -135,6 +135,8 @@ class Arithmetic:
     """Largest force that the fixed-point sum holds."""
     parameters: Literal["double", "single"] = "double"
     """Width in which force constants and rest lengths are kept."""
+    excess: float = 0.0
+    """Every force is too large by this fraction."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
 

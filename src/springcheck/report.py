@@ -11,6 +11,8 @@ from rich.text import Text
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
+from springcheck.studies.outcome import MethodSummary, PrecisionStudy
+from springcheck.studies.points import Point
 
 Lines = list[Table | Text]
 
@@ -199,3 +201,113 @@ def summary(report: Report) -> Text:
         f"Stored in {report.path}",
         "bold red" if failed else "bold green",
     )
+
+
+def precision_report(study: PrecisionStudy, *, points: bool = False) -> Lines:
+    """The whole report of `springcheck precision`; `points` adds every point."""
+    scene = study.scene
+    done = sum(point.complete for point in study.points)
+    out: Lines = [
+        plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
+        plain(f"  {done} points in {study.seconds:.0f} s on {study.machine['processor']}"),
+        plain(),
+        _precision_methods(study.methods),
+    ]
+    for method in study.methods:
+        expected = method.expected_floor
+        if expected and method.condition:
+            steps, error = expected
+            longer = (
+                "" if method.seconds_per_step is None else f", {duration(steps * method.seconds_per_step)}"
+            )
+            out.append(
+                plain(f"  {method.method}: floor expected near {error:.0e}, {steps:.0e} steps{longer} a run")
+            )
+    rest = [point for point in study.points if not point.complete]
+    if rest:
+        out += [plain(), plain("Not measured:")]
+        out += [plain(f"  {point.method} at {_where(point)}: {_outcome(point)}") for point in rest]
+    out += [plain(), plain("The cheapest way to an error (largest, of the start):"), _cheapest(study)]
+    if points:
+        out += [plain(), _points(study.points)]
+    if study.interrupted:
+        out.append(plain("Interrupted: every point that was finished is here.", "bold red"))
+    return out
+
+
+def duration(value: float) -> str:
+    """Seconds, hours or years, roughly."""
+    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("h", 3600.0)):
+        if value >= size:
+            return f"{value / size:.2g} {unit}"
+    return seconds(value)
+
+
+def _precision_methods(methods: Sequence[MethodSummary]) -> Table:
+    table = grid()
+    for name in ("method", "order", "floor", "/eps*cond", "step", "step, read", "start"):
+        table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for m in methods:
+        order = "-" if m.order is None else f"{m.order:.4f}({m.order_standard_error:.0e})"
+        table.add_row(
+            plain(m.method),
+            order,
+            "-" if m.floor is None else f"{m.floor:.1e}",
+            "-" if m.floor_ratio is None else f"{m.floor_ratio:.2g}",
+            *(
+                "-" if value is None else seconds(value)
+                for value in (m.seconds_per_step, m.read_seconds_per_step, m.start_seconds)
+            ),
+        )
+    return table
+
+
+def _cheapest(study: PrecisionStudy) -> Table:
+    table = grid()
+    for name in ("error", "method", "at", "run", "force calls"):
+        table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for answer in study.cheapest:
+        point = answer.point
+        if point is None:
+            table.add_row(f"{answer.target:.0e}", plain("none reaches it"), "", "", "")
+        else:
+            table.add_row(
+                f"{answer.target:.0e}",
+                plain(point.method),
+                _where(point),
+                seconds(point.seconds),
+                str(point.force_calls),
+            )
+    return table
+
+
+def _where(point: Point) -> str:
+    if point.tolerance is not None:
+        return f"tolerance {point.tolerance:.0e}"
+    return "-" if point.step is None else f"step {point.step:.3g}"
+
+
+def _outcome(point: Point) -> str:
+    return f"{point.outcome}: {point.message}" if point.message else point.outcome
+
+
+def _points(points: Sequence[Point]) -> Table:
+    table = grid()
+    for name in ("method", "at", "error", "end", "phase", "energy", "run", "calls"):
+        table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for point in points:
+        found = point.accuracy
+        if found is None:
+            table.add_row(plain(point.method), _where(point), plain(point.outcome, "red"))
+            continue
+        table.add_row(
+            plain(point.method),
+            _where(point).replace("tolerance ", "tol "),
+            f"{found.largest:.1e}",
+            f"{found.end:.1e}",
+            "-" if found.phase is None else f"{found.phase:+.0e}",
+            f"{found.energy:.0e}",
+            seconds(point.seconds),
+            str(point.force_calls),
+        )
+    return table

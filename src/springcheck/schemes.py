@@ -405,8 +405,13 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
+<<<<<<< HEAD
     `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
     solution of its equation.
+=======
+    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
+    squared norm of the inverse of the matrix that it solves, the condition of its step.
+>>>>>>> main
     """
     direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
@@ -432,8 +437,14 @@ def magnitude_step(
         own = row[len(forces)]
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
+<<<<<<< HEAD
             kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
             qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
+=======
+            condition = _condition(stiffness, own**2 / (m * slowed))
+            # the solution is larger than what it is made from by the condition, its error by that again
+            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
+>>>>>>> main
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
@@ -622,7 +633,11 @@ def propagate(
             np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
         )
         root = np.sqrt(d)
-        size = np.exp(j / 2 * np.log(d))
+        # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
+        less = matrices - np.eye(2, dtype=np.longdouble)
+        a, c = less[:, 0, 0], less[:, 1, 1]
+        beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
+        size = np.exp(j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond)))
         a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
         c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
         return (

@@ -60,11 +60,13 @@ class Record:
     origin: dict[str, str]
 
 
-def play(scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None) -> Record:
+def play(
+    scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None, planned: int = 0
+) -> Record:
     """Run a scene and hand every recorded frame, the start first, to `sink`.
 
     Memory does not grow with the length of the run.  Ctrl-C ends the run with the outcome
-    `interrupted`; the frames before it have been handed over.
+    `interrupted`; the frames before it have been handed over.  For `planned` see `bare`.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -74,8 +76,9 @@ def play(scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = 
         raise MethodError(f"{label}: {reason}")
     method = engines.method(label)
     driver = engines.load(label.engine)
+    ahead = scene if method.adaptive else replace(scene, steps=max(scene.steps, planned))
     began = perf_counter()
-    simulation = driver.start(scene, method, label, scene.step)
+    simulation = driver.start(ahead, method, label, scene.step)
     start_seconds = perf_counter() - began
 
     with_energy = "energy" in scene.quantities
@@ -224,10 +227,42 @@ def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) 
     return gather.trajectory(play(scene, label, gather, progress=progress))
 
 
-def bare(scene: Scene, label: Label) -> Timing:
-    """Time the engine alone: all steps in one call, one row read at the end."""
-    return play(replace(scene, every=scene.steps, quantities=("q", "p")), label, _nothing).timing
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bare:
+    """What running an engine alone took, for one run of it: seconds of wall clock and force calls."""
+
+    timing: Timing
+    force_calls: int
 
 
-def _nothing(t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
-    return None
+def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, planned: int = 0) -> Bare:
+    """Time the engine alone: all steps in one call and one row read at the end, nothing recorded.
+
+    `copies` fresh runs are timed together, one after the other, where one is too short for the clock.
+    With `read` every step is read, in chunks, and thrown away.  `planned` steps lie before the caller in
+    all: an engine that compiles decides by them instead of by this one run, so that the runs of a study
+    go the same way.  A run that is not finite costs what it costs: judge it by `play`.
+
+    Raises:
+        Stopped: the engine gave up.
+    """
+    driver, method = engines.load(label.engine), engines.method(label)
+    ahead = scene if method.adaptive else replace(scene, steps=max(scene.steps, planned))
+    began = perf_counter()
+    simulations = [driver.start(ahead, method, label, scene.step) for _ in range(copies)]
+    start_seconds = perf_counter() - began
+    every = 1 if read else scene.steps
+    rows = min(CHUNK // scene.n or 1, scene.steps // every)
+    q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
+    whole, rest = divmod(scene.steps // every, rows)
+    began = perf_counter()
+    for simulation in simulations:
+        for _ in range(whole):
+            simulation.advance(every, q, p)
+        if rest:
+            simulation.advance(every, q[:rest], p[:rest])
+    run_seconds = perf_counter() - began
+    return Bare(
+        timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
+        force_calls=simulations[0].force_calls,
+    )

@@ -30,8 +30,9 @@ class Case:
     @cached_property
     def judged(self) -> Scene:
         """The scene with its parameters as the engine's arithmetic keeps them."""
-        single = self.trajectory.arithmetic.parameters == "single"
-        return mechanics.in_single(self.scene) if single else self.scene
+        arithmetic = self.trajectory.arithmetic
+        scene = mechanics.in_single(self.scene) if arithmetic.parameters == "single" else self.scene
+        return mechanics.stiffened(scene, 1 + arithmetic.excess) if arithmetic.excess else scene
 
     @cached_property
     def steps(self) -> Integers:

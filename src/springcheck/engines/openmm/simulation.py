@@ -19,6 +19,9 @@ Friction does, and goes forwards only.
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
+
 import numpy as np
 import openmm as mm
 
@@ -49,15 +52,20 @@ _PRECISIONS = {
 }
 """Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
-displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference.
-
-The sums are read back times 2**-32 by VerletIntegrator; CustomIntegrator's kernel (8.6.1,
-customIntegratorPerDof.cc) divides by 0xFFFFFFFF, so that its forces are too large by 2.3e-10.  That is
-not the arithmetic it claims, and the checks reject it."""
+displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
 
 SHIFTED = frozenset({"verlet", "langevin-middle"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
+
+
+CUSTOM = ("euler", "semi-implicit-euler", "mts")
+"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
+
+CUSTOM_EXCESS = 2.0**-32
+"""On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
+1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
+its forces are too large by 2.3e-10.  springcheck's step defect showed it before the source was read."""
 
 
 def version() -> dict[str, str]:
@@ -69,7 +77,8 @@ def arithmetic(label: Label) -> Arithmetic:
     """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
     if label.platform in ("", "Reference", "CPU"):
         return Arithmetic()
-    return _PRECISIONS[label.precision or "single"]
+    found = _PRECISIONS[label.precision or "single"]
+    return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found
 
 
 def convention(method: Method) -> str:
@@ -82,7 +91,13 @@ def convention(method: Method) -> str:
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """Build system, integrator and context.  MethodError: the platform is not here."""
+    """Build system, integrator and context.
+
+    Raises MethodError where the platform is not here, and for friction backwards in time: OpenMM takes no
+    negative step, and friction is not undone by reflecting the momenta.
+    """
+    if step < 0 and mechanics.is_damped(scene):
+        raise MethodError(f"{label}: OpenMM takes no negative step, so friction runs forwards in time only")
     if arithmetic(label).parameters == "single":
         # the half kicks below must be those of the springs that OpenMM feels
         scene = mechanics.in_single(scene)
@@ -96,6 +111,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     velocities = np.zeros_like(positions)
     with np.errstate(all="ignore"):
         velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
+    _warm_up(context, integrator, positions)
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
@@ -224,6 +240,17 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
+
+
+def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) -> None:
+    """Take and forget a step: OpenMM compiles what it needs in the first, which belongs to the start."""
+    context.setPositions(positions)
+    # a scene that blows up in its first step is to do so in its run
+    with contextlib.suppress(mm.OpenMMException):
+        integrator.step(1)
+        context.getState(positions=True, velocities=True)
+    context.setTime(0.0)
+    context.setStepCount(0)
 
 
 class _Context:

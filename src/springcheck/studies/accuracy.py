@@ -1,0 +1,213 @@
+"""How far a run is from the true motion, taken as it streams by: nothing of it is kept but a few numbers.
+
+Error, phase and energy are three answers.  A symplectic method keeps its energy while its phase runs
+away (Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so none of them stands for another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from springcheck import checks, exact, mechanics, schemes
+from springcheck.errors import SceneError
+from springcheck.model import Extended, Floats, Integers, Reals, Scene
+
+CARRIES = 1e-3
+"""Modes whose amplitude is at least this part of the largest have a phase worth naming: in a mode that
+hardly moves, the rounding of the others is a large angle."""
+
+FRAMES = 4096
+"""Most frames at which a run is compared with the true motion.  They stand closer than a 250th of a
+period as long as the run has fewer than 16, and every finer step meets the same instants."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Accuracy:
+    """Errors of one run, over its whole trajectory unless it says otherwise.
+
+    `largest` and `end` are in the energy norm (`mechanics.norm`), in units of the start; `phase` is the
+    angle [rad] that a mode is ahead (> 0) or behind where that is largest, None where nothing turns;
+    `energy` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
+    `rounding` is the largest distance from the scheme's own motion in exact arithmetic, None where that
+    has no closed form.
+    """
+
+    largest: float
+    end: float
+    phase: float | None
+    energy: float
+    rounding: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """The true motion of a scene, and what is worth computing once for all runs of it."""
+
+    scene: Scene
+    norm: mechanics.Norm
+    modes: exact.Modes | None
+    """Modes of a scene that has them."""
+    turning: exact.Modes
+    """Modes of its springs alone, by which the phase is told."""
+    w: float
+    """Largest frequency along the motion [1/T], 0 where nothing turns."""
+    duration: float
+
+    @property
+    def angle(self) -> float:
+        """w T: the largest angle through which the motion turns."""
+        return abs(self.duration) * self.w
+
+    def at(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
+        """True q and p (f, n) after so many steps of h."""
+        return exact.true_motion(self.scene, steps, h, self.modes)
+
+
+def truth(scene: Scene) -> Truth:
+    """Prepare the true motion of a scene.
+
+    Raises:
+        SceneError: no closed form of it is known, or the scene rests, so that errors have no unit.
+    """
+    if not exact.has_true_motion(scene):
+        raise SceneError(
+            f"scene {scene.name}: its true motion is not known, so errors cannot be measured; "
+            "a study of precision needs springs, or stiffening wells without couplings"
+        )
+    norm = mechanics.norm(scene)
+    if not norm.unit > 0:
+        raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
+    known = exact.modes(scene) if mechanics.has_modes(scene) else None
+    springs = (mechanics.WallSpring, mechanics.Spring)
+    turning = exact.modes(
+        replace(scene, terms=tuple(term for term in scene.terms if isinstance(term, springs)))
+    )
+    return Truth(
+        scene=scene,
+        norm=norm,
+        modes=known,
+        turning=turning,
+        w=_frequency(scene, known),
+        duration=scene.step * scene.steps,
+    )
+
+
+def _frequency(scene: Scene, modes: exact.Modes | None) -> float:
+    """The largest w along the motion: from the modes, or from the stiffness on the true path."""
+    if modes is not None:
+        return float(np.sqrt(np.maximum(np.max(modes.w2), 0)))
+    samples = 256
+    q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
+    root = np.sqrt(scene.m)
+    w2 = [
+        np.linalg.eigvalsh(np.asarray(mechanics.stiffness(scene, row), np.float64) / root[:, None] / root)
+        for row in q
+    ]
+    return float(np.sqrt(max(float(np.max(w2)), 0.0)))
+
+
+class Errors:
+    """A sink for `simulate.play` that adds up the errors of one run of steps `h`."""
+
+    def __init__(
+        self, known: Truth, h: float, every: int, *, scheme: schemes.Scheme, judged: Scene | None = None
+    ) -> None:
+        """`judged` is the scene with its parameters as the engine keeps them, for the rounding alone."""
+        self._truth, self._h, self._every = known, h, every
+        self._frame = 0
+        self._largest = self._end = self._energy = 0.0
+        self._phase, self._last = 0.0, np.zeros(0, dtype=np.longdouble)
+        modes = known.turning
+        u, v = self._turned(known.scene.q[None], known.scene.p[None])
+        size = np.hypot(u, v)[0]
+        self._clear = (modes.w2 > 0) & (size >= CARRIES * np.max(size)) & (size > 0)
+        self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
+        self._rounding = _Rounding.of(judged or known.scene, scheme, h)
+        self._rounded = 0.0
+
+    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
+        """Take frames into account."""
+        known = self._truth
+        steps = np.arange(self._frame, self._frame + len(t)) * self._every
+        self._frame += len(t)
+        true_q, true_p = known.at(steps, self._h)
+        with np.errstate(over="ignore", invalid="ignore"):
+            error = known.norm(q - true_q, p - true_p)
+            wide_q, wide_p = q.astype(np.longdouble), p.astype(np.longdouble)
+            energy_off = mechanics.energy(known.scene, wide_q, wide_p) - mechanics.energy(
+                known.scene, true_q, true_p
+            )
+            off = np.abs(energy_off) / known.norm.unit**2
+            if self._rounding is not None:
+                own_q, own_p = self._rounding.at(steps)
+                rounded = float(np.max(known.norm(q - own_q, p - own_p)))
+                self._rounded = float(np.fmax(self._rounded, rounded))
+        self._largest = max(self._largest, float(np.max(error)))
+        self._end = float(error[-1])
+        self._energy = max(self._energy, float(np.max(off)))
+        self._turn(q, p, true_q, true_p)
+
+    @property
+    def result(self) -> Accuracy:
+        """Errors so far."""
+        return Accuracy(
+            largest=self._largest,
+            end=self._end,
+            phase=self._phase if len(self._last) else None,
+            energy=self._energy,
+            rounding=None if self._rounding is None else self._rounded,
+        )
+
+    def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
+        """Mode coordinates in which the true motion turns clockwise on circles, (f, n) each."""
+        modes = self._truth.turning
+        y, v = modes.into(q, p)
+        return np.sqrt(np.abs(modes.w2)) * (y - modes.centre()), v
+
+    def _turn(self, q: Floats, p: Floats, true_q: Extended, true_p: Extended) -> None:
+        if not len(self._last):
+            return
+        (u, v), (true_u, true_v) = self._turned(q, p), self._turned(true_q, true_p)
+        u, v, true_u, true_v = (x[:, self._clear] for x in (u, v, true_u, true_v))
+        with np.errstate(over="ignore", invalid="ignore"):
+            ahead = np.arctan2(u * true_v - v * true_u, u * true_u + v * true_v)
+            # an angle is followed from frame to frame, across pieces, past half a turn
+            ahead = np.unwrap(np.concatenate([self._last[None], ahead]), axis=0)
+        self._last = ahead[-1]
+        worst = ahead.flat[int(np.argmax(np.abs(ahead)))]
+        if abs(worst) > abs(self._phase):
+            self._phase = float(worst)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Rounding:
+    """The scheme's own motion in exact arithmetic: what differs from it is rounding, at any step."""
+
+    scene: Scene
+    modes: exact.Modes
+    matrices: Extended
+    symplectic: bool
+
+    @classmethod
+    def of(cls, scene: Scene, scheme: schemes.Scheme, h: float) -> _Rounding | None:
+        """None for an adaptive solver and where the discrete motion has no closed form."""
+        if not scheme.one_step or scheme.mixes or not mechanics.has_modes(scene):
+            return None
+        modes = exact.modes(scene)
+        if np.any((modes.w2 == 0) & (modes.pull != 0)):
+            return None
+        matrices = schemes.matrix(scheme, h=h, m=np.ones(1), k=modes.w2, c=modes.rate)
+        # below that, friction contracts area in one step more than extended precision has digits for
+        if np.any(schemes.rotation(matrices).determinant < checks.CONTRACTED):
+            return None
+        symplectic = scheme.symplectic and not mechanics.is_damped(scene)
+        return cls(scene=scene, modes=modes, matrices=matrices, symplectic=symplectic)
+
+    def at(self, steps: Integers) -> tuple[Extended, Extended]:
+        y, v = self.modes.into(self.scene.q, self.scene.p)
+        y, v = schemes.propagate(
+            self.matrices, y - self.modes.centre(), v, steps, area_preserving=self.symplectic
+        )
+        return self.modes.out_of(y + self.modes.centre(), v)

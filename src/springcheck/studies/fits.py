@@ -1,0 +1,160 @@
+"""What the points of a sweep say: order, rounding floor, the front of best methods, the cheapest way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from springcheck.model import Arithmetic, Method
+from springcheck.schemes import SCHEMES
+from springcheck.studies.points import Point
+
+ASYMPTOTIC = 2e-2
+"""Errors from here down are led by the first term of their expansion: the next is about the error's own
+size smaller, a fiftieth here and a quarter or a half of that at each finer step."""
+
+ABOVE_FLOOR = 100.0
+"""Points of a fit lie this far above their rounding, which then shifts no error by more than 1 %."""
+
+FITTED = 8
+"""The finest points that a fit takes, where there are more: the steps span a factor of 128."""
+
+FEWEST = 4
+"""Points below which no order is claimed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """Error = constant * step**order; `order` is a signed slope, with its standard error."""
+
+    order: float
+    standard_error: float
+    constant: float
+    points: int
+
+
+def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
+    """Index of the smallest of errors by ever finer steps, once `by` finer steps have not improved on it."""
+    if not errors:
+        return None
+    best = int(np.argmin(errors))
+    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
+
+
+def order(points: Sequence[Point]) -> Fit | None:
+    """Order of a method of fixed step from points by ever finer steps; None with fewer than four to go by."""
+    best = turned([point.error for point in points])
+    floor = points[best].error if best is not None else 0.0
+    chosen = [
+        point
+        for point in points[: None if best is None else best]
+        if point.error <= ASYMPTOTIC
+        and (
+            point.error >= ABOVE_FLOOR * floor
+            if point.rounding is None
+            else point.error >= ABOVE_FLOOR * point.rounding
+        )
+    ][-FITTED:]
+    if len(chosen) < FEWEST:
+        return None
+    x = np.log([abs(point.size) for point in chosen])
+    y = np.log([point.error for point in chosen])
+    centred = x - np.mean(x)
+    spread = float(np.sum(centred**2))
+    slope = float(np.sum(centred * y)) / spread
+    left = y - np.mean(y) - slope * centred
+    error = float(np.sqrt(np.sum(left**2) / (len(x) - 2) / spread))
+    constant = float(np.exp(np.mean(y) - slope * np.mean(x)))
+    return Fit(order=slope, standard_error=error, constant=constant, points=len(x))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """What one rounding a step becomes in the end: eps times `value(steps)`, with its name and reason."""
+
+    name: Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]
+    why: str
+    eps: float
+    """Relative spacing of the numbers that are rounded."""
+    angle: float
+    """w T, the largest angle through which the motion turns."""
+
+    def value(self, steps: float) -> float:
+        """The condition of a run of so many steps."""
+        match self.name:
+            case "sqrt(N)":
+                return float(np.sqrt(steps))
+            case "N":
+                return float(steps)
+            case "N**1.5/(w T)":
+                return float(steps**1.5 / self.angle)
+            case "w T":
+                return self.angle
+
+
+def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition | None:
+    """How rounding adds up in a method over a run that turns by `angle`; None for an adaptive solver.
+
+    Each step rounds the state once, up or down as it falls, and the motion carries that on: a random
+    walk, eps sqrt(N).  Two things are worse.  A velocity rebuilt as (x' - x)/h takes on eps x / h at each
+    step, a walk of eps sqrt(N) / (h w).  A divisor 1 + (h w)**2 that is rounded once and used in every
+    step turns the same way every time, eps N.  Parameters kept in single precision detune the motion by
+    their own eps, whatever the step.
+    """
+    scheme = SCHEMES[method.scheme]
+    if not scheme.one_step or angle <= 0:
+        return None
+    eps = 2 * max(arithmetic.state, 2.0**-53)
+    if arithmetic.parameters == "single" and arithmetic.force < 2.0**-24:
+        return Condition(
+            name="w T", why="parameters kept in single precision detune it", eps=2.0**-23, angle=angle
+        )
+    if method.rebuilds_velocity:
+        why = "each step rounds the position, and the velocity is rebuilt from it over h"
+        return Condition(name="N**1.5/(w T)", why=why, eps=eps, angle=angle)
+    if scheme.implicit:
+        why = "one rounded divisor is used in every step"
+        return Condition(name="N", why=why, eps=eps, angle=angle)
+    why = "each step rounds the state once, up or down: a random walk"
+    return Condition(name="sqrt(N)", why=why, eps=eps, angle=angle)
+
+
+TYPICAL = 0.25
+"""Rounding over eps times its condition, where it cannot be measured: of the order of the standard
+deviation of a rounding, eps/sqrt(12), in a sum whose size changes sign."""
+
+
+def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: float) -> tuple[float, float]:
+    """Where the fitted error meets the rounding -> (steps, error there)."""
+    seen = [
+        point.rounding / (how.eps * how.value(point.steps))
+        for point in points[-4:]
+        if point.rounding and point.steps
+    ]
+    per = how.eps * (float(np.median(seen)) if seen else TYPICAL)
+    low, high = 0.0, np.log(1e18)
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        steps = float(np.exp(middle))
+        over = fit.constant * (abs(duration) / steps) ** fit.order > per * how.value(steps)
+        low, high = (middle, high) if over else (low, middle)
+    steps = float(np.exp(low))
+    return steps, 2 * per * how.value(steps)
+
+
+def front(points: Sequence[Point]) -> list[Point]:
+    """The points that no other beats in both error and time, from the fastest to the most accurate."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda point: (point.seconds, point.error)):
+        if not best or point.error < best[-1].error:
+            best.append(point)
+    return best
+
+
+def cheapest(points: Sequence[Point], target: float) -> Point | None:
+    """The fastest point whose error is within the target, or None."""
+    reaching = [point for point in points if point.error <= target]
+    return min(reaching, key=lambda point: point.seconds) if reaching else None

@@ -1,0 +1,294 @@
+"""Error against run time: how much accuracy a method gives for how much work, down to rounding.
+
+Every method of fixed step takes the same duration T in N steps of the double h = T/N, N doubling from the
+edge of stability until the error turns up again on its rounding, or the time budget ends.  An adaptive
+solver's tolerance falls instead.  What is compared with the true motion and what is timed are separate
+runs.  Timed runs record nothing; methods take turns, so that a machine that slows down slows all alike.
+
+The design follows the work-precision diagrams of DiffEqDevTools (SciML): one warm-up, the minimum of the
+repeats to quote.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil
+from pathlib import Path
+from time import get_clock_info, perf_counter
+
+import numpy as np
+
+from springcheck import mechanics, simulate, store
+from springcheck.model import Label, Scene, Stopped
+from springcheck.schemes import SCHEMES
+from springcheck.studies import fits
+from springcheck.studies.accuracy import Errors, Truth, truth
+from springcheck.studies.outcome import Answer, MethodSummary, PrecisionStudy, machine
+from springcheck.studies.points import Point
+from springcheck.studies.sweeps import (
+    PLANNED,
+    Sweep,
+    affordable,
+    begin,
+    blank,
+    is_finished,
+    repeats,
+    to_time,
+    warm_ups,
+)
+
+BUDGET = 75.0
+"""Seconds that a study takes unless it is told otherwise."""
+
+TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+"""Errors for which the cheapest way is looked up."""
+
+TICKS = 1000
+"""A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
+
+READS = 3
+"""Timings of a run with every step read."""
+
+READ_SECONDS = 0.1
+"""Longest run that is also timed with every step read: reading costs the same at each step."""
+
+DOCUMENT = "precision"
+"""Name of the study's document in a store."""
+
+Progress = Callable[[float, str], None]
+"""Told of the seconds spent and of what comes next."""
+
+
+def study(
+    scene: Scene,
+    labels: Sequence[Label],
+    *,
+    budget: float = BUDGET,
+    progress: Progress | None = None,
+) -> PrecisionStudy:
+    """Measure these methods on a scene within about `budget` seconds.
+
+    A method that cannot run, a run that diverges and a sweep that is cut off are points with their
+    reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.
+
+    Raises:
+        SceneError: the true motion of the scene is not known, or nothing moves in it.
+    """
+    began = perf_counter()
+    known = truth(scene)
+    sweeps = [begin(scene, label, known) for label in labels]
+    interrupted = False
+
+    def tell(what: str) -> None:
+        if progress:
+            progress(perf_counter() - began, what)
+
+    try:
+        while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
+            _level(ready, known, tell)
+    except KeyboardInterrupt:
+        interrupted = True
+    why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
+    for sweep in _open(sweeps):
+        sweep.points.append(blank(sweep, "cut off", why))
+    return _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
+
+
+def record(
+    scene: Scene,
+    labels: Sequence[Label],
+    path: str | Path,
+    *,
+    budget: float = BUDGET,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> PrecisionStudy:
+    """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    command = "\n".join(["precision", *map(str, labels), scene.text])
+    with store.open_new(path, command, force=force) as journal:
+        found = study(scene, labels, budget=budget, progress=progress)
+        for table in found.tables():
+            journal.add(table)
+        journal.commit(scene, documents={DOCUMENT: json.dumps(found.document(), allow_nan=False)})
+    return found
+
+
+def _open(sweeps: list[Sweep]) -> list[Sweep]:
+    return [sweep for sweep in sweeps if sweep.scene is not None]
+
+
+def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
+    """The next point of each of these sweeps: errors one by one, then timings in turn."""
+    points: list[Point] = []
+    for sweep in sweeps:
+        tell(f"{sweep.label}, errors")
+        points.append(_errors(sweep, known))
+    tell(f"timing {len(sweeps)} methods in turn")
+    clocks = [
+        _Clock(sweep=sweep, scene=to_time(known.scene, sweep))
+        for sweep, point in zip(sweeps, points, strict=True)
+        if point.complete
+    ]
+    _time(clocks)
+    timed = {id(clock.sweep): clock for clock in clocks}
+    for sweep, point in zip(sweeps, points, strict=True):
+        clock = timed.get(id(sweep))
+        sweep.points.append(point if clock is None else clock.onto(point))
+        if clock and not clock.gave_up:
+            before, sweep.cost = sweep.cost, min(run.timing.run for run in clock.runs)
+            sweep.read = min(clock.reads, default=np.inf)
+            if sweep.method.adaptive and before:
+                sweep.growth = max(1.2, sweep.cost / before)
+        sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
+
+
+def _errors(sweep: Sweep, known: Truth) -> Point:
+    """Run for the errors."""
+    scene = sweep.scene
+    assert scene is not None
+    errors = Errors(
+        known,
+        scene.step,
+        scene.every,
+        scheme=SCHEMES[sweep.method.scheme],
+        judged=mechanics.in_single(known.scene) if sweep.arithmetic.parameters == "single" else None,
+    )
+    record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
+    outcome = record.outcome
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
+    if outcome.status != "complete":
+        message = f"after {outcome.step} steps: {outcome.message}"
+        return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
+    found = errors.result
+    if not (np.isfinite(found.largest) and np.isfinite(found.energy)):
+        return blank(sweep, "diverged", "the error is beyond the range of numbers")
+    return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
+
+
+def tick() -> float:
+    """The smallest difference that the clock shows [s]."""
+    seen = []
+    for _ in range(100):
+        began = perf_counter()
+        now = perf_counter()
+        while now == began:
+            now = perf_counter()
+        seen.append(now - began)
+    return max(min(seen), get_clock_info("perf_counter").resolution)
+
+
+@dataclass(kw_only=True, eq=False)
+class _Clock:
+    """The timings of one point while they are taken."""
+
+    sweep: Sweep
+    scene: Scene
+    copies: int = 1
+    count: int = 0
+    runs: list[simulate.Bare] = field(default_factory=list)
+    reads: list[float] = field(default_factory=list)
+    gave_up: str = ""
+
+    def warm_up(self, shortest: float) -> None:
+        """Find how many runs fit into one timing, and how many timings are worth taking."""
+        expected = self.sweep.cost * self.sweep.growth
+        if warm_ups(expected):
+            warm = self._bare()
+            expected = warm.timing.run if warm else 0.0
+        self.copies = max(1, min(64, ceil(shortest / max(expected, 1e-9))))
+        self.count = repeats(expected)
+
+    def turn(self, number: int) -> None:
+        """One repeat."""
+        run = self._bare(copies=self.copies)
+        if run:
+            self.runs.append(run)
+        if number < READS and self.sweep.read * self.sweep.growth <= READ_SECONDS:
+            read = self._bare(copies=self.copies, read=True)
+            if read:
+                self.reads.append(read.timing.run)
+
+    def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
+        try:
+            return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+        except Stopped as stop:
+            self.gave_up = str(stop)
+            return None
+
+    def onto(self, point: Point) -> Point:
+        """The point with its timings."""
+        if self.gave_up:
+            return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
+        return replace(
+            point,
+            run_repeats=tuple(run.timing.run for run in self.runs),
+            start_repeats=tuple(run.timing.start for run in self.runs),
+            read_repeats=tuple(self.reads),
+            force_calls=self.runs[0].force_calls,
+        )
+
+
+def _time(clocks: list[_Clock]) -> None:
+    """Warm up, then repeat in turn: A B C A B C."""
+    shortest = TICKS * tick()
+    for clock in clocks:
+        clock.warm_up(shortest)
+    for number in range(max((clock.count for clock in clocks), default=0)):
+        for clock in clocks:
+            if number < clock.count and not clock.gave_up:
+                clock.turn(number)
+
+
+def _put_together(
+    scene: Scene, sweeps: list[Sweep], known: Truth, budget: float, seconds: float, interrupted: bool
+) -> PrecisionStudy:
+    points = tuple(point for sweep in sweeps for point in sweep.points)
+    timed = [point for point in points if point.complete and point.run_repeats]
+    return PrecisionStudy(
+        scene=scene,
+        budget=budget,
+        seconds=seconds,
+        interrupted=interrupted,
+        points=points,
+        methods=tuple(_summary(sweep, known) for sweep in sweeps),
+        front=tuple(fits.front(timed)),
+        cheapest=tuple(Answer(target=target, point=fits.cheapest(timed, target)) for target in TARGETS),
+        machine=machine({sweep.label.engine for sweep in sweeps}),
+        tick=tick(),
+    )
+
+
+def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
+    points = sweep.complete
+    timed = [point for point in points if point.run_repeats]
+    fit = None if sweep.method.adaptive else fits.order(points)
+    # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
+    best = fits.turned([point.error for point in points], by=2 if sweep.method.adaptive else 1)
+    expected = None
+    if best is None and fit and sweep.condition:
+        expected = fits.expected_floor(points, fit, sweep.condition, known.duration)
+    return MethodSummary(
+        method=str(sweep.label),
+        order=fit.order if fit else None,
+        order_standard_error=fit.standard_error if fit else None,
+        order_points=fit.points if fit else 0,
+        constant=fit.constant if fit else None,
+        floor=points[best].error if best is not None else None,
+        floor_steps=points[best].steps if best is not None else None,
+        condition=sweep.condition,
+        expected_floor=expected,
+        # what a call costs beside its steps only adds to a short run, so that the minimum is the step's own
+        seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
+        seconds_per_force_call=min((p.seconds / p.force_calls for p in timed if p.force_calls), default=None),
+        read_seconds_per_step=min(
+            (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None
+        ),
+        start_seconds=min((min(p.start_repeats) for p in timed if p.start_repeats), default=None),
+        first_start_seconds=sweep.first_start,
+    )

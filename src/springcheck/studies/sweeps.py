@@ -1,0 +1,205 @@
+"""One method on its way from coarse to fine, and whose turn it is: a budget of seconds shared fairly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil, floor
+from time import perf_counter
+
+import numpy as np
+
+from springcheck import engines, simulate
+from springcheck.errors import MethodError
+from springcheck.model import Arithmetic, Label, Method, Scene, Stopped
+from springcheck.schemes import SCHEMES
+from springcheck.studies import fits
+from springcheck.studies.accuracy import FRAMES, Truth
+from springcheck.studies.points import Point
+
+TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
+"""Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double
+precision: how a solver answers that is a row too."""
+
+RESERVED = 0.75
+"""Part of the time left that may be set aside for the methods that can reach their floor."""
+
+PLANNED = 1_000_000_000
+"""Steps that an engine may take to lie before it: a sweep to the floor is worth compiling for."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Sweep:
+    """One method on its way from coarse to fine; the only state that changes while a study runs."""
+
+    label: Label
+    scenes: Iterator[Scene]
+    """Those that are still to come."""
+    scene: Scene | None = None
+    """The next one, None at the end."""
+    points: list[Point]
+    arithmetic: Arithmetic
+    condition: fits.Condition | None
+    """How rounding adds up in it."""
+    cost: float = 0.0
+    """Seconds of one bare run at the last point."""
+    growth: float = 2.0
+    """What one point costs, compared with the one before."""
+    read: float = 0.0
+    """Seconds of the last run with every step read."""
+    first_start: float | None = None
+
+    @property
+    def method(self) -> Method:
+        """What the engine says of the method."""
+        return engines.method(self.label)
+
+    @property
+    def complete(self) -> list[Point]:
+        """The points that have errors."""
+        return [point for point in self.points if point.complete]
+
+
+def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
+    """A sweep at its coarsest point, or at its end where the method cannot run."""
+    method = engines.method(label)
+    plain = replace(scene, quantities=("q", "p"))
+    limit = SCHEMES[method.scheme].limit
+    sweep = Sweep(
+        label=label,
+        scenes=by_tolerance(plain) if method.adaptive else by_step(plain, limit, known),
+        points=[],
+        arithmetic=Arithmetic(),
+        condition=None,
+    )
+    reason = engines.refusal(scene, label) or engines.absence(label.engine)
+    if reason is None:
+        try:
+            sweep.arithmetic = engines.load(label.engine).arithmetic(label)
+            sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
+            sweep.scene = next(sweep.scenes)
+            began = perf_counter()
+            simulate.bare(sweep.scene, label, planned=PLANNED)
+            sweep.first_start = perf_counter() - began
+        except MethodError as error:
+            reason = str(error)
+        except Stopped:
+            # the run for the errors meets this again and makes a row of it
+            pass
+    if reason is not None:
+        sweep.scene = None
+        sweep.points.append(blank(sweep, "cannot run", reason))
+    return sweep
+
+
+def coarsest(known: Truth, limit: float) -> int:
+    """The fewest steps worth taking: the first below the limit of stability, or h w = 1 without one."""
+    if 0 < limit < np.inf:
+        return max(1, floor(known.angle / limit) + 1)
+    return max(1, ceil(known.angle))
+
+
+def by_step(scene: Scene, limit: float, known: Truth) -> Iterator[Scene]:
+    """The scene in ever more steps, read at the same instants from some 4096 steps on."""
+    steps, every = coarsest(known, limit), 1
+    while steps < 2**31:
+        yield replace(scene, step=known.duration / steps, steps=steps, every=every)
+        steps *= 2
+        every = every * 2 if steps // every > FRAMES else every
+
+
+def by_tolerance(scene: Scene) -> Iterator[Scene]:
+    """The scene at ever smaller tolerances, on a time grid fine enough to see its largest error."""
+    finer = max(1, FRAMES // scene.steps)
+    h = scene.step / finer
+    for tolerance in TOLERANCES:
+        yield replace(scene, step=h, steps=scene.steps * finer, every=1, tolerance=tolerance)
+
+
+def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
+    """Those whose turn it is with so many seconds left; the cheapest that fits at all where none's is.
+
+    What the methods need that can reach their floor is set aside for them; the others share the rest
+    equally.  A method that waits loses nothing: when others have finished, it goes on.
+    """
+    needs = sorted((_need(sweep, known.duration), i) for i, sweep in enumerate(sweeps))
+    aside, reserved = set(), 0.0
+    for need, i in needs:
+        if reserved + need <= RESERVED * left:
+            aside.add(i)
+            reserved += need
+    share = (left - reserved) / max(1, len(sweeps) - len(aside))
+    ready = [
+        sweep
+        for i, sweep in enumerate(sweeps)
+        if (i in aside and _price(sweep) <= left) or _price(sweep) <= share
+    ]
+    if ready or not sweeps:
+        return ready
+    cheapest = min(sweeps, key=_price)
+    return [cheapest] if _price(cheapest) <= left else []
+
+
+def _need(sweep: Sweep, duration: float) -> float:
+    """Seconds until a method of fixed step has passed its floor; infinite while that is not known."""
+    points = sweep.complete
+    fit = fits.order(points) if not sweep.method.adaptive else None
+    if fit is None or sweep.condition is None:
+        return np.inf
+    steps, _ = fits.expected_floor(points, fit, sweep.condition, duration)
+    run, last, total = sweep.cost, float(points[-1].steps or 1), 0.0
+    while last < 1.2 * steps:
+        run, last = 2 * run, 2 * last
+        total += run * _runs(run)
+    return total
+
+
+def _runs(seconds: float) -> int:
+    """Runs that a point of so many seconds takes: errors, warm-up and repeats."""
+    return 1 + warm_ups(seconds) + repeats(seconds)
+
+
+def repeats(seconds: float) -> int:
+    """Timed runs: fewer where one is long and averages over the machine's noise by itself."""
+    return 9 if seconds < 0.02 else 5 if seconds < 0.1 else 3 if seconds < 1 else 2
+
+
+def warm_ups(seconds: float) -> int:
+    """A long run is warm after its first thousandth, and after the run for the errors before it."""
+    return 1 if seconds < 0.1 else 0
+
+
+def _price(sweep: Sweep) -> float:
+    """Seconds that the next point will take."""
+    run = sweep.cost * sweep.growth
+    return run * _runs(run)
+
+
+def is_finished(sweep: Sweep) -> bool:
+    """Whether the error of a method of fixed step has turned up.
+
+    Where the first term leads, a smaller step makes it smaller; nothing but rounding can turn it up.
+    """
+    errors = [point.error for point in sweep.complete]
+    return not sweep.method.adaptive and fits.turned(errors) is not None
+
+
+def to_time(scene: Scene, sweep: Sweep) -> Scene:
+    """What is timed at a point: an adaptive solver on the scene's own time grid, else the point itself."""
+    assert sweep.scene is not None
+    if sweep.method.adaptive:
+        return replace(scene, tolerance=sweep.scene.tolerance)
+    return sweep.scene
+
+
+def blank(sweep: Sweep, outcome: str, message: str = "") -> Point:
+    """The sweep's next point, with nothing measured."""
+    scene, adaptive = sweep.scene, sweep.method.adaptive
+    return Point(
+        method=str(sweep.label),
+        step=None if scene is None or adaptive else scene.step,
+        tolerance=scene.tolerance if scene is not None and adaptive else None,
+        steps=None if scene is None or adaptive else scene.steps,
+        outcome=outcome,
+        message=message,
+    )

@@ -1,0 +1,402 @@
+"""Errors obey the laws of the schemes, nothing is lost, and nothing but seconds depends on the clock."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import engines, exact, scenes, simulate, store
+from springcheck.errors import SceneError, StoreError
+from springcheck.figures import precision as figure
+from springcheck.model import Scene
+from springcheck.schemes import SCHEMES
+from springcheck.studies import accuracy, fits, precision, sweeps
+from springcheck.studies.accuracy import Accuracy
+from springcheck.studies.points import Point
+
+FIXED = [str(label) for label in engines.match(("*",)) if not engines.method(label).adaptive]
+LINEAR = [name for name in scenes.names() if exact.has_true_motion(scenes.load_scene(name))]
+
+
+def serving(labels: list[str], names: list[str]) -> list[tuple[str, str]]:
+    return [
+        (label, name)
+        for name in names
+        for label in labels
+        if engines.refusal(scenes.load_scene(name), engines.parse(label)) is None
+    ]
+
+
+def measure(scene: Scene, label: str, counts: list[int]) -> list[Point]:
+    """Errors at these numbers of steps, without a clock."""
+    known, parsed = accuracy.truth(scene), engines.parse(label)
+    points = []
+    for steps in counts:
+        every = max(1, steps // 1024)
+        here = replace(scene, step=known.duration / steps, steps=steps, every=every, quantities=("q", "p"))
+        errors = accuracy.Errors(known, here.step, every, scheme=SCHEMES[engines.method(parsed).scheme])
+        record = simulate.play(here, parsed, errors, planned=sweeps.PLANNED)
+        assert record.outcome.status == "complete"
+        points.append(
+            Point(
+                method=label,
+                step=here.step,
+                tolerance=None,
+                steps=steps,
+                outcome="complete",
+                accuracy=errors.result,
+                force_calls=record.force_calls,
+            )
+        )
+    return points
+
+
+def made_up(
+    errors: list[float], seconds: list[float] | None = None, rounding: list[float] | None = None
+) -> list[Point]:
+    """Points at steps 1, 1/2, 1/4 ... with these errors."""
+    return [
+        Point(
+            method="own:euler",
+            step=0.5**i,
+            tolerance=None,
+            steps=2**i,
+            outcome="complete",
+            accuracy=Accuracy(
+                largest=error, end=error, phase=None, energy=0.0, rounding=rounding[i] if rounding else None
+            ),
+            run_repeats=(seconds[i] if seconds else 2.0**i,),
+        )
+        for i, error in enumerate(errors)
+    ]
+
+
+@pytest.mark.parametrize(("label", "name"), serving(FIXED, ["spring", "spring-uneven"]))
+def test_every_method_has_the_order_of_its_scheme(label: str, name: str, need: Callable[[str], None]) -> None:
+    need(label)
+    scheme = SCHEMES[engines.method(engines.parse(label)).scheme]
+    # errors of at most 1e-2, and a hundred times the rounding at least
+    counts = [2**i for i in range(14, 19)]
+    if scheme.order == 2:
+        counts = [256, 512, 1024, 2048]
+    fit = fits.order(measure(scenes.load_scene(name), label, counts))
+    assert fit is not None
+    assert abs(fit.order - scheme.order) < 0.02
+    assert fit.standard_error < 0.01
+
+
+def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], None]) -> None:
+    # one part in 1e4 of the step is an error of phase that no smaller step removes
+    scene = scenes.load_scene("spring-uneven")
+    known = accuracy.truth(scene)
+    points = []
+    for steps in (256, 512, 1024, 2048, 4096):
+        h = known.duration / steps
+        errors = accuracy.Errors(known, h, 1, scheme=SCHEMES["semi-implicit-euler"])
+        wrong = replace(scene, step=h * 1.0001, steps=steps, every=1, quantities=("q", "p"))
+        simulate.play(wrong, engines.parse("own:semi-implicit-euler"), errors)
+        points.append(
+            Point(method="", step=h, tolerance=None, steps=steps, outcome="complete", accuracy=errors.result)
+        )
+    # against its own closed form the fault is plain, and ten million times the rounding
+    rounding = [point.rounding for point in points]
+    assert all(part is not None and part > 1e-4 for part in rounding)
+    fit = fits.order([replace(p, accuracy=replace(p.accuracy, rounding=None)) for p in points if p.accuracy])
+    assert fit is None or abs(fit.order - 1) > 0.02 or fit.standard_error > 0.01
+
+
+@pytest.mark.parametrize(
+    "label", [label for label, _ in serving(FIXED, ["spring-uneven"]) if not label.startswith("ase")]
+)
+def test_rounding_adds_up_as_its_condition_says(label: str, need: Callable[[str], None]) -> None:
+    need(label)
+    scene = scenes.load_scene("spring-uneven")
+    known, parsed = accuracy.truth(scene), engines.parse(label)
+    method, driver = engines.method(parsed), engines.load(parsed.engine)
+    how = fits.condition(method, driver.arithmetic(parsed), known.angle)
+    assert how is not None
+    counts = [90_112, 180_224, 360_448] if "openmm" in label else [1_441_792, 2_883_584, 5_767_168]
+    seen = [
+        point.rounding / (how.eps * how.value(point.steps))
+        for point in measure(scene, label, counts)
+        if point.rounding and point.steps
+    ]
+    assert len(seen) == 3
+    # a biased rounding may happen to fall near 0 at one step: the largest of three counts
+    assert 0.1 / 3 < max(seen) < 10
+
+
+def test_the_floor_of_openmm_verlet_is_reached_and_within_ten_of_its_condition(
+    need: Callable[[str], None],
+) -> None:
+    need("openmm:verlet")
+    scene = scenes.load_scene("spring-uneven")
+    known = accuracy.truth(scene)
+    points = measure(scene, "openmm:verlet", [2**i for i in range(13, 22)])
+    best = fits.turned([point.error for point in points])
+    assert best is not None
+    label = engines.parse("openmm:verlet")
+    how = fits.condition(engines.method(label), engines.load("openmm").arithmetic(label), known.angle)
+    assert how is not None
+    assert how.name == "N**1.5/(w T)"
+    ratio = points[best].error / (how.eps * how.value(points[best].steps or 0))
+    assert 0.1 < ratio < 10
+    fit = fits.order(points)
+    assert fit is not None
+    assert abs(fit.order - 2) < 0.02
+    steps, error = fits.expected_floor(points[: best - 1], fit, how, known.duration)
+    assert 0.25 < steps / (points[best].steps or 0) < 4
+    assert 0.25 < error / points[best].error < 4
+
+
+def test_the_phase_error_of_semi_implicit_euler_is_that_of_its_frequency() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    known = accuracy.truth(scene)
+    (point,) = measure(scene, "own:semi-implicit-euler", [23])
+    w = np.sqrt(np.longdouble(2.9) / np.longdouble(3.7))
+    h = known.duration / 23
+    turned = 23 * (2 * np.arcsin(h * w / 2) - h * w)
+    assert point.accuracy is not None
+    assert point.accuracy.phase is not None
+    # the phase runs ahead steadily; the ellipse on which the scheme turns adds up to h w / 2 in between
+    assert abs(point.accuracy.phase - float(turned)) <= float(h * w / 2) * 1.1
+
+
+def test_a_phase_is_followed_past_half_a_turn() -> None:
+    scene = scenes.load_scene("spring")
+    known = accuracy.truth(replace(scene, steps=2000))
+    w, h = 1.0, known.duration / 400
+    errors = accuracy.Errors(known, h, 1, scheme=SCHEMES["velocity-verlet"])
+    t = np.arange(401) * h
+    # a motion that is faster by 5 %: after 200 time units it is 10 rad ahead
+    q, p = np.sin(1.05 * w * t)[:, None], np.cos(1.05 * w * t)[:, None]
+    for piece in (slice(0, 100), slice(100, 101), slice(101, 401)):
+        errors(t[piece], q[piece], p[piece], None)
+    assert errors.result.phase == pytest.approx(0.05 * t[-1], rel=1e-12)
+
+
+def test_the_energy_error_of_explicit_euler_is_its_growth() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    (point,) = measure(scene, "own:euler", [1000])
+    h = accuracy.truth(scene).duration / 1000
+    growth = (1 + h * h * 2.9 / 3.7) ** 1000 - 1
+    assert point.accuracy is not None
+    assert point.accuracy.energy == pytest.approx(growth, rel=1e-10)
+    assert point.accuracy.end == point.accuracy.largest
+
+
+def test_the_error_of_a_mode_at_rest_has_no_phase() -> None:
+    scene = scenes.load_scene("spring")
+    free = replace(scene, terms=(replace(scene.terms[0], k=np.zeros(1)),))  # type: ignore[type-var]
+    (point,) = measure(free, "own:semi-implicit-euler", [50])
+    assert point.accuracy is not None
+    assert point.accuracy.phase is None
+    assert point.accuracy.largest < 1e-14
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_every_point_ends_at_the_same_time(name: str) -> None:
+    scene = scenes.load_scene(name)
+    known = accuracy.truth(scene)
+    for i, here in enumerate(sweeps.by_step(scene, 2.0, known)):
+        # one rounding of T/N, of the order of the spacing of doubles
+        assert abs(here.steps * np.longdouble(here.step) - known.duration) <= 2.0**-53 * known.duration
+        assert here.steps % here.every == 0
+        assert here.frames <= max(accuracy.FRAMES + 1, sweeps.coarsest(known, 2.0) + 1)
+        if i > 24:
+            break
+
+
+def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
+    known = accuracy.truth(scenes.load_scene("spring-uneven"))
+    steps = sweeps.coarsest(known, 2.0)
+    assert known.angle / steps < 2 <= known.angle / (steps - 1)
+    for limit in (0.0, np.inf):
+        assert 0.9 < known.angle / sweeps.coarsest(known, limit) <= 1
+
+
+def test_the_same_study_twice_gives_the_same_errors_and_force_calls() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    labels = list(engines.match(("own:*", "sundials:adams")))
+    one, other = (precision.study(scene, labels, budget=2.5) for _ in range(2))
+    assert len(one.points) > 20
+    compared = 0
+    known = {(p.method, p.step, p.tolerance): p for p in other.points if p.complete}
+    for point in one.points:
+        twin = known.get((point.method, point.step, point.tolerance))
+        # how far a sweep comes depends on the machine; what it finds on the way does not
+        if point.complete and twin:
+            compared += 1
+            assert point.accuracy == twin.accuracy
+            assert point.force_calls == twin.force_calls
+    assert compared > 20
+
+
+def test_what_fails_stays_in_with_its_reason(need: Callable[[str], None]) -> None:
+    need("openmm:verlet")
+    scene = replace(scenes.load_scene("spring-uneven"), steps=40_000, kind="particles")
+    labels = [engines.parse("own:euler"), engines.parse("openmm:verlet@CUDA-double")]
+    found = precision.study(scene, labels, budget=2.0)
+    worst = found.of("own:euler")[0]
+    # h w = 1 grows by sqrt(2) a step, past the largest double after 2048 steps
+    assert worst.outcome == "diverged"
+    assert "not finite" in worst.message
+    assert worst.accuracy is None
+    absent = found.of("openmm:verlet@CUDA-double")
+    if len(absent) == 1:
+        assert absent[0].outcome == "cannot run"
+        assert "CUDA" in absent[0].message
+    document = found.document()
+    assert len(document["points"]) == len(found.points)
+    assert document["points"][0]["outcome"].startswith("diverged: after")
+    json.dumps(document, allow_nan=False)
+
+
+def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
+    scene = replace(scenes.load_scene("spring"), kind="circuit")
+    found = precision.study(scene, [engines.parse("ase:velocity-verlet")], budget=1.0)
+    (point,) = found.points
+    assert point.outcome == "cannot run"
+    assert "circuit" in point.message
+
+
+def test_a_budget_that_ends_is_said() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    found = precision.study(scene, [engines.parse("own:semi-implicit-euler")], budget=0.5)
+    last = found.points[-1]
+    assert last.outcome == "cut off"
+    assert "budget of 0.5 s" in last.message
+    (method,) = found.methods
+    assert method.floor is None
+
+
+def test_an_interrupted_study_keeps_every_finished_point() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    told: list[str] = []
+
+    def interrupt(seconds: float, what: str) -> None:
+        told.append(what)
+        if len(told) == 12:
+            raise KeyboardInterrupt
+
+    found = precision.study(scene, list(engines.match(("own:*",))), budget=5.0, progress=interrupt)
+    assert found.interrupted
+    # three methods and one round of timings a level: 12 calls are three levels less one timing
+    assert sum(point.complete for point in found.points) == 6
+    assert all(point.run_repeats for point in found.points if point.complete)
+    assert [point.message for point in found.points if not point.complete] == ["interrupted before it"] * 3
+
+
+def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
+    scene = scenes.load_scene("spring-uneven")
+    labels = list(engines.match(("own:semi-implicit-euler", "sundials:bdf")))
+    path = tmp_path / "study.h5"
+    found = precision.record(scene, labels, path, budget=1.5)
+    assert store.check(path) == []
+    document = json.loads(store.document(path, precision.DOCUMENT))
+    assert document == found.document()
+    table = store.read_tables(path)["precision/own:semi-implicit-euler"]
+    assert table.signal == "max_error"
+    assert table.axes == ("run_seconds",)
+    mine = found.of("own:semi-implicit-euler")
+    assert table.columns["force_calls"][0] == mine[0].steps
+    repeats = np.asarray(table.columns["run_seconds_repeats"])
+    assert np.nanmin(repeats[0]) == mine[0].seconds
+    with pytest.raises(StoreError, match="exists"):
+        precision.record(scene, labels, path, budget=1.5)
+    written = figure.draw(document, tmp_path)
+    assert {file.suffix for file in written} == {".png", ".svg"}
+    assert "own:semi-implicit-euler" in (tmp_path / "precision.svg").read_text()
+
+
+def test_the_document_has_the_fields_that_it_promises() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    found = precision.study(scene, [engines.parse("own:euler")], budget=0.5).document()
+    point = found["points"][3]
+    for name in ("step", "steps", "max_error", "end_error", "phase_error", "energy_error", "run_seconds",
+                 "start_seconds", "read_seconds", "force_calls"):  # fmt: skip
+        assert isinstance(point[name], int | float), name
+    low, high = point["run_seconds_quartiles"]
+    assert 0 < point["run_seconds"] <= low <= high
+    assert point["tolerance"] is None
+    assert point["outcome"] == "complete"
+    assert {"order", "order_standard_error", "floor", "seconds_per_step"} <= set(found["methods"][0])
+    assert [answer["error"] for answer in found["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
+
+
+def test_several_short_runs_in_one_timing_count_as_one() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    label = engines.parse("own:semi-implicit-euler")
+    for read in (False, True):
+        found = simulate.bare(replace(scene, steps=70), label, copies=5, read=read)
+        assert found.force_calls == 70
+
+
+def test_a_scene_at_rest_has_no_error_to_measure() -> None:
+    scene = scenes.load_scene("spring")
+    with pytest.raises(SceneError, match="rests in equilibrium"):
+        precision.study(replace(scene, p=np.zeros(1)), [engines.parse("own:euler")])
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 4.0])
+def test_a_fit_finds_the_order_of_a_power_law(order: float) -> None:
+    fit = fits.order(made_up([0.01 * 0.5 ** (order * i) for i in range(7)]))
+    assert fit is not None
+    assert fit.order == pytest.approx(order, rel=1e-12)
+    assert fit.standard_error < 1e-12
+    assert fit.constant == pytest.approx(0.01, rel=1e-12)
+
+
+def test_a_fit_leaves_out_what_is_coarse_and_what_is_rounding() -> None:
+    errors = [3.0, 0.5, *(0.01 * 0.25**i for i in range(6))]
+    plain = fits.order(made_up(errors))
+    assert plain is not None
+    assert plain.points == 6
+    rounding = [1e-17] * 6 + [1e-6] * 2
+    fit = fits.order(made_up([*errors[:6], 3e-6, 5e-6], rounding=rounding))
+    assert fit is not None
+    assert fit.points == 4
+    assert fit.order == pytest.approx(2, rel=1e-12)
+
+
+def test_no_order_is_claimed_from_three_points() -> None:
+    assert fits.order(made_up([0.01, 0.005, 0.0025])) is None
+
+
+def test_an_error_has_turned_only_when_a_finer_step_is_worse() -> None:
+    assert fits.turned([1e-2, 1e-4, 1e-6]) is None
+    assert fits.turned([1e-2, 1e-4, 1e-6, 2e-6]) == 2
+    assert fits.turned([1e-2, 1e-4, 1e-6, 2e-6], by=2) is None
+    # far from the asymptote an error may go up and down as it likes
+    assert fits.turned([2.0, 1.5, 3.0]) is None
+    assert fits.turned([]) is None
+
+
+def test_no_point_of_the_front_is_beaten_and_every_other_is() -> None:
+    generator = np.random.default_rng(7)
+    points = made_up(
+        list(generator.lognormal(size=60)), seconds=[float(x) for x in generator.lognormal(size=60)]
+    )
+    best = fits.front(points)
+
+    def beaten(point: Point) -> bool:
+        return any(
+            other.error <= point.error
+            and other.seconds <= point.seconds
+            and (other.error, other.seconds) != (point.error, point.seconds)
+            for other in points
+        )
+
+    assert [point for point in sorted(points, key=lambda p: p.seconds) if not beaten(point)] == best
+
+
+def test_the_cheapest_way_is_the_fastest_that_is_good_enough() -> None:
+    points = made_up([1e-1, 1e-3, 1e-5, 1e-5], seconds=[1.0, 5.0, 3.0, 2.0])
+    assert fits.cheapest(points, 1e-1) is points[0]
+    assert fits.cheapest(points, 1e-2) is points[3]
+    assert fits.cheapest(points, 1e-6) is None

@@ -1,0 +1,149 @@
+"""The seconds per step of a study of precision are the engine's own: springcheck adds nothing to them.
+
+Claim: what the study times (`simulate.bare`: the engine started by springcheck, stepped in one call, read
+once) lies within 5 % of the same engine driven by a bare loop written by hand below, without springcheck,
+measured in turn with it in this run; minimum of the repeats of each.
+
+Command: python validation/timing_overhead.py        (60 s)
+
+Expected (AMD EPYC, Zen 4, one core, openmm 8.6, ase 3.29, numba 0.68; time a step, bare loop first):
+
+EXPECTED
+
+Exit status 0 when every ratio is within 5 % of 1, 1 otherwise.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, ClassVar
+
+import numba
+import numpy as np
+import openmm
+from ase import Atoms
+from ase.calculators.calculator import Calculator, all_changes
+from ase.md.verlet import VelocityVerlet
+
+from springcheck import engines, scenes, simulate
+
+M, K, Q, P = 3.7, 2.9, 0.3, 0.7
+WITHIN = 0.05
+Run = Callable[[int, float], float]
+
+
+def openmm_verlet(steps: int, h: float) -> float:
+    """A particle on a bond to a fixed one, as OpenMM's manual would have it."""
+    system = openmm.System()
+    system.addParticle(M)
+    system.addParticle(0.0)
+    bond = openmm.HarmonicBondForce()
+    bond.addBond(0, 1, 0.0, K)
+    system.addForce(bond)
+    integrator = openmm.VerletIntegrator(h)
+    context = openmm.Context(system, integrator, openmm.Platform.getPlatformByName("Reference"))
+    context.setPositions([[Q, 0, 0], [0, 0, 0]])
+    context.setVelocities([[P / M, 0, 0], [0, 0, 0]])
+    integrator.step(1)
+    began = perf_counter()
+    integrator.step(steps)
+    context.getState(positions=True, velocities=True)
+    return perf_counter() - began
+
+
+class Spring(Calculator):  # type: ignore[misc]
+    """The shortest calculator of one spring."""
+
+    implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
+
+    def calculate(
+        self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = all_changes
+    ) -> None:
+        super().calculate(atoms, properties, system_changes)
+        x = self.atoms.positions[:, 0]
+        forces = np.zeros((1, 3))
+        forces[:, 0] = -K * x
+        self.results["forces"] = forces
+        if "energy" in properties:
+            self.results["energy"] = 0.5 * K * float(x[0]) ** 2
+
+
+def ase_verlet(steps: int, h: float) -> float:
+    """One atom and `VelocityVerlet.run`."""
+    atoms = Atoms("H", positions=[[Q, 0, 0]], masses=[M], momenta=[[P, 0, 0]])
+    atoms.calc = Spring()
+    dynamics = VelocityVerlet(atoms, timestep=h)
+    began = perf_counter()
+    dynamics.run(steps)
+    return perf_counter() - began
+
+
+@numba.njit
+def _euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
+    for _ in range(steps):
+        q, p = q + (p / m) * h, p + (-k * q) * h
+    return q, p
+
+
+@numba.njit
+def _semi_implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
+    for _ in range(steps):
+        p = p + (-k * q) * h
+        q = q + (p / m) * h
+    return q, p
+
+
+@numba.njit
+def _implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
+    inverse = 1 / (1 + h * h * (k / m))
+    for _ in range(steps):
+        p = (p + (-k * q) * h) * inverse
+        q = q + (p / m) * h
+    return q, p
+
+
+def compiled(loop: Callable[..., tuple[float, float]]) -> Run:
+    """A timed call of a compiled loop."""
+
+    def run(steps: int, h: float) -> float:
+        loop(1, h, M, K, Q, P)
+        began = perf_counter()
+        loop(steps, h, M, K, Q, P)
+        return perf_counter() - began
+
+    return run
+
+
+BARE: dict[str, tuple[Run, int]] = {
+    "openmm:verlet": (openmm_verlet, 1_000_000),
+    "ase:velocity-verlet": (ase_verlet, 1_000),
+    "own:euler": (compiled(_euler), 30_000_000),
+    "own:semi-implicit-euler": (compiled(_semi_implicit_euler), 20_000_000),
+    "own:implicit-euler": (compiled(_implicit_euler), 20_000_000),
+}
+
+
+def main(repeats: int = 15) -> int:
+    """Measure in turn, print a line for each method, compare."""
+    scene = scenes.load_scene("spring-uneven")
+    best: dict[str, list[float]] = {name: [np.inf, np.inf] for name in BARE}
+    for _ in range(repeats):
+        for name, (loop, steps) in BARE.items():
+            h = scene.step * scene.steps / steps
+            here = replace(scene, step=h, steps=steps, every=steps)
+            found = simulate.bare(here, engines.parse(name)).timing.run
+            by_hand = loop(steps, h)
+            best[name] = [min(best[name][0], by_hand / steps), min(best[name][1], found / steps)]
+    print(f"{'':28}{'bare loop':>12}{'springcheck':>14}{'ratio':>8}")
+    worst = 0.0
+    for name, (by_hand, found) in best.items():
+        worst = max(worst, abs(found / by_hand - 1))
+        print(f"{name:28}{by_hand * 1e9:9.4g} ns{found * 1e9:11.4g} ns{found / by_hand:8.3f}")
+    return 0 if worst <= WITHIN else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
