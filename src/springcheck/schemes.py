@@ -405,13 +405,8 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-<<<<<<< HEAD
     `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
     solution of its equation.
-=======
-    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
-    squared norm of the inverse of the matrix that it solves, the condition of its step.
->>>>>>> main
     """
     direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
@@ -437,14 +432,8 @@ def magnitude_step(
         own = row[len(forces)]
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
-<<<<<<< HEAD
             kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
             qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
-=======
-            condition = _condition(stiffness, own**2 / (m * slowed))
-            # the solution is larger than what it is made from by the condition, its error by that again
-            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
->>>>>>> main
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
