@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -88,6 +89,24 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("-o", "--output", metavar="FOLDER", default="figures", help="default: figures")
     plot.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
     plot.set_defaults(command=_plot)
+
+    identify = commands.add_parser("identify", help="which scheme made a trajectory, ours or anyone's")
+    identify.add_argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities")
+    identify.add_argument(
+        "--trajectory", metavar="LABEL", help="one trajectory or particle group of the file"
+    )
+    identify.add_argument("--stiffness", type=float, metavar="K", help="is this the stiffness?")
+    identify.add_argument(
+        "--mass", type=float, metavar="M", help="mass of every particle, where the file has none"
+    )
+    identify.add_argument("--step", type=float, metavar="H", help="is this the time step?")
+    identify.add_argument(
+        "--stepper",
+        metavar="MODULE:FUNCTION",
+        help="judge a Python function step(q, p, h, force, mass) -> (q, p)",
+    )
+    identify.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    identify.set_defaults(command=_identify)
 
     check = commands.add_parser("check", help="is a store whole: digests, completeness, structure")
     check.add_argument("file", metavar="FILE")
@@ -182,8 +201,6 @@ def _repeat(options: argparse.Namespace) -> int:
 
 
 def _precision(options: argparse.Namespace) -> int:
-    import math
-
     from springcheck import report, scenes, session
     from springcheck.studies import precision
 
@@ -262,6 +279,33 @@ def _inspect(options: argparse.Namespace) -> int:
     else:
         _show(inspection.lines(found, verdicts=options.verdicts))
     return 0
+
+
+def _identify(options: argparse.Namespace) -> int:
+    from springcheck import identify, report
+    from springcheck.identify import files
+
+    if (options.file is None) == (options.stepper is None):
+        raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
+    if options.stepper is not None:
+        found = {options.stepper: identify.identify_stepper(identify.load_stepper(options.stepper))}
+    else:
+        stated = {"mass": options.mass, "stiffness": options.stiffness, "step": options.step}
+        for name, value in stated.items():
+            if value is not None and not (math.isfinite(value) and (value > 0 or name != "mass")):
+                raise SpringcheckError(f"--{name} {value}: a finite number is needed, a mass above 0")
+        found = {}
+        for states in files.read(Path(options.file), options.trajectory):
+            try:
+                found[states.label] = files.identify_states(states, **stated)
+            except SpringcheckError as error:
+                raise type(error)(f"{options.file}, {states.label}: {error}") from error
+    documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
+    if options.json:
+        _document(documents[0] if len(documents) == 1 else {"identifications": documents})
+    else:
+        _show([line for label, one in found.items() for line in report.identification(label, one)])
+    return 0 if all(one.fits for one in found.values()) else 1
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from springcheck.identify import Identification
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
@@ -168,6 +169,48 @@ def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
         word, style = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}[v.passed]
         table.add_row(plain(v.method), plain(v.check), plain(word, style), plain(verdict_line(v), style))
     return table
+
+
+def identification(label: str, found: Identification) -> Lines:
+    """What a trajectory says of the scheme that made it."""
+    style = "bold" if found.fits else "bold red"
+    out: Lines = [plain(f"{label}: {found.scheme}", style)]
+    if not found.fits:
+        out.append(
+            plain(f"  nearest: {found.nearest}; off by {', '.join(f'{x:.1e}' for x in found.difference)}")
+        )
+    also = [*found.aliases, *(c for c in found.candidates if c != found.scheme)]
+    rows = [
+        ("the same map on a spring", ", ".join(dict.fromkeys(also))),
+        (
+            "step",
+            f"{found.step:.9g}, every {found.stride} recorded" if found.stride > 1 else f"{found.step:.9g}",
+        ),
+        ("angular frequency", _numbers(found.omega)),
+        ("stiffness", _numbers(found.stiffness)),
+        ("velocities", _offset(found.velocity_offset)),
+        ("determinant of a step", _numbers(found.determinant)),
+        ("symplectic defect", f"{found.symplectic_defect:.1e}"),
+        ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
+    ]
+    out += [plain(f"  {name + ':':26}{text}") for name, text in rows if text and "nan" not in text]
+    out += [plain(f"  note: {note}") for note in found.notes]
+    return out
+
+
+def _numbers(values: tuple[float, ...] | None) -> str:
+    if not values:
+        return ""
+    text = ", ".join(f"{x:.12g}" for x in values[:3])
+    return text + (f" ... ({len(values)} oscillators)" if len(values) > 3 else "")
+
+
+def _offset(steps: float) -> str:
+    if np.isnan(steps):
+        return ""
+    if steps == 0:
+        return "synchronised with the positions"
+    return f"{abs(steps):g} of a step {'early' if steps < 0 else 'late'}"
 
 
 def repeat_line(one: Repeat) -> Text:

@@ -31,6 +31,7 @@ from springcheck.checks.experiments import (
 )
 from springcheck.checks.laws import convergence, order, order_anharmonic, rounding_bias, rounding_growth
 from springcheck.checks.recorded import (
+    CONTRACTED,
     arithmetic,
     closed_form,
     energies,
@@ -51,6 +52,7 @@ from springcheck.model import Scene, Trajectory, Verdict
 
 __all__ = [
     "CHECKS",
+    "CONTRACTED",
     "THOROUGH",
     "Bench",
     "Case",

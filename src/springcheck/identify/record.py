@@ -100,6 +100,10 @@ def _interval(t: Floats) -> tuple[np.longdouble, float, float]:
         raise IdentificationError("all times are equal: the interval between the states is unknown")
     quantum = float(np.max(storage(t).quantum(t)))
     off = np.abs(np.diff(wide) - interval)
+    # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal: those are uneven
+    even = float(np.max(np.spacing(np.abs(t))))
+    if np.max(off) <= 4 * even:
+        quantum = min(quantum, even)
     worst = int(np.argmax(off))
     # two rounded times make a difference, and a clock that adds its step up rounds once more each time
     if off[worst] > 4 * quantum:

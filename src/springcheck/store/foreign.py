@@ -39,23 +39,25 @@ class Foreign:
     roundoff: float
 
 
-def read_foreign(path: str | Path) -> dict[str, Foreign]:
+def read_foreign(path: str | Path, most: int | None = None) -> dict[str, Foreign]:
     """Particle groups of an H5MD file by name, those that have positions and velocities.
+
+    `most` frames are read, from the first on; None for all.
 
     Where the two are stored at different steps, the common ones are taken.  Raises StoreError when the
     file is no H5MD, holds no velocities, or is damaged.
     """
     path = Path(path)
     trust.trust(path, trust.FOREIGN)
-    return _load(path)
+    return _load(path, most)
 
 
-def _load(path: Path) -> dict[str, Foreign]:
+def _load(path: Path, most: int | None = None) -> dict[str, Foreign]:
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
         groups = file.get("particles")
         if not isinstance(groups, h5py.Group) or not len(groups):
             raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
-        found = dict(_groups(path, groups))
+        found = dict(_groups(path, groups, most))
         if not found:
             names = ", ".join(groups)
             raise StoreError(
@@ -65,14 +67,16 @@ def _load(path: Path) -> dict[str, Foreign]:
         return found
 
 
-def _groups(path: Path, groups: Any) -> Iterator[tuple[str, Foreign]]:
+def _groups(path: Path, groups: Any, most: int | None) -> Iterator[tuple[str, Foreign]]:
     for name in groups:
         group = groups.get(name)
         if not isinstance(group, h5py.Group) or not {"position", "velocity"} <= set(group):
             continue
         q, v = group["position"], group["velocity"]
         t, rows_q, rows_v = _common(path, name, q, v)
-        values = [_values(path, q["value"])[rows_q], _values(path, v["value"])[rows_v]]
+        if most is not None and len(t) > most:
+            t, rows_q, rows_v = t[:most], _first(rows_q, most), _first(rows_v, most)
+        values = [_values(path, q["value"], rows_q), _values(path, v["value"], rows_v)]
         if values[0].ndim != 3 or values[0].shape != values[1].shape or len(values[0]) == 0:
             raise StoreError(
                 f"{path}: position {values[0].shape} and velocity {values[1].shape} of {name} are not "
@@ -97,14 +101,19 @@ def _groups(path: Path, groups: Any) -> Iterator[tuple[str, Foreign]]:
         )
 
 
-def _values(path: Path, dataset: Any) -> Floats:
-    """A dataset as float64; StoreError for one that is none, or claims more than its file can hold."""
+def _first(rows: Any, most: int) -> Any:
+    """The first rows of a slice or of an index array."""
+    return slice(0, most) if isinstance(rows, slice) else rows[:most]
+
+
+def _values(path: Path, dataset: Any, rows: Any = ()) -> Floats:
+    """A dataset, or rows of it, as float64; StoreError where it is none, or claims more than its file holds."""
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu":
         raise StoreError(f"{path}: {getattr(dataset, 'name', 'a dataset')} is no array of numbers")
     claimed = dataset.size * dataset.dtype.itemsize
     if claimed > EXPANSION * path.stat().st_size:
         raise StoreError(f"{path} is damaged: {dataset.name} claims {files.readable(claimed)}")
-    return np.asarray(dataset[()], dtype=np.float64)
+    return np.asarray(dataset[rows], dtype=np.float64)
 
 
 def _common(path: Path, name: str, q: Any, v: Any) -> tuple[Floats, Any, Any]:

@@ -1,0 +1,122 @@
+"""Trajectories of a file for identification: our own stores, and H5MD files of any other program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from springcheck import scenes, store
+from springcheck.errors import StoreError
+from springcheck.identify.report import identify
+from springcheck.identify.result import Identification
+from springcheck.model import Floats, Integers
+
+MOST_FRAMES = 20_000
+"""Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""
+
+MOST_OSCILLATORS = 16
+"""Moving coordinates that are looked at in a file of many particles."""
+
+LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
+TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
+"""Lengths in nm and times in ps, by the names that H5MD files use."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class States:
+    """Recorded states: t (f,), q and p or v (f, n), mass (n,) or None; `notes` on what was left out."""
+
+    label: str
+    t: Floats
+    q: Floats
+    p: Floats | None
+    v: Floats | None
+    mass: Floats | None
+    notes: tuple[str, ...]
+
+
+def read(path: Path, label: str | None = None) -> list[States]:
+    """The trajectories of a file, or the one of this label.
+
+    Raises StoreError where the file cannot be read, holds no velocities, or has no such trajectory.
+    """
+    try:
+        own = [run.label for run in store.summary(path).runs]
+    except StoreError:
+        own = []
+    found = list(_ours(path, own, label) if own else _foreign(path, label))
+    if not found:
+        names = own or list(store.read_foreign(path, 2))
+        raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
+    return found
+
+
+def _ours(path: Path, labels: list[str], wanted: str | None) -> Iterator[States]:
+    m = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)").m
+    for label in labels:
+        if wanted in (None, label):
+            piece = next(store.windows(path, label, MOST_FRAMES))
+            chosen, notes = _chosen(piece.q, piece.p, _frames(len(piece.t), label, path))
+            yield States(
+                label=label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None, mass=m[chosen],
+                notes=notes,
+            )  # fmt: skip
+
+
+def _frames(kept: int, label: str, path: Path) -> list[str]:
+    whole = next(run.frames for run in store.summary(path).runs if run.label == label)
+    return [f"the first {kept} of {whole} frames were looked at"] if kept < whole else []
+
+
+def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
+    for name, group in store.read_foreign(path, MOST_FRAMES + 1).items():
+        if wanted not in (None, name):
+            continue
+        notes: list[str] = []
+        if len(group.t) > MOST_FRAMES:
+            notes.append(f"the first {len(group.t)} frames were looked at")
+        frames, n, dimensions = group.q.shape
+        mass = None if group.mass is None else np.repeat(group.mass, dimensions)
+        factor = _velocity_factor(group.units, notes)
+        v = group.v.reshape(frames, n * dimensions) * factor
+        q = group.q.reshape(frames, n * dimensions)
+        chosen, remarks = _chosen(q, v, notes)
+        yield States(
+            label=name, t=group.t, q=q[:, chosen], p=None, v=v[:, chosen],
+            mass=None if mass is None else mass[chosen], notes=remarks,
+        )  # fmt: skip
+
+
+def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:
+    """What makes velocities lengths of q over times of t, where the file names units that differ."""
+    q, t, v = units.get("q", ""), units.get("t", ""), units.get("v", "")
+    length, _, time = v.partition(" ")
+    time = time.removesuffix("-1").removesuffix("^-1")
+    if q == length and t == time:
+        return 1.0
+    if q in LENGTHS and length in LENGTHS and t in TIMES and time in TIMES:
+        return LENGTHS[length] / LENGTHS[q] * TIMES[t] / TIMES[time]
+    if q or t or v:
+        notes.append(f"units of position {q!r}, time {t!r} and velocity {v!r} are taken as consistent")
+    return 1.0
+
+
+def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str, ...]]:
+    """The coordinates that move, not more than can be looked at, and notes with what is left out."""
+    moving = np.flatnonzero((np.ptp(q, axis=0) > 0) | (np.ptp(p, axis=0) > 0))
+    if len(moving) > MOST_OSCILLATORS:
+        notes = [*notes, f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
+    chosen = moving[:MOST_OSCILLATORS] if len(moving) else np.arange(min(1, q.shape[1]))
+    return np.asarray(chosen), tuple(notes)
+
+
+def identify_states(
+    states: States, *, mass: float | None = None, stiffness: float | None = None, step: float | None = None
+) -> Identification:
+    """Identify what a file holds; a stated mass overrides the file's.  Raises IdentificationError."""
+    m = states.mass if mass is None else np.full(states.q.shape[1], mass)
+    found = identify(states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, step=step)
+    return replace(found, notes=(*states.notes, *found.notes))
