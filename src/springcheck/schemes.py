@@ -405,8 +405,8 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
-    squared norm of the inverse of the matrix that it solves, the condition of its step.
+    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
+    solution of its equation.
     """
     direction = h
     q, p, h = np.abs(q), np.abs(p), abs(h)
@@ -432,9 +432,8 @@ def magnitude_step(
         own = row[len(forces)]
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
-            condition = _condition(stiffness, own**2 / (m * slowed))
-            # the solution is larger than what it is made from by the condition, its error by that again
-            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
+            kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
+            qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
@@ -445,14 +444,21 @@ def magnitude_step(
     )
 
 
-def _condition(stiffness: Reals | None, factor: Reals) -> Reals:
-    """How much solving with 1 + factor * stiffness can enlarge an error, at least 1: (n,) or one number."""
+def _solved(given: Reals, factor: Reals, stiffness: Reals | None) -> Reals:
+    """What bounds the rounding of the solution of (1 + factor * stiffness) x = b, `given` bounding b.
+
+    Componentwise backward error: |A^-1| (|A| |x| + |b|) with |x| <= |A^-1| |b| (Higham, Accuracy and
+    Stability of Numerical Algorithms, 7.2).
+    """
     if stiffness is None:
-        return np.ones(1)
+        return given
     if stiffness.ndim == 1:
-        return np.maximum(1 / np.abs(1 + factor * stiffness), 1)
-    matrix = np.eye(len(factor)) + np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
-    return np.maximum(np.linalg.norm(np.linalg.inv(matrix), np.inf), np.ones(1))
+        change = factor * stiffness
+        inverse = 1 / np.abs(1 + change)
+        return np.asarray(((1 + np.abs(change)) * (inverse * given) + given) * inverse)
+    matrix = np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
+    inverse = np.abs(np.linalg.inv(np.eye(len(matrix)) + matrix)).T
+    return np.asarray(((given @ inverse) @ (np.eye(len(matrix)) + np.abs(matrix)).T + given) @ inverse)
 
 
 def roundings(scheme: Scheme) -> int:

@@ -268,8 +268,9 @@ def momentum(case: Case) -> Verdict:
         return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
-    _, of_p = case.allowance
-    unit = np.maximum.accumulate(np.sum(of_p, axis=1))
+    # at both ends of each stretch between frames, for a motion that grows along it
+    _, of_p = case.allowance_at(run.q, run.p)
+    unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
     if case.steps[0] != 0:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
     limit = case.roundings * case.steps[1:].astype(np.float64)

@@ -135,9 +135,8 @@ def _origins(scene: Scene, method: Method) -> Floats:
     origins = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
     springs = [t for t in scene.terms if isinstance(t, mechanics.WallSpring | mechanics.Spring)]
-    stiffnesses = [k for term in springs for k in term.k.tolist()]
     hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
-    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and min(stiffnesses, default=0.0) >= 0
+    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
