@@ -64,21 +64,24 @@ def picture(document: Document) -> Figure:
 
 
 def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """A colour for each engine, a marker and a line style for each of its methods."""
-    found = list(dict.fromkeys(name.partition(":")[0] for name in names))
-    count = dict.fromkeys(found, 0)
+    """A colour for each engine, a marker and a line style for each method; one engine alone takes them all."""
+    engines = list(dict.fromkeys(name.partition(":")[0] for name in names))
+    families = engines if len(engines) > 1 else list(names)
+    count = dict.fromkeys(families, 0)
     out: dict[str, dict[str, Any]] = {}
     for i, name in enumerate(names):
-        engine = name.partition(":")[0]
+        family = name.partition(":")[0] if len(engines) > 1 else name
+        place = families.index(family)
+        # the first families are drawn hollow and larger, so that curves that coincide show both
+        hollow = place < max(1, len(families) // 2)
         out[name] = {
-            "color": COLOURS[found.index(engine) % len(COLOURS)],
-            "linestyle": LINES[count[engine] % len(LINES)],
+            "color": COLOURS[place % len(COLOURS)],
+            "linestyle": LINES[count[family] % len(LINES)],
             "marker": MARKERS[i % len(MARKERS)],
-            # the first engines are drawn hollow and larger, so that curves that coincide show both
-            "markerfacecolor": "none" if found.index(engine) < 2 else None,
-            "markersize": 6.5 if found.index(engine) < 2 else 3.2,
+            "markerfacecolor": "none" if hollow else None,
+            "markersize": 6.5 if hollow else 3.2,
         }
-        count[engine] += 1
+        count[family] += 1
     return out
 
 
