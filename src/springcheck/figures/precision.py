@@ -64,7 +64,7 @@ def picture(document: Document) -> Figure:
 
 
 def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """A colour for each engine, a marker and a line style for each method; one engine alone takes them all."""
+    """A colour for each engine, or each method of a single engine; a marker and a line style for each method."""
     engines = list(dict.fromkeys(name.partition(":")[0] for name in names))
     families = engines if len(engines) > 1 else list(names)
     count = dict.fromkeys(families, 0)
