@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import random
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -193,13 +195,25 @@ def test_what_is_no_store_is_told(tmp_path: Path) -> None:
                 reader(tmp_path / name)
 
 
-def test_a_file_that_another_program_is_writing_is_told(whole: Path, tmp_path: Path) -> None:
-    path = tmp_path / "s.h5"
-    with h5py.File(path, "w") as file:
-        file["x"] = 1
-        file.flush()
-        with pytest.raises(StoreError, match="another program is writing it"):
-            store.read_foreign(path)
+WRITER = """
+import h5py, sys
+with h5py.File(sys.argv[1], "w") as file:
+    file["x"] = 1
+    file.flush()
+    print("open", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_file_that_another_program_is_writing_is_told(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WRITER, str(tmp_path / "s.h5")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == b"open\n"
+        for reader in (store.read, store.summary, store.read_foreign):
+            with pytest.raises(StoreError, match="another program is writing it"):
+                reader(tmp_path / "s.h5")
+        writer.communicate()
 
 
 def test_a_reader_that_crashes_or_never_ends_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
