@@ -104,7 +104,7 @@ def _first(rows: Any, most: int) -> Any:
 
 
 def _values(path: Path, dataset: Any, rows: Any = ()) -> Floats:
-    """A dataset, or rows of it, as float64; StoreError where it is none, or claims more than its file holds."""
+    """A dataset, or rows of it, as float64; StoreError where it is none or larger than its file."""
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu":
         raise StoreError(f"{path}: {getattr(dataset, 'name', 'a dataset')} is no array of numbers")
     claimed = dataset.size * dataset.dtype.itemsize
