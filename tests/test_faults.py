@@ -82,7 +82,7 @@ def test_clean_scenes_raise_no_alarm_and_are_counted() -> None:
 
 def test_a_broken_engine_among_the_clean_ones_is_a_false_alarm_that_is_reported() -> None:
     fault = next(fault for fault in FAULTS if fault.name == "friction")
-    found = trial.clean_engine(lambda scene, label: fault.run(scene, label), "friction", 0)
+    found = trial.clean_engine(fault.run, "friction", 0)
     assert found.alarms
 
 

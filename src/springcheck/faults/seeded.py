@@ -213,6 +213,7 @@ def coefficient(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 def skipped(every: int) -> Make:
     """The last of so many steps is left out."""
+
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
         right = textbook(scene, scheme)
         return lambda i, q, p: (q, p) if i % every == every - 1 else right(i, q, p)
