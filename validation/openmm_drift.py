@@ -68,6 +68,7 @@ def main() -> int:
                     axes.plot(steps, implied / STEPS * steps, color="black", linewidth=0.8, label="implied")
             axes.set_title(f"h = {name}")
             axes.set_xlabel("steps")
+            axes.locator_params(axis="x", nbins=4)
         panels[0].set_ylabel("relative change of the shadow energy")
         panels[0].legend(loc="lower left")
         for path in style.save(figure, folder, "openmm-drift"):
