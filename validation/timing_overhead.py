@@ -81,14 +81,14 @@ def ase_verlet(steps: int, h: float) -> float:
     return perf_counter() - began
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     for _ in range(steps):
         q, p = q + (p / m) * h, p + (-k * q) * h
     return q, p
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _semi_implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     for _ in range(steps):
         p = p + (-k * q) * h
@@ -96,7 +96,7 @@ def _semi_implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: 
     return q, p
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     inverse = 1 / (1 + h * h * (k / m))
     for _ in range(steps):

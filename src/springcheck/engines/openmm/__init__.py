@@ -5,7 +5,7 @@ from __future__ import annotations
 from springcheck.engines import Engine
 from springcheck.model import Method
 
-_TERMS = frozenset({"wall-spring", "spring"})
+_TERMS = frozenset({"wall-spring", "spring", "quartic"})
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")

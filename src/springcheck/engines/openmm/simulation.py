@@ -192,12 +192,24 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
             ):
                 bonds.addBond(a, b, length, k)
+        elif isinstance(term, mechanics.Quartic):
+            system.addForce(_wells(term, origins))
     for bonds in (slow, fast):
         if bonds.getNumBonds():
             system.addForce(bonds)
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
+
+
+def _wells(term: mechanics.Quartic, origins: Floats) -> mm.CustomExternalForce:
+    """Stiffening wells, whose force OpenMM derives from their energy."""
+    wells = mm.CustomExternalForce("b*u*u*u*u/4; u=x-at")
+    wells.addPerParticleParameter("b")
+    wells.addPerParticleParameter("at")
+    for i, b, at in zip(term.i.tolist(), term.b.tolist(), (term.at - origins[term.i]).tolist(), strict=True):
+        wells.addParticle(i, [b, at])
+    return wells
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:

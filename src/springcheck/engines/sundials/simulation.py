@@ -7,6 +7,9 @@ that the energy of the start allows each component, because q and p may differ i
 
 from __future__ import annotations
 
+import contextlib
+import io
+
 import numpy as np
 import sksundae
 from sksundae.cvode import CVODE
@@ -119,14 +122,22 @@ class _Solver:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         n, take = self._n, self._solver.step
-        for row in range(len(q)):
-            self._done += every
-            try:
-                result = take(self._done * self._step)
-            except RuntimeError as error:
-                raise Stopped(row, str(error)) from error
-            if not result.success:
-                raise Stopped(row, str(result.message))
-            y = result.y
-            q[row] = y[:n]
-            p[row] = y[n:]
+        heard = io.StringIO()
+        # the wrapper prints SUNDIALS' complaints on standard output, which is not its to write to
+        with contextlib.redirect_stdout(heard):
+            for row in range(len(q)):
+                self._done += every
+                try:
+                    result = take(self._done * self._step)
+                except RuntimeError as error:
+                    raise Stopped(row, _said(heard, error)) from error
+                if not result.success:
+                    raise Stopped(row, _said(heard, result.message))
+                y = result.y
+                q[row] = y[:n]
+                p[row] = y[n:]
+
+
+def _said(heard: io.StringIO, otherwise: object) -> str:
+    """What SUNDIALS printed in one line, or else what its wrapper says."""
+    return " ".join((heard.getvalue() or str(otherwise)).split())
