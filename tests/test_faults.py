@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -82,7 +83,7 @@ def test_clean_scenes_raise_no_alarm_and_are_counted() -> None:
 
 def test_a_broken_engine_among_the_clean_ones_is_a_false_alarm_that_is_reported() -> None:
     fault = next(fault for fault in FAULTS if fault.name == "friction")
-    found = trial.clean_engine(lambda scene, label: fault.run(scene, label), "friction", 0)
+    found = trial.clean_engine(fault.run, "friction", 0)
     assert found.alarms
 
 
@@ -108,3 +109,36 @@ def test_a_fault_that_only_the_rounding_law_sees_passes_everything_else() -> Non
 def test_the_package_exposes_its_scenes_to_a_plain_run() -> None:
     scene = trial.scene("spring")
     assert [v for v in checks.judge(scene, springcheck.run(scene, "own:euler")) if v.passed is False] == []
+
+
+def test_faults_of_the_command_line_print_one_document(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from springcheck import cli
+
+    few = FAULTS[:2]
+    monkeypatch.setattr(trial, "FAULTS", few)
+    monkeypatch.setattr(trial, "CLEAN", 20)
+    monkeypatch.setattr(trial, "BY_ENGINES", 0)
+    monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert cli.main(["faults", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
+    assert document["limits"]["stiffness"]["step-defect"] < 1e-14
+    assert document["clean_runs"] == 21
+    assert cli.main(["faults"]) == 0
+    assert "2 of 2 faults rejected" in capsys.readouterr().out
+
+
+def test_a_thorough_run_reports_its_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from springcheck import cli
+
+    store = str(tmp_path / "s.h5")
+    arguments = ["run", "spring-uneven", "--method", "own:semi-implicit-euler", "-o", store]
+    assert cli.main([*arguments, "--thorough"]) == 0
+    out = capsys.readouterr().out
+    assert "Experiments with laws" in out
+    assert max(map(len, out.splitlines())) <= 100
+    assert cli.main([*arguments, "--force"]) == 0
+    assert "Experiments" not in capsys.readouterr().out

@@ -224,7 +224,7 @@ def frequency(case: Case) -> Verdict:
         return case.not_applicable("frequency", "nothing has moved yet")
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
-    # beyond its limit a scheme of several stages can turn the other way
+    # on an inverted spring a scheme that goes back on part of its way can turn the other way
     backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)
     off = phase - expected

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from springcheck.faults.seeded import Fault
 from springcheck.faults.table import FAULTS
-from springcheck.faults.trial import FaultReport, Result, examine, study
+from springcheck.faults.trial import ENGINES, FaultReport, Result, examine, study
 
-__all__ = ["FAULTS", "Fault", "FaultReport", "Result", "examine", "study"]
+__all__ = ["ENGINES", "FAULTS", "Fault", "FaultReport", "Result", "examine", "study"]

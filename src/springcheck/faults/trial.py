@@ -52,6 +52,8 @@ SLOW = frozenset({"order", "order-anharmonic", "rounding-bias", "rounding-growth
 """Experiments that do not look at the scene, and take most of the time."""
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
+ENGINES = ("own:*", "openmm:*", "ase:*")
+"""Methods of fixed step whose right runs are judged too."""
 BY_ENGINES = 40
 """Random scenes for each method of the engines."""
 SMALLEST, LARGEST = 1e-20, 0.3
