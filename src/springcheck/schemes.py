@@ -408,22 +408,23 @@ def magnitude_step(
     `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
     solution of its equation.
     """
-    direction = h
-    q, p, h = np.abs(q), np.abs(p), abs(h)
+    direction = np.sign(h)
+    # in extended precision: the square of a step may leave the range of a double
+    q, p, size = np.abs(q), np.abs(p), np.abs(np.longdouble(h))
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
         for kind, c in stages:
             if kind == "drift":
-                q = q + c * h * p / m
+                q = q + c * size * p / m
             elif kind == "friction":
                 # a rounding of x in exp(-x) costs x exp(-x) p, and the decayed p is exp(-x) p: the sum is
                 # below p forwards in time; backwards p grows first
-                x = np.zeros_like(m) if rate is None else -c * np.sign(direction) * h * rate
+                x = np.zeros_like(m) if rate is None else -c * direction * size * rate
                 p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
             else:
-                p = p + c * h * _acting(kind, magnitude, parts)(q, p)
+                p = p + c * size * _acting(kind, magnitude, parts)(q, p)
         return q, p
-    rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
+    rows = [[abs(float(c)) * size for c in row] for row in scheme.a]
     forces: list[Reals] = []
     velocities: list[Reals] = []
     for row in rows:
@@ -431,13 +432,13 @@ def magnitude_step(
         ps = _sum(list(zip(row, forces, strict=False)), p)
         own = row[len(forces)]
         if own:
-            slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
+            slowed = np.ones_like(m) if rate is None else np.abs(1 + direction * own * rate)
             kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
             qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
-    weights = [abs(float(c)) * h for c in scheme.b]
+    weights = [abs(float(c)) * size for c in scheme.b]
     return (
         _sum(list(zip(weights, velocities, strict=True)), q),
         _sum(list(zip(weights, forces, strict=True)), p),

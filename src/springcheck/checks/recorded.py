@@ -99,7 +99,7 @@ def _closed(case: Case) -> str | None:
     reason = _no_map(case)
     if reason:
         return reason
-    if case.scheme.mixes:
+    if case.mixed:
         return "slow and fast springs act at different times: no normal mode stays by itself"
     if not case.linear:
         return (

@@ -26,6 +26,7 @@ import numpy as np
 import openmm as mm
 
 from springcheck import mechanics
+from springcheck.engines import quiet
 from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
 from springcheck.schemes import SCHEMES
@@ -115,7 +116,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
-        scene=scene, m=m, origins=origins, context=context, integrator=integrator, half_kick=early
+        m=m, origins=origins, context=context, integrator=integrator, force=force, half_kick=early
     )
 
 
@@ -249,7 +250,9 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         raise MethodError(f"{label}: OpenMM has no platform {name} on this machine; it has {', '.join(here)}")
     properties = {"Precision": label.precision} if label.precision else {}
     try:
-        return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
+        # OpenMM's C++ warns on standard output, where results go, that an OpenCL is a processor's
+        with quiet.caught(1):
+            return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
 
@@ -271,11 +274,11 @@ class _Context:
     def __init__(
         self,
         *,
-        scene: Scene,
         m: Floats,
         origins: Floats,
         context: mm.Context,
         integrator: mm.Integrator,
+        force: Force,
         half_kick: float,
     ) -> None:
         self.force_calls = 0
@@ -284,7 +287,7 @@ class _Context:
         self._integrator = integrator
         self._m = m
         self._origins = origins if np.any(origins) else None
-        self._force = _pull(scene)
+        self._force = force
         self._half_kick = half_kick
         self._x = np.zeros((context.getSystem().getNumParticles(), 3))
         self._v = np.zeros_like(self._x)
