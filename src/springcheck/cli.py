@@ -80,6 +80,16 @@ def _parser() -> argparse.ArgumentParser:
     precision.add_argument("--points", action="store_true", help="print every point")
     precision.set_defaults(command=_precision)
 
+    stability = commands.add_parser("stability", help="limits of stability, measured against theory")
+    stability.add_argument("scene", metavar="SCENE", help="a shipped scene's name, or a scene file's path")
+    _scene_options(stability)
+    stability.set_defaults(command=_stability)
+
+    extremes = commands.add_parser("extremes", help="the atlas of extreme cases")
+    _scene_options(extremes)
+    extremes.add_argument("--quick", action="store_true", help="fewer cells, in about 20 seconds")
+    extremes.set_defaults(command=_extremes)
+
     inspect = commands.add_parser("inspect", help="what is in a store")
     inspect.add_argument("file", metavar="FILE")
     inspect.add_argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory")
@@ -264,6 +274,48 @@ def _precision(options: argparse.Namespace) -> int:
     if found.interrupted:
         return INTERRUPTED
     return 0 if any(point.complete for point in found.points) else 2
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from springcheck import report, scenes
+    from springcheck.session import LeftOut
+    from springcheck.studies import stability
+
+    scene = scenes.load_scene(options.scene)
+    path = Path(options.output or f"{scene.name}-stability.h5")
+    with _progress(options) as started:
+        found = stability.record(scene, path, options.method, force=options.force, progress=_naming(started))
+    if options.json:
+        _document(stability.document(found))
+    else:
+        left = [LeftOut(method=method, reason=reason) for method, reason in found.left_out]
+        lines = [*report.stability_report(found), *report.left_out(left)]
+        _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
+    return 0 if found.passed else 1
+
+
+def _extremes(options: argparse.Namespace) -> int:
+    from springcheck import report
+    from springcheck.session import LeftOut
+    from springcheck.studies import extremes
+
+    path = Path(options.output or "extremes.h5")
+    with _progress(options) as started:
+        found = extremes.record(
+            path, options.method, quick=options.quick, force=options.force, progress=_naming(started)
+        )
+    if options.json:
+        _document(extremes.document(found))
+    else:
+        left = [LeftOut(method=method, reason=reason) for method, reason in found.left_out]
+        lines = [*report.extremes_report(found), *report.left_out(left)]
+        _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
+    return 0 if found.passed else 1
+
+
+def _naming(started: Any) -> Callable[[str], None] | None:
+    """A line of progress for each thing that is begun."""
+    return None if started is None else lambda what: started(what, 1)(1)
 
 
 def _spending(started: Any, budget: float) -> Callable[[float, str], None] | None:

@@ -13,8 +13,11 @@ from springcheck.identify import Identification
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
+from springcheck.studies import stability
+from springcheck.studies.extremes import Atlas
 from springcheck.studies.outcome import MethodSummary, PrecisionStudy
 from springcheck.studies.points import Point
+from springcheck.studies.stability import Stability
 
 Lines = list[Table | Text]
 
@@ -417,3 +420,56 @@ def fault_report(found: FaultReport) -> Lines:
         )
     )
     return out
+
+
+def stability_report(study: Stability) -> Lines:
+    """The whole report of `springcheck stability`."""
+    out: Lines = [plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"), plain()]
+    if study.limits:
+        table = grid()
+        for title in ("method", "limit h w", "theory", "off", "growth above", "predicted"):
+            table.add_column(title, justify="left" if title == "method" else "right")
+        for x in study.limits:
+            off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
+            grown = (
+                ("-", "-")
+                if np.isnan(x.growth_above)
+                else (f"{x.growth_above:.7f}", f"{x.growth_predicted:.7f}")
+            )
+            limit = "none" if np.isinf(x.limit) else f"{x.limit:.9f}"
+            theory = "none" if np.isinf(x.theory) else f"{x.theory:.9f}"
+            table.add_row(x.method, limit, theory, f"{off:.0e}", *grown, style="" if x.agrees else "bold red")
+        out += [table, plain()]
+    if study.costs:
+        table = grid()
+        for title in ("method", "ratio", "steps", "rejected", "force calls", "error", "outcome"):
+            table.add_column(title, justify="left" if title in ("method", "outcome") else "right")
+        for cost in study.costs:
+            error = "-" if np.isnan(cost.error) else f"{cost.error:.1e}"
+            table.add_row(
+                cost.method, f"{cost.ratio:.0e}", str(cost.steps), str(cost.rejected),
+                str(cost.force_calls), error, cost.outcome.partition(":")[0],
+            )  # fmt: skip
+        out += [table, plain()]
+    out += [plain(line) for line in stability.sentences(study)]
+    return out
+
+
+def extremes_report(atlas: Atlas) -> Lines:
+    """The whole report of `springcheck extremes`."""
+    outcomes = ("right", "unstable, as theory says", "engine's limit", "refused", "silently wrong")
+    table = grid()
+    for title in ("method", "cells", "right", "unstable", "limit", "refused", "wrong"):
+        table.add_column(title, justify="left" if title == "method" else "right")
+    for method in dict.fromkeys(cell.method for cell in atlas.cells):
+        counts = atlas.counts(method)
+        table.add_row(method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in outcomes))
+    out: Lines = [plain(f"{len(atlas.cells)} extreme cases", "bold"), plain(), table, plain()]
+    out += [plain(window.sentence) for window in atlas.windows]
+    wrong = atlas.wrong
+    out += [
+        plain(f"silently wrong: {cell.method} {cell.parameters}: {cell.reason}", "bold red")
+        for cell in wrong[:20]
+    ]
+    verdict = f"{len(wrong)} cells silently wrong" if wrong else "no cell is silently wrong"
+    return [*out, plain(verdict, "bold red" if wrong else "bold green")]

@@ -6,22 +6,24 @@ say why), or refused.  A cell that is off without a named reason is silently wro
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck import engines
+from springcheck import engines, store
 from springcheck.errors import MethodError
 from springcheck.model import Label
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.stability import propagators
 
-__all__ = ["Atlas", "Cell", "Window", "document", "measure", "windows"]
+__all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows"]
 
 PLATFORMS = ("openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
              "openmm:verlet@OpenCL-double")  # fmt: skip
@@ -93,6 +95,37 @@ def measure(
     if not methods:
         cells += refusals.cells()
     return Atlas(cells=tuple(cells), windows=tuple(windows(cells)), left_out=tuple(left_out))
+
+
+def record(
+    path: str | Path,
+    methods: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Atlas:
+    """Like `measure`, kept in a store: one table of cells for each method, and the document.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    with store.open_new(path, "\n".join(["extremes", *methods]), force=force) as journal:
+        atlas = measure(methods, quick=quick, progress=progress)
+        for method in dict.fromkeys(cell.method for cell in atlas.cells):
+            cells = [cell for cell in atlas.cells if cell.method == method]
+            numbers: dict[str, list[float] | list[str]] = {
+                name: [cell.parameters.get(name, np.nan) for cell in cells]
+                for name in ("m", "k", "q", "p", "h", "steps", "tolerance")
+            }
+            judged: dict[str, list[float] | list[str]] = {
+                "outcome": [cell.outcome for cell in cells],
+                "reason": [cell.reason for cell in cells],
+                "value": [cell.value for cell in cells],
+                "bound": [cell.bound for cell in cells],
+            }
+            journal.add(store.Table(name=f"extremes/{method}", columns=numbers | judged))
+        journal.commit(documents={"extremes": json.dumps(document(atlas), allow_nan=False)})
+    return atlas
 
 
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:

@@ -7,13 +7,15 @@ steps (`resonance`), and the scenes `two-scales` and `overdamped` what stiffness
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck import engines, mechanics
+from springcheck import engines, mechanics, store
 from springcheck.errors import MethodError
 from springcheck.model import Label, Scene
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
@@ -22,7 +24,7 @@ from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 
-__all__ = ["Cost", "Limit", "Region", "Resonance", "Stability", "document", "measure", "sentences"]
+__all__ = ["Cost", "Limit", "Region", "Resonance", "Stability", "document", "measure", "record", "sentences"]
 
 GROWTH = 1e-6
 """Relative difference allowed between measured and predicted growth in double precision: what is left of
@@ -105,6 +107,48 @@ def measure(
         costs=tuple(rows),
         left_out=tuple(left_out),
     )
+
+
+def record(
+    scene: Scene,
+    path: str | Path,
+    methods: Sequence[str] = (),
+    *,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Stability:
+    """Like `measure`, kept in a store: tables under /stability, and the document.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    with store.open_new(path, "\n".join(["stability", *methods, scene.text]), force=force) as journal:
+        study = measure(scene, methods, progress=progress)
+        for x in study.limits:
+            journal.add(
+                store.Table(
+                    name=f"stability/limits/{x.method}",
+                    columns={"h_w": x.turn, "radius": x.radius, "radius_predicted": x.radius_predicted},
+                    attributes={"limit": x.limit, "theory": x.theory},
+                    signal="radius",
+                    axes=("h_w",),
+                )
+            )
+        for y in study.regions:
+            journal.add(
+                store.Table(
+                    name=f"stability/regions/{y.method}",
+                    columns={
+                        "damping_ratio": y.ratio,
+                        "h_w": y.turn,
+                        "radius": y.radius,
+                        "radius_predicted": y.radius_predicted,
+                    },
+                    signal="radius",
+                    axes=("damping_ratio", "h_w"),
+                )
+            )
+        journal.commit(scene, documents={"stability": json.dumps(document(study), allow_nan=False)})
+    return study
 
 
 def growth_allowed(limit: Limit) -> float:
