@@ -118,7 +118,7 @@ def record(
                 for name in ("m", "k", "q", "p", "h", "steps", "tolerance")
             }
             judged: dict[str, list[float] | list[str]] = {
-                "outcome": [cell.outcome for cell in cells],
+                "outcome": [str(cell.outcome) for cell in cells],
                 "reason": [cell.reason for cell in cells],
                 "value": [cell.value for cell in cells],
                 "bound": [cell.bound for cell in cells],

@@ -155,9 +155,9 @@ def growth_allowed(limit: Limit) -> float:
     """Relative difference allowed between measured and predicted growth above the limit.
 
     Growth is the square root of the distance from the limit, so a limit known to `bound` moves it by half
-    of bound over that distance.
+    of bound over that distance; in double precision the limit is known to far better than `AGREED`.
     """
-    if limit.theory in (0.0, np.inf):
+    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED:
         return GROWTH
     return GROWTH + 0.5 * limit.bound / (limit.theory * limits.NEXT)
 

@@ -18,6 +18,9 @@ FIRST, LAST, COARSE = 1e-9, 1e6, 4096
 FINE = 1024
 """Springs in each refinement of the bracket, each 1/1000 of the one before."""
 
+AGREED = 1e-6
+"""What every limit in double precision is held to."""
+
 NEXT = 1e-3
 """Relative distance from the limit at which stepping confirms it."""
 
@@ -38,7 +41,7 @@ class Limit:
     """Largest h w with a bounded propagator; infinity where none up to `LAST` is unbounded."""
     theory: float
     bound: float
-    """How far `limit` may be from `theory`: what one step's rounding hides, 1e-6 at least."""
+    """How far `limit` may be from `theory`: what one step's rounding hides, `AGREED` at least."""
     growth_above: float
     """Measured growth of the amplitude per step just above the limit (its logarithm); NaN: no limit."""
     growth_predicted: float
@@ -69,7 +72,7 @@ def measure(label: Label) -> Limit:
     off = 0.0 if np.isinf(theory) else abs(hidden - theory)
     how = propagators.arithmetic(label)
     # theory at its own rounding shows what cannot be told; the roundings of k and of the step come on top
-    bound = max(1e-6, 4 * off + 4 * propagators.noise(label) * (0 if np.isinf(theory) else theory))
+    bound = max(AGREED, 4 * off + 4 * propagators.noise(label) * (0 if np.isinf(theory) else theory))
     turn = _points(theory)
     springs = Springs(label=label, turn=turn)
     rounding = propagators.noise(label)
