@@ -1,8 +1,9 @@
 """Terms of a scene, and forces and energies made of them: pure functions of any width of float.
 
 A term is a frozen class of parameter arrays.  Its formula is written once and serves double and
-extended precision, one state and a whole trajectory alike.  To add a term: write its class here, put
-it into `TERMS`, and name its key in the methods of the engines that serve it.
+extended precision, one state and a whole trajectory alike.  To add a term: write its class here with
+the columns of its table in a scene file, put it into `TERMS`, and name its key in the methods of the
+engines that serve it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
 
@@ -44,12 +46,27 @@ def scatter(out: Reals, index: Integers, values: Reals) -> None:
         np.add.at(out, where, values)
 
 
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A parameter of a term: its name in a scene file, the field that takes it, and what it may be.
+
+    The field takes the number as it stands, or its inverse.
+    """
+
+    name: str
+    field: str
+    default: float | None = None
+    positive: bool = False
+    inverse: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WallSpring:
     """Springs from particles i to fixed points: V = k/2 (q - at)**2.  k [M/T2], at [L]."""
 
     key: ClassVar[str] = "wall-spring"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = ()
     i: Integers
     k: Floats
     at: Floats
@@ -60,18 +77,18 @@ class WallSpring:
         u = gather(q, self.i) - self.at
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        u = gather(dq, self.i)
-        return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.k * (gather(q, self.i) - self.at))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         scatter(out, self.i, np.abs(self.k) * (np.abs(gather(q, self.i)) + np.abs(self.at)))
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        np.add.at(out, (self.i, self.i), self.k)
+    def curvature(self, q: Reals) -> Reals:
+        return self.k
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.abs(self.k)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,6 +97,7 @@ class Spring:
 
     key: ClassVar[str] = "spring"
     bodies: ClassVar[int] = 2
+    columns: ClassVar[tuple[Column, ...]] = ()
     a: Integers
     b: Integers
     k: Floats
@@ -91,25 +109,22 @@ class Spring:
         u = gather(q, self.b) - gather(q, self.a) - self.rest
         return np.asarray(0.5 * np.sum(self.k * u * u, axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        u = gather(dq, self.b) - gather(dq, self.a)
-        return np.asarray(0.5 * np.sum(np.abs(self.k) * u * u, axis=-1))
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         tension = self.k * (gather(q, self.b) - gather(q, self.a) - self.rest)
         scatter(out, self.a, tension)
         scatter(out, self.b, -tension)
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         size = np.abs(gather(q, self.b)) + np.abs(gather(q, self.a)) + np.abs(self.rest)
         scatter(out, self.a, np.abs(self.k) * size)
         scatter(out, self.b, np.abs(self.k) * size)
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        np.add.at(out, (self.a, self.a), self.k)
-        np.add.at(out, (self.b, self.b), self.k)
-        np.add.at(out, (self.a, self.b), -self.k)
-        np.add.at(out, (self.b, self.a), -self.k)
+    def curvature(self, q: Reals) -> Reals:
+        return self.k
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.abs(self.k)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,6 +133,7 @@ class Quartic:
 
     key: ClassVar[str] = "quartic"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = (Column("coefficient", "b"), Column("at", "at", 0.0))
     i: Integers
     b: Floats
     at: Floats
@@ -126,21 +142,117 @@ class Quartic:
         u = gather(q, self.i) - self.at
         return np.asarray(0.25 * np.sum(self.b * (u * u) * (u * u), axis=-1))
 
-    def size(self, dq: Reals) -> Reals:
-        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         u = gather(q, self.i) - self.at
         scatter(out, self.i, -self.b * (u * u * u))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         # a relative error of u counts threefold in u**3
-        u = np.abs(gather(q, self.i) - self.at)
-        scatter(out, self.i, 3 * np.abs(self.b) * u * u * (np.abs(gather(q, self.i)) + np.abs(self.at)))
+        size = np.abs(gather(q, self.i)) + np.abs(self.at)
+        u = size if near is None else np.abs(gather(near, self.i) - self.at)
+        scatter(out, self.i, 3 * np.abs(self.b) * u * u * size)
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        u = q[self.i] - self.at
-        np.add.at(out, (self.i, self.i), 3 * self.b * u * u)
+    def curvature(self, q: Reals) -> Reals:
+        u = gather(q, self.i) - self.at
+        return np.asarray(3 * self.b * u * u)
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.zeros_like(self.b)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cosine:
+    """Pendulums: V = depth (1 - cos(wave (q - at))).  depth [M L2/T2], wave [1/L], at [L].
+
+    For a pendulum depth is m g l and wave 1/l; for an angle and its angular momentum wave is 1.
+    """
+
+    key: ClassVar[str] = "cosine"
+    bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("depth", "depth"),
+        Column("length", "wave", 1.0, positive=True, inverse=True),
+        Column("at", "at", 0.0),
+    )
+    i: Integers
+    depth: Floats
+    wave: Floats
+    at: Floats
+
+    def energy(self, q: Reals) -> Reals:
+        # 1 - cos without its cancellation at small angles
+        half = np.sin(self.wave * (gather(q, self.i) - self.at) / 2)
+        return np.asarray(2 * np.sum(self.depth * half * half, axis=-1))
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        angle = self.wave * (gather(q, self.i) - self.at)
+        scatter(out, self.i, -(self.depth * self.wave) * np.sin(angle))
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
+        # the sine's own rounding, and that of its argument, which turns round and round
+        size = 1 + np.abs(self.wave) * (np.abs(gather(q, self.i)) + np.abs(self.at))
+        scatter(out, self.i, np.abs(self.depth * self.wave) * size)
+
+    def curvature(self, q: Reals) -> Reals:
+        angle = self.wave * (gather(q, self.i) - self.at)
+        return np.asarray(self.depth * self.wave**2 * np.cos(angle))
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.asarray(np.abs(self.depth) * self.wave**2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Morse:
+    """Bonds between particles a and b: V = depth (1 - exp(-steepness (q[b] - q[a] - rest)))**2.
+
+    depth [M L2/T2], steepness [1/L], rest [L].  P. M. Morse, Phys. Rev. 34 (1929) 57.
+    """
+
+    key: ClassVar[str] = "morse"
+    bodies: ClassVar[int] = 2
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("depth", "depth", positive=True),
+        Column("steepness", "steepness", positive=True),
+        Column("rest", "rest"),
+    )
+    a: Integers
+    b: Integers
+    depth: Floats
+    steepness: Floats
+    rest: Floats
+
+    def _gap(self, q: Reals) -> Reals:
+        """1 - exp(-steepness u), without its cancellation at small u."""
+        u = gather(q, self.b) - gather(q, self.a) - self.rest
+        return np.asarray(-np.expm1(-self.steepness * u))
+
+    def energy(self, q: Reals) -> Reals:
+        gap = self._gap(q)
+        return np.asarray(np.sum(self.depth * gap * gap, axis=-1))
+
+    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
+        gap = self._gap(q)
+        tension = (2 * self.depth * self.steepness) * (1 - gap) * gap
+        scatter(out, self.a, tension)
+        scatter(out, self.b, -tension)
+
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
+        # roundings of 1 - x, of x = exp(-steepness u) itself, and of u, which both factors feel
+        size = gather(q, self.b) + gather(q, self.a) + np.abs(self.rest)
+        x = np.exp(self.steepness * size) if near is None else 1 - self._gap(near)
+        size = 2 * self.depth * self.steepness * x * (1 + x + np.abs(1 - 2 * x) * self.steepness * size)
+        scatter(out, self.a, np.abs(size))
+        scatter(out, self.b, np.abs(size))
+
+    def curvature(self, q: Reals) -> Reals:
+        x = 1 - self._gap(q)
+        return np.asarray(2 * self.depth * self.steepness**2 * x * (2 * x - 1))
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.asarray(2 * np.abs(self.depth) * self.steepness**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,6 +261,7 @@ class Damping:
 
     key: ClassVar[str] = "damping"
     bodies: ClassVar[int] = 1
+    columns: ClassVar[tuple[Column, ...]] = ()
     i: Integers
     c: Floats
     m: Floats
@@ -156,21 +269,62 @@ class Damping:
     def energy(self, q: Reals) -> Reals:
         return np.zeros(q.shape[:-1], dtype=q.dtype)
 
-    def size(self, dq: Reals) -> Reals:
-        return np.zeros(dq.shape[:-1], dtype=dq.dtype)
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         scatter(out, self.i, -self.c * (p[..., self.i] / self.m))
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
         scatter(out, self.i, np.abs(self.c) * (np.abs(p[..., self.i]) / self.m))
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        """Friction has no energy to differentiate."""
+    def curvature(self, q: Reals) -> Reals:
+        return np.zeros_like(self.c)
+
+    @property
+    def rigidity(self) -> Floats:
+        return np.zeros_like(self.c)
 
 
-TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Damping)
+TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Cosine, Morse, Damping)
 LINEAR = frozenset({"wall-spring", "spring", "damping"})
+
+
+def particles(term: Term) -> tuple[Integers, ...]:
+    """The particles on which a term acts: (i,), or both ends (a, b) of its bonds."""
+    return tuple(getattr(term, name) for name in (("i",) if term.bodies == 1 else ("a", "b")))
+
+
+def acting(scene: Scene) -> dict[str, NDArray[np.bool_]]:
+    """For each kind of term in the scene, on which particles it acts (n,)."""
+    out: dict[str, NDArray[np.bool_]] = {}
+    for term in scene.terms:
+        for end in particles(term):
+            out.setdefault(term.key, np.zeros(scene.n, dtype=bool))[end] = True
+    return out
+
+
+def part(scene: Scene, chosen: Integers) -> Scene:
+    """These particles (s,) alone, renumbered, with the terms that act on nothing else."""
+    number = np.full(scene.n, -1)
+    number[chosen] = np.arange(len(chosen))
+
+    def cut(term: Any) -> Any:
+        here = np.all([number[end] >= 0 for end in particles(term)], axis=0)
+        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        rows = {name: x[here] for name, x in values.items() if isinstance(x, np.ndarray)}
+        ends = {name: number[row] for name, row in rows.items() if name in ("i", "a", "b") and _is_index(row)}
+        return replace(term, **rows | ends)
+
+    terms = tuple(cut(term) for term in scene.terms)
+    return replace(
+        scene,
+        m=scene.m[chosen],
+        q=scene.q[chosen],
+        p=scene.p[chosen],
+        terms=tuple(term for term in terms if len(particles(term)[0])),
+    )
+
+
+def _is_index(values: NDArray[Any]) -> bool:
+    return bool(np.issubdtype(values.dtype, np.integer))
 
 
 def is_linear(scene: Scene) -> bool:
@@ -219,18 +373,12 @@ def is_separate(scene: Scene) -> bool:
 
 
 def in_single(scene: Scene) -> Scene:
-    """The scene with stiffnesses and rest lengths rounded to single precision; rest points stay."""
+    """The scene with the parameters of its potential in single precision; walls stay in their place."""
 
     def rounded(term: Any) -> Any:
-        kept = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b", "rest")}
-        return replace(
-            term,
-            **{
-                name: value.astype(np.float32).astype(np.float64)
-                for name, value in kept.items()
-                if value.dtype == np.float64
-            },
-        )
+        names = {column.field for column in term.columns} or {"k", "rest"}
+        kept = {f.name: getattr(term, f.name) for f in fields(term) if f.name in names}
+        return replace(term, **{name: x.astype(np.float32).astype(np.float64) for name, x in kept.items()})
 
     with np.errstate(over="ignore", under="ignore"):
         return replace(scene, terms=tuple(rounded(term) for term in scene.terms))
@@ -240,7 +388,7 @@ def stiffened(scene: Scene, factor: float) -> Scene:
     """The scene with every force of its potential multiplied by a factor."""
 
     def scaled(term: Any) -> Any:
-        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b")}
+        found = {f.name: getattr(term, f.name) for f in fields(term) if f.name in ("k", "b", "depth")}
         # the b of a spring is the index of an end
         return replace(term, **{name: x * factor for name, x in found.items() if x.dtype == np.float64})
 
@@ -260,17 +408,19 @@ def force(terms: Iterable[Term]) -> Force:
     return total
 
 
-def magnitude(terms: Iterable[Term]) -> Force:
+def magnitude(terms: Iterable[Term], near: Reals | None = None) -> Force:
     """Like `force`, with every product and difference taken as a sum of absolute values.
 
-    Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.
+    Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  It takes sizes
+    of positions and momenta.  Laws that bend are evaluated at the states `near` (..., n), a step away at
+    most, or where these are not given at the worst place within the sizes.
     """
     parts = tuple(terms)
 
     def total(q: Reals, p: Reals) -> Reals:
         out = np.zeros_like(q)
         for term in parts:
-            term.add_magnitude(q, p, out)
+            term.add_magnitude(q, p, out, near)
         return out
 
     return total
@@ -279,21 +429,35 @@ def magnitude(terms: Iterable[Term]) -> Force:
 def stiffness(scene: Scene, q: Reals) -> Extended:
     """Second derivatives of the potential energy at q (n,) -> (n, n) [M/T2], extended precision."""
     out = np.zeros((scene.n, scene.n), dtype=np.longdouble)
+    wide = np.asarray(q, dtype=np.longdouble)
     for term in scene.terms:
-        term.add_stiffness(np.asarray(q, dtype=np.longdouble), out)
+        ends, k = particles(term), term.curvature(wide)
+        for end in ends:
+            np.add.at(out, (end, end), k)
+        if len(ends) == 2:
+            np.add.at(out, ends, -k)
+            np.add.at(out, ends[::-1], -k)
     return out
 
 
 def own_stiffness(scene: Scene, q: Reals) -> Extended:
-    """Diagonal of `stiffness` (n,), for scenes of many particles that nothing joins."""
+    """Diagonal of `stiffness` (n,), all of it where nothing joins two particles."""
     out = np.zeros(scene.n, dtype=np.longdouble)
     wide = np.asarray(q, dtype=np.longdouble)
     for term in scene.terms:
-        if isinstance(term, WallSpring):
-            np.add.at(out, term.i, term.k.astype(np.longdouble))
-        elif isinstance(term, Quartic):
-            u = wide[term.i] - term.at
-            np.add.at(out, term.i, 3 * term.b * u * u)
+        for end in particles(term):
+            np.add.at(out, end, term.curvature(wide))
+    return out
+
+
+def steepest(scene: Scene, q: Reals) -> Floats:
+    """Bound on the sum of |stiffness| in each particle's row, at all states q (..., n) -> (n,) [M/T2]."""
+    out = np.zeros(scene.n)
+    for term in scene.terms:
+        k = np.abs(term.curvature(q)).reshape(-1, len(term.rigidity))
+        k = np.maximum(np.max(k, axis=0, initial=0.0), term.rigidity)
+        for end in particles(term):
+            np.add.at(out, end, k * term.bodies)
     return out
 
 
@@ -352,13 +516,14 @@ def free_groups(scene: Scene) -> tuple[Integers, ...]:
 
     held = np.zeros(scene.n, dtype=bool)
     for term in scene.terms:
-        if isinstance(term, WallSpring):
-            held[term.i[term.k != 0]] = True
+        if term.bodies == 1:
+            held[particles(term)[0][term.rigidity > 0]] = True
     if np.all(held):
         return ()
     for term in scene.terms:
-        if isinstance(term, Spring):
-            for a, b in zip(term.a.tolist(), term.b.tolist(), strict=True):
+        if term.bodies == 2:
+            a_all, b_all = particles(term)
+            for a, b in zip(a_all.tolist(), b_all.tolist(), strict=True):
                 parent[root(a)] = root(b)
     roots = np.array([root(i) for i in range(scene.n)])
     loose = np.setdiff1d(roots, roots[held])
@@ -392,7 +557,9 @@ class Norm:
 def _size(scene: Scene, groups: tuple[Integers, ...], duration: float, dq: Reals, dp: Reals) -> Reals:
     total = kinetic_energy(scene, dp)
     for term in scene.terms:
-        total = total + term.size(dq)
+        ends = particles(term)
+        du = gather(dq, ends[-1]) - gather(dq, ends[0]) if len(ends) == 2 else gather(dq, ends[0])
+        total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
     for group in groups:
         m = scene.m[group]
         centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)
@@ -409,3 +576,19 @@ def norm(scene: Scene) -> Norm:
     for term in scene.terms:
         unit = unit + np.abs(term.energy(q))
     return Norm(scene=scene, groups=groups, duration=duration, unit=np.longdouble(np.sqrt(unit)))
+
+
+def amplitudes(scene: Scene) -> tuple[Floats, Floats]:
+    """How far each position and momentum could go (n,) if it had all of the energy of the start to itself.
+
+    A particle that nothing holds is as far as it could get within the run.
+    """
+    unit = float(norm(scene).unit)
+    k = np.zeros(scene.n)
+    for term in scene.terms:
+        for end in particles(term):
+            np.add.at(k, end, np.maximum(np.abs(term.curvature(scene.q)), term.rigidity))
+    p = np.sqrt(2 * scene.m) * unit
+    held = k > 0
+    duration = abs(scene.step) * scene.steps
+    return np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / scene.m * duration), p

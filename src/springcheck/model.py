@@ -47,27 +47,31 @@ class Term(Protocol):
 
     @property
     def bodies(self) -> int:
-        """1 where it acts on single particles, 2 where it joins pairs."""
+        """1 where it acts on single particles `i`, 2 where it joins pairs `a`, `b`."""
         ...
 
     def energy(self, q: Reals) -> Reals:
         """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
         ...
 
-    def size(self, dq: Reals) -> Reals:
-        """|k| du**2 / 2 of differences dq (..., n) -> (...) [M L2/T2], k the stiffness at rest."""
-        ...
-
     def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
         """Add the force at (q, p), each (..., n), to out (..., n) [M L/T2]."""
         ...
 
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals) -> None:
-        """Add the sum of the absolute values of everything that add_force adds or subtracts."""
+    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
+        """Add what bounds the rounding of add_force at states of sizes q, p (see `mechanics.magnitude`)."""
         ...
 
-    def add_stiffness(self, q: Reals, out: Reals) -> None:
-        """Add the second derivatives of the energy at q (n,) to out (n, n) [M/T2]."""
+    def curvature(self, q: Reals) -> Reals:
+        """Second derivative of each energy by its spring's elongation, at q (..., n) -> (..., s) [M/T2].
+
+        A constant may come back as (s,).
+        """
+        ...
+
+    @property
+    def rigidity(self) -> Floats:
+        """Its absolute value at the term's own rest (s,) [M/T2]: what errors of position are weighed by."""
         ...
 
 

@@ -99,11 +99,12 @@ class Case:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each."""
         run, scene = self.trajectory, self.judged
         rounding = run.arithmetic
-        q, p = np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble)
+        near = q.astype(np.longdouble)
+        q, p = np.abs(near), np.abs(p).astype(np.longdouble)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-        sizes = mechanics.magnitude(scene.terms)
+        sizes = mechanics.magnitude(scene.terms, near)
         slow, fast = mechanics.split(scene.terms)
-        parts = mechanics.magnitude(slow), mechanics.magnitude(fast)
+        parts = mechanics.magnitude(slow, near), mechanics.magnitude(fast, near)
         size_q, size_p = schemes.magnitude_step(
             self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
         )
@@ -191,8 +192,8 @@ def _pulls(scene: Scene) -> Integers:
     """How many terms pull at each particle (n,)."""
     count = np.zeros(scene.n, dtype=np.int64)
     for term in scene.terms:
-        for name in ("i", "a", "b"):
-            np.add.at(count, getattr(term, name, np.empty(0, dtype=np.int64)), 1)
+        for end in mechanics.particles(term):
+            np.add.at(count, end, 1)
     return count
 
 

@@ -88,11 +88,9 @@ def _amplified(case: Case, steps: int) -> float:
 
 
 def fastest(case: Case) -> float:
-    """Upper bound of the frequencies and rates met along the way [1/T]: stiffness at the widest points."""
-    q = case.trajectory.q
-    stiff = np.abs([mechanics.stiffness(case.judged, x) for x in (np.max(q, axis=0), np.min(q, axis=0))])
-    stiff = np.max(stiff, axis=0) / case.judged.m[:, None]
-    return float(np.sqrt(np.max(np.sum(stiff, axis=1)))) + float(np.max(mechanics.rates(case.judged)))
+    """Upper bound of the frequencies and rates met along the way [1/T], by Gershgorin's circles."""
+    stiff = mechanics.steepest(case.judged, case.trajectory.q) / case.judged.m
+    return float(np.sqrt(np.max(stiff))) + float(np.max(mechanics.rates(case.judged)))
 
 
 def _closed(case: Case) -> str | None:
@@ -318,17 +316,37 @@ def tolerance(case: Case) -> Verdict:
 def tolerance_bound(case: Case) -> float:
     """What an adaptive solver's errors may add up to, in units of the start.
 
-    CVODE keeps the weighted root mean square of the 2n local errors below 1, each weighed by twice its
-    tolerance at most; so a step may leave sqrt(8 n) tolerances, and there are no more steps than force
-    calls.  On an unstable scene the motion itself carries errors apart.
+    CVODE and IDA keep the weighted root mean square of the 2n local errors below 1, each weighed by the
+    tolerance times its size and its amplitude; all of it may lie in the component that counts most.  There
+    are no more steps than force calls.  An unstable motion itself carries errors apart; in an anharmonic
+    one an error of the energy shifts the frequency, and so the phase for the rest of the run.
     """
     run = case.trajectory
     duration = abs(float(run.t[-1]))
     growth = 1.0
-    if case.linear and np.any(case.modes.w2 <= 0):
-        rate = float(np.sqrt(np.max(np.where(case.modes.w2 < 0, -case.modes.w2, 0))))
-        growth = float(np.exp(min(rate * duration, 700.0))) * max(duration, 1.0)
-    return float((run.tolerance or 0.0) * run.force_calls * np.sqrt(8 * case.scene.n) * growth)
+    if not mechanics.is_linear(case.scene):
+        growth += fastest(case) * duration / 2
+    elif case.linear and np.any(case.modes.w2 < 0):
+        rate = float(np.sqrt(np.max(-case.modes.w2)))
+        growth = float(np.exp(min(rate * duration, 700.0))) * max(duration * rate, 1.0)
+    return float((run.tolerance or 0.0) * run.force_calls * _worst_local_error(case) * growth)
+
+
+def _worst_local_error(case: Case) -> float:
+    """The largest local error that passes, in tolerances and in units of the start."""
+    run, scene = case.trajectory, case.judged
+    of_q, of_p = mechanics.amplitudes(scene)
+    weight_q, weight_p = np.max(np.abs(run.q), axis=0) + of_q, np.max(np.abs(run.p), axis=0) + of_p
+    # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `mechanics.Norm`
+    stiff = np.zeros(scene.n)
+    for term in scene.terms:
+        for end in mechanics.particles(term):
+            np.add.at(stiff, end, term.rigidity * term.bodies)
+    for group in case.norm.groups:
+        stiff[group] += scene.m[group] / case.norm.duration**2
+    largest = np.max(np.maximum(stiff * weight_q**2, weight_p**2 / scene.m)) / 2
+    with np.errstate(divide="ignore"):
+        return float(np.sqrt(2 * scene.n * largest) / case.norm.unit)
 
 
 def arithmetic(case: Case) -> Verdict:

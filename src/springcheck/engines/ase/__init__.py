@@ -16,7 +16,7 @@ ENGINE = Engine(
             name="velocity-verlet",
             scheme="velocity-verlet",
             about="ase.md.verlet.VelocityVerlet",
-            terms=frozenset({"wall-spring", "spring", "quartic"}),
+            terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "morse"}),
         )
     },
 )

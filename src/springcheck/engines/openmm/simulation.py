@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import openmm as mm
@@ -55,6 +56,13 @@ _PRECISIONS = {
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
+
+EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
+    "quartic": ("0.25*b*(x-at)^4", ("b",)),
+    "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave")),
+}
+"""One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`.  No parameter is divided
+by or multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
 SHIFTED = frozenset({"verlet", "langevin-middle"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
@@ -193,24 +201,54 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
             ):
                 bonds.addBond(a, b, length, k)
-        elif isinstance(term, mechanics.Quartic):
-            system.addForce(_wells(term, origins))
     for bonds in (slow, fast):
         if bonds.getNumBonds():
             system.addForce(bonds)
+    for term in scene.terms:
+        if term.key in EXTERNAL:
+            system.addForce(_external(term, origins))
+        elif isinstance(term, mechanics.Morse):
+            _stays_right_way_round(scene, term)
+            system.addForce(_morse(term, origins))
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
 
 
-def _wells(term: mechanics.Quartic, origins: Floats) -> mm.CustomExternalForce:
-    """Stiffening wells, whose force OpenMM derives from their energy."""
-    wells = mm.CustomExternalForce("b*u*u*u*u/4; u=x-at")
-    wells.addPerParticleParameter("b")
-    wells.addPerParticleParameter("at")
-    for i, b, at in zip(term.i.tolist(), term.b.tolist(), (term.at - origins[term.i]).tolist(), strict=True):
-        wells.addParticle(i, [b, at])
-    return wells
+def _external(term: Any, origins: Floats) -> mm.CustomExternalForce:
+    """A one-body term as its energy in the coordinate x."""
+    energy, names = EXTERNAL[term.key]
+    force = mm.CustomExternalForce(energy)
+    for name in (*names, "at"):
+        force.addPerParticleParameter(name)
+    columns = [getattr(term, name) for name in names] + [term.at - origins[term.i]]
+    for i, values in zip(term.i.tolist(), np.transpose(columns).tolist(), strict=True):
+        force.addParticle(i, values)
+    return force
+
+
+def _morse(term: mechanics.Morse, origins: Floats) -> mm.CustomBondForce:
+    force = mm.CustomBondForce("depth*(1-exp(-steepness*(r-rest)))^2")
+    for name in ("depth", "steepness", "rest"):
+        force.addPerBondParameter(name)
+    rest = term.rest - (origins[term.b] - origins[term.a])
+    for a, b, *values in zip(
+        term.a.tolist(), term.b.tolist(), term.depth.tolist(), term.steepness.tolist(), rest.tolist(),
+        strict=True,
+    ):  # fmt: skip
+        force.addBond(a, b, values)
+    return force
+
+
+def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
+    """MethodError where a Morse bond could reach length 0: OpenMM's knows its length, not its sign."""
+    energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
+    barrier = term.depth * np.expm1(term.steepness * term.rest) ** 2
+    if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
+        raise MethodError(
+            f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
+            "its second end must start to the right of the first, too slow to close the rest length"
+        )
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:

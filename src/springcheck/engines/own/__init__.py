@@ -7,7 +7,7 @@ from springcheck.model import Method
 
 _KINDS = frozenset({"particles", "circuit", "rotor"})
 _LINEAR = frozenset({"wall-spring", "spring", "damping"})
-_TERMS = _LINEAR | {"quartic"}
+_TERMS = _LINEAR | {"quartic", "cosine", "morse"}
 
 
 def _method(name: str, scheme: str, about: str, terms: frozenset[str] = _TERMS) -> Method:

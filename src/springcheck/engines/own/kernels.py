@@ -3,6 +3,8 @@
 Interpreted, the rows `m, k, q, p ...` are lists of floats (Python's floats neither warn nor raise when
 they overflow); compiled, they are arrays.  So no kernel may contain what rounds or fails differently
 there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
+Sines and exponentials are made of these too: the C library's differ in the last digit from one system
+to the next, and Python's raise where these give inf or nan.
 
 Every kernel takes `(every, h, *constants, q, p, qs, ps)`, fills row after row of qs and ps (f, n) with
 the state `every` steps later, and returns the last state.  There are four layouts:
@@ -12,7 +14,7 @@ many    particles side by side, each on one wall spring: n systems in one
 joined  any terms; forces are summed over the terms in the order of `forces`, then over each term's list
 chain   springs between neighbours, for implicit Euler: its equations are tridiagonal then
 
-To add a term to `joined`: write its loop, add it to `HELPERS` and `forces`, and name its fields in
+To add a term to `joined`: write its loop, add it to `LAWS` and `forces`, and name its fields in
 `simulation.FIELDS`.
 """
 
@@ -26,7 +28,7 @@ Row: TypeAlias = Any
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
 Terms: TypeAlias = Any
-"""One tuple of rows for each kind of term, in the order of `simulation.FIELDS`."""
+"""One tuple of rows for each kind of term, in the order of `LAWS`; empty where the scene has none."""
 State: TypeAlias = Any
 Kernel: TypeAlias = Callable[..., State]
 
@@ -140,42 +142,136 @@ def many_implicit_euler(
     return q, p
 
 
-def wall_springs(i: Row, k: Row, at: Row, q: Row, f: Row) -> None:
+WHOLE = 6755399441055744.0
+"""1.5 * 2**52: adding and taking it away rounds to a whole number."""
+TWO_BY_PI = 6.36619772367581382433e-01
+PI_BY_2 = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
+"""In three parts, the first two of 33 bits: their products with numbers below 2**20 are exact."""
+LOG2_E = 1.44269504088896338700e00
+LN_2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+EXPONENTS = (7.09782712893383973096e02, -7.45133219101941108420e02)
+"""exp overflows above the first and vanishes below the second."""
+INFINITE = float("inf")
+POWERS = tuple((float(e), 2.0**e) for e in (64, 512, 256, 128, 64, 32, 16, 8, 4, 2, 1))
+
+
+def sine(x: float) -> float:
+    """sin(x) to 1 ulp of x or of the result, for |x| < 2**20; to eps |x| below 2**50; no meaning beyond.
+
+    Polynomials of fdlibm, k_sin.c and k_cos.c (Sun Microsystems, 1993).
+    """
+    turns = (x * TWO_BY_PI + WHOLE) - WHOLE
+    r = ((x - turns * PI_BY_2[0]) - turns * PI_BY_2[1]) - turns * PI_BY_2[2]
+    quarter = turns - 4.0 * ((turns * 0.25 + WHOLE) - WHOLE)
+    z = r * r
+    if quarter * quarter == 1.0:
+        c = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
+        c = -2.75573143513906633035e-07 + z * c
+        c = 2.48015872894767294178e-05 + z * c
+        c = -1.38888888888741095749e-03 + z * c
+        c = 4.16666666666666019037e-02 + z * c
+        half = 0.5 * z
+        w = 1.0 - half
+        y = w + ((1.0 - w - half) + z * (z * c))
+        return y if quarter == 1.0 else -y
+    c = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+    c = 2.75573137070700676789e-06 + z * c
+    c = -1.98412698298579493134e-04 + z * c
+    c = 8.33333333332248946124e-03 + z * c
+    c = -1.66666666666666324348e-01 + z * c
+    y = r + r * (z * c)
+    return y if quarter == 0.0 else -y
+
+
+def exponential(x: float) -> float:
+    """exp(x) to 1 ulp; inf where it overflows, 0 where it vanishes.  Polynomial of fdlibm, e_exp.c."""
+    if x > EXPONENTS[0]:
+        return INFINITE
+    if x < EXPONENTS[1]:
+        return 0.0
+    n = (x * LOG2_E + WHOLE) - WHOLE
+    high = x - n * LN_2[0]
+    low = n * LN_2[1]
+    r = high - low
+    z = r * r
+    c = -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
+    c = 6.61375632143793436117e-05 + z * c
+    c = -2.77777777770155933842e-03 + z * c
+    c = 1.66666666666666019037e-01 + z * c
+    c = r - z * c
+    y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
+    for size, power in POWERS:
+        if n >= size:
+            n = n - size
+            y = y * power
+        elif n <= -size:
+            n = n + size
+            y = y / power
+    return y
+
+
+def wall_springs(rows: Rows, q: Row, p: Row, f: Row) -> None:
     """Add -k (q - at) to f."""
+    i, k, at = rows
     for s in range(len(i)):
         f[i[s]] += -k[s] * (q[i[s]] - at[s])
 
 
-def springs(a: Row, b: Row, k: Row, rest: Row, q: Row, f: Row) -> None:
+def springs(rows: Rows, q: Row, p: Row, f: Row) -> None:
     """Add the tension k (q[b] - q[a] - rest) to f[a] and take it from f[b]."""
+    a, b, k, rest = rows
     for s in range(len(a)):
         tension = k[s] * (q[b[s]] - q[a[s]] - rest[s])
         f[a[s]] += tension
         f[b[s]] -= tension
 
 
-def quartics(i: Row, b: Row, at: Row, q: Row, f: Row) -> None:
+def quartics(rows: Rows, q: Row, p: Row, f: Row) -> None:
     """Add -b (q - at)**3 to f."""
+    i, b, at = rows
     for s in range(len(i)):
         u = q[i[s]] - at[s]
         f[i[s]] += -b[s] * (u * u * u)
 
 
-def dampings(i: Row, c: Row, m: Row, p: Row, f: Row) -> None:
+def cosines(rows: Rows, q: Row, p: Row, f: Row) -> None:
+    """Add -depth wave sin(wave (q - at)) to f."""
+    i, depth, wave, at = rows
+    for s in range(len(i)):
+        f[i[s]] += -(depth[s] * wave[s]) * sine(wave[s] * (q[i[s]] - at[s]))
+
+
+def morses(rows: Rows, q: Row, p: Row, f: Row) -> None:
+    """Add the tension 2 depth steepness x (1 - x), x = exp(-steepness u), to f[a]; take it from f[b]."""
+    a, b, depth, steepness, rest = rows
+    for s in range(len(a)):
+        x = exponential(-steepness[s] * (q[b[s]] - q[a[s]] - rest[s]))
+        tension = 2.0 * depth[s] * steepness[s] * x * (1.0 - x)
+        f[a[s]] += tension
+        f[b[s]] -= tension
+
+
+def dampings(rows: Rows, q: Row, p: Row, f: Row) -> None:
     """Add -c p/m to f."""
+    i, c, m = rows
     for s in range(len(i)):
         f[i[s]] += -c[s] * (p[i[s]] / m[s])
 
 
+def nothing(rows: Rows, q: Row, p: Row, f: Row) -> None:
+    """Stands in for a term that the scene does not have."""
+
+
 def forces(terms: Terms, q: Row, p: Row, f: Row) -> None:
     """Fill f with the force on every particle."""
-    walls, pairs, wells, brakes = terms
     for i in range(len(f)):
         f[i] = 0.0
-    wall_springs(walls[0], walls[1], walls[2], q, f)
-    springs(pairs[0], pairs[1], pairs[2], pairs[3], q, f)
-    quartics(wells[0], wells[1], wells[2], q, f)
-    dampings(brakes[0], brakes[1], brakes[2], p, f)
+    wall_springs(terms[0], q, p, f)
+    springs(terms[1], q, p, f)
+    quartics(terms[2], q, p, f)
+    cosines(terms[3], q, p, f)
+    morses(terms[4], q, p, f)
+    dampings(terms[5], q, p, f)
 
 
 def joined_euler(
@@ -277,8 +373,18 @@ def chain_implicit_euler(
     return q, p
 
 
-HELPERS: tuple[Callable[..., None], ...] = (wall_springs, springs, quartics, dampings, forces)
-"""What kernels call, each after what it calls itself."""
+ELEMENTARY: tuple[Callable[[float], float], ...] = (sine, exponential)
+"""What the loops of terms call."""
+LAWS: dict[str, Callable[..., None]] = {
+    "wall-spring": wall_springs,
+    "spring": springs,
+    "quartic": quartics,
+    "cosine": cosines,
+    "morse": morses,
+    "damping": dampings,
+}
+"""The loop of each kind of term, in the order in which `forces` calls them.  A scene's kernel has
+`nothing` in the place of those that the scene lacks: they are neither compiled nor evaluated."""
 
 ONE: dict[str, Kernel] = {
     "euler": one_euler,

@@ -38,9 +38,11 @@ FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "wall-spring": (("i",), ("k", "at")),
     "spring": (("a", "b"), ("k", "rest")),
     "quartic": (("i",), ("b", "at")),
+    "cosine": (("i",), ("depth", "wave", "at")),
+    "morse": (("a", "b"), ("depth", "steepness", "rest")),
     "damping": (("i",), ("c", "m")),
 }
-"""Indices and parameters of each kind of term, in the order in which `kernels.forces` takes them."""
+"""Indices and parameters of each kind of term, in the order in which its loop in `kernels` takes them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,6 +50,8 @@ class Layout:
     """A kernel and what it works on: floats, arrays, and tuples of them; `work` spring-steps a step."""
 
     kernel: kernels.Kernel
+    keys: frozenset[str]
+    """Terms that the kernel evaluates one by one."""
     n: int
     constants: tuple[Any, ...]
     q: Any
@@ -116,7 +120,7 @@ def prepare(scene: Scene, method: str, step: float, *, compiled: bool | None = N
         kernel = _try_to_compile(layout, h) if layout.work * scene.steps >= WORTH else None
     else:
         kernel = _compile(layout, h) if compiled else None
-    return Own(layout, h, kernel or layout.kernel, compiled=kernel is not None)
+    return Own(layout, h, kernel or _interpreted(layout), compiled=kernel is not None)
 
 
 def _layout(scene: Scene, method: str, h: float) -> Layout:
@@ -133,21 +137,30 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
         if scene.n == 1 and at[0] == 0:
             constants = tuple(float(x[0]) for x in (m, k, *inverse))
             return Layout(
-                kernel=kernels.ONE[method], n=1, constants=constants, q=float(q[0]), p=float(p[0]), work=1
+                kernel=kernels.ONE[method],
+                keys=frozenset(),
+                n=1,
+                constants=constants,
+                q=float(q[0]),
+                p=float(p[0]),
+                work=1,
             )
         q, p, *rows = _blocks((q, p, m, k, at, *inverse))
         return Layout(
             kernel=kernels.MANY[method],
+            keys=frozenset(),
             n=scene.n,
             constants=tuple(rows),
             q=q,
             p=p,
             work=scene.n,
         )
-    terms = tuple(_rows(scene, key) for key in FIELDS)
+    keys = frozenset(term.key for term in scene.terms)
+    # the types of absent terms differ from those of empty ones: numba tells saved kernels apart by types
+    terms = tuple(_rows(scene, key) if key in keys else () for key in kernels.LAWS)
     kernel = kernels.JOINED[method]
     solver: tuple[Floats, ...] = ()
-    work = float(scene.n + sum(len(rows[0]) for rows in terms))
+    work = float(scene.n + sum(len(rows[0]) for rows in terms if rows))
     if implicit and _is_chain(scene):
         kernel, solver = kernels.CHAIN[method], _factors(scene, h, slowed)
         work += scene.n
@@ -156,7 +169,13 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
         # one product and sum of the matrix costs about an eighth of a spring
         work += scene.n**2 / 8
     return Layout(
-        kernel=kernel, n=scene.n, constants=(m, terms, np.zeros(scene.n), *solver), q=q, p=p, work=work
+        kernel=kernel,
+        keys=keys,
+        n=scene.n,
+        constants=(m, terms, np.zeros(scene.n), *solver),
+        q=q,
+        p=p,
+        work=work,
     )
 
 
@@ -256,6 +275,12 @@ def _as_lists(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
+def _interpreted(layout: Layout) -> kernels.Kernel:
+    """The kernel as it stands, without the loops of absent terms."""
+    forces = _with_names(kernels.forces, dict(_laws(layout.keys)))
+    return _with_names(layout.kernel, {"forces": forces})
+
+
 def _try_to_compile(layout: Layout, h: float) -> kernels.Kernel | None:
     try:
         return _compile(layout, h)
@@ -269,7 +294,7 @@ def _compile(layout: Layout, h: float) -> kernels.Kernel:
     arguments = (1, h, *layout.constants, layout.q, layout.p, none, none.copy())
     for saved in (True, False):
         try:
-            kernel = _jit(layout.kernel, saved)
+            kernel = _jit(layout.kernel, layout.keys, saved)
             kernel(*arguments)
         except (OSError, RuntimeError):
             # no folder for the compiled code can be written: compile for this process alone
@@ -281,21 +306,30 @@ def _compile(layout: Layout, h: float) -> kernels.Kernel:
 
 
 @cache
-def _jit(kernel: kernels.Kernel, saved: bool) -> kernels.Kernel:
-    """numba's version of a kernel."""
+def _jit(kernel: kernels.Kernel, keys: frozenset[str], saved: bool) -> kernels.Kernel:
+    """numba's version of a kernel for scenes with these terms."""
     import numba
 
     jit: Callable[[FunctionType], Any] = numba.njit(cache=saved, **kernels.FLAGS)
-    names: dict[str, Any] = dict(vars(kernels))
-    for helper in kernels.HELPERS:
+    names: dict[str, Any] = {}
+    laws = _laws(keys)
+    helpers: tuple[Callable[..., Any], ...] = (*kernels.ELEMENTARY, *laws.values())
+    for helper in helpers:
         names[helper.__name__] = jit(_with_names(helper, names))
+    names = {name: names[law.__name__] for name, law in laws.items()}
+    names["forces"] = jit(_with_names(kernels.forces, names))
     return cast(kernels.Kernel, jit(_with_names(kernel, names)))
 
 
+def _laws(keys: frozenset[str]) -> dict[str, Callable[..., None]]:
+    """By the name that `kernels.forces` calls: the loop of each term, `nothing` for those not in keys."""
+    return {law.__name__: law if key in keys else kernels.nothing for key, law in kernels.LAWS.items()}
+
+
 def _with_names(function: Callable[..., Any], names: dict[str, Any]) -> FunctionType:
-    """The same code, calling the helpers in `names`: numba calls none that it has not compiled."""
+    """The same code, calling what stands in `names`: numba calls nothing that it has not compiled."""
     code = cast(FunctionType, function).__code__
-    return FunctionType(code, dict(names), function.__name__)
+    return FunctionType(code, {**vars(kernels), **names}, function.__name__)
 
 
 def _installed(distribution: str) -> str:

@@ -13,7 +13,7 @@ def _method(name: str, about: str) -> Method:
         scheme=name,
         about=about,
         adaptive=True,
-        terms=frozenset({"wall-spring", "spring", "quartic", "damping"}),
+        terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "morse", "damping"}),
         kinds=frozenset({"particles", "circuit", "rotor"}),
     )
 

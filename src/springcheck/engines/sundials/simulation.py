@@ -43,13 +43,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
 
 def absolute_tolerance(scene: Scene) -> Floats:
     """`scene.tolerance` times the amplitude of each component of (q, p) at the energy of the start (2n,)."""
-    unit = mechanics.norm(scene).unit
-    k = np.abs(np.diag(mechanics.stiffness(scene, scene.q))).astype(np.float64)
-    duration = abs(scene.step) * scene.steps
-    p = np.sqrt(2 * scene.m) * float(unit)
-    held = k > 0
-    q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * float(unit), p / scene.m * duration)
-    found = scene.tolerance * np.concatenate([q, p])
+    found = scene.tolerance * np.concatenate(mechanics.amplitudes(scene))
     # a component that never moves needs a weight too; any will do
     return np.asarray(np.where(found > 0, found, scene.tolerance))
 

@@ -1,12 +1,9 @@
-"""The true motion of a scene: normal modes, in extended precision.
+"""The true motion of linear scenes: normal modes.
 
 A linear scene falls apart into modes y'' = -w2 y - r y' + g, one for each eigenvector of
 M^-1/2 K M^-1/2: without friction (r = 0) circular functions for w2 > 0, hyperbolic ones for w2 < 0, a
 parabola for w2 = 0; with friction the same, decaying.  Every scheme acts on
 each mode by itself too, which is why limits and shadow energies are read off here as well.
-
-Phases are taken as (number of steps) * (h w) with the very double h that the engines were given, in
-extended precision: after 1e7 steps a phase in double precision would be wrong by 1e-10.
 """
 
 from __future__ import annotations
@@ -16,11 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import mechanics
+from springcheck.exact.elliptic import EPS
 from springcheck.model import Extended, Integers, Reals, Scene
-
-EPS = float(np.finfo(np.longdouble).eps)
-"""Of the extended precision used for every reference: 1.1e-19 on x86-64.  Where `long double` is no
-wider than double the references round like the engines, and every bound that names EPS widens."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -200,37 +194,27 @@ def _clusters(close: np.ndarray) -> list[Integers]:
     return [np.asarray(block) for block in np.split(np.arange(len(close)), breaks)]
 
 
-def has_true_motion(scene: Scene) -> bool:
-    """Whether `true_motion` knows the scene."""
-    return mechanics.has_modes(scene)
+def motion(scene: Scene, t: Extended, known: Modes | None = None) -> tuple[Extended, Extended]:
+    """True q and p (f, n) of a linear scene at times t (f, 1) [T].
 
-
-def true_motion(
-    scene: Scene, steps: Integers, h: float, known: Modes | None = None
-) -> tuple[Extended, Extended]:
-    """True q and p (f, n) after these numbers of steps of h, in extended precision.
-
-    `known` are the scene's modes, for a caller that asks often.  Motion that leaves even the extended
-    range comes back infinite.
+    `known` are the scene's modes, for a caller that asks often.
     """
     found = known or modes(scene)
     y0, v0 = found.into(scene.q, scene.p)
     centre = found.centre()
     u0 = y0 - centre
-    count = np.asarray(steps).astype(np.longdouble)[:, None]
-    t = count * np.longdouble(h)
-    y = np.empty((len(count), len(u0)), dtype=np.longdouble)
+    y = np.empty((len(t), len(u0)), dtype=np.longdouble)
     v = np.empty_like(y)
     w2, rate = found.w2, found.rate
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        for kind, motion in (
+        for kind, law in (
             ((w2 != 0) & (rate == 0), _undamped),
             ((w2 != 0) & (rate != 0), _damped),
             ((w2 == 0) & (rate == 0), _free),
             ((w2 == 0) & (rate != 0), _dragged),
         ):
             if np.any(kind):
-                y[:, kind], v[:, kind] = motion(
+                y[:, kind], v[:, kind] = law(
                     u0[kind], v0[kind], t, _Law(w2=w2[kind], rate=rate[kind], pull=found.pull[kind])
                 )
     return found.out_of(y + centre, v)

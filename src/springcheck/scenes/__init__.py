@@ -1,0 +1,105 @@
+"""Scene files: TOML in, `model.Scene` out, and every mistake answered with file, field and remedy."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from springcheck.errors import SceneError
+from springcheck.model import Scene
+from springcheck.scenes import building, tables
+
+
+def folder() -> Path:
+    """Where the shipped scenes lie: inside the installed package, or in a checkout's data folder."""
+    packaged = Path(__file__).parents[1] / "data" / "scenes"
+    return packaged if packaged.is_dir() else Path(__file__).parents[3] / "data" / "scenes"
+
+
+def names() -> tuple[str, ...]:
+    """Names of the shipped scenes."""
+    return tuple(sorted(path.stem for path in folder().glob("*.toml")))
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Read a shipped scene by name, or any scene file by path.
+
+    Raises:
+        SceneError: no such scene, or a mistake in the file: says which field, what stands there and
+            what is accepted.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml" and path.parent == Path() and not path.is_file():
+        path = folder() / f"{name_or_path}.toml"
+        if not path.is_file():
+            raise SceneError(
+                f"no scene {str(name_or_path)!r}: shipped are {', '.join(names())}; "
+                "the name of a file of your own ends in .toml"
+            )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise SceneError(f"{path}: cannot be read: {reason}") from error
+    return parse(text, name=path.stem, where=str(path))
+
+
+def parse(text: str, *, name: str, where: str | None = None) -> Scene:
+    """The scene that a TOML text describes; `where` is named in messages.  Raises SceneError."""
+    where = where or name
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{where}: not valid TOML: {error}") from error
+    for field, value in _numbers(data):
+        if not math.isfinite(value):
+            raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
+    try:
+        table = msgspec.convert(data, tables.SceneTable, strict=True)
+    except msgspec.ValidationError as error:
+        raise SceneError(f"{where}: {_explain(str(error), data)}") from error
+    try:
+        return building.scene(table, name=name, text=text)
+    except building.MistakeError as error:
+        raise SceneError(f"{where}: {error}") from error
+
+
+def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """All numbers in nested tables, each with its field's path."""
+    if isinstance(data, bool):
+        return
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _numbers(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list):
+        for i, value in enumerate(data):
+            yield from _numbers(value, f"{path}[{i}]")
+    elif isinstance(data, int | float):
+        try:
+            yield path, float(data)
+        except OverflowError:
+            yield path, math.inf
+
+
+def _explain(message: str, data: Any) -> str:
+    """msgspec's message with the field first, what was found there, and the fields that exist."""
+    what, _, path = message.partition(" - at `$")
+    field = path.rstrip("`").lstrip(".")
+    found = data
+    for part in re.findall(r"[^.\[\]]+", field):
+        try:
+            found = found[int(part)] if part.isdigit() else found[part]
+        except (KeyError, IndexError, TypeError):
+            found = None
+    what = what[0].lower() + what[1:]
+    if "unknown field" in what or "missing required field" in what:
+        table = tables.FIELDS.get(re.sub(r"\[.*", "", field))
+        known = f"; its fields are {', '.join(table.__struct_encode_fields__)}" if table else ""
+        return f"{field or 'the scene'}: {what.replace('object', 'it')}{known}"
+    return f"{field} = {found!r}: {what}"

@@ -1,0 +1,217 @@
+"""From the tables of a scene file to a `model.Scene`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from springcheck import mechanics
+from springcheck.model import Floats, Kind, Scene, Term, Units
+from springcheck.scenes import tables
+
+
+class MistakeError(ValueError):
+    """A value of the right type that makes no sense."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Bodies:
+    """What moves: m, q, p (n,), what it is, and what it is called in the file."""
+
+    m: Floats
+    q: Floats
+    p: Floats
+    kind: Kind
+    name: str
+
+
+def scene(table: Any, *, name: str, text: str) -> Scene:
+    """The scene of a `tables.SceneTable`.  Raises MistakeError."""
+    time = table.time
+    if time.step == 0:
+        raise MistakeError("time.step = 0: a step forwards (> 0) or backwards (< 0) is needed")
+    if time.every is not None and table.record.every is not None:
+        raise MistakeError("record.every and time.every are both given; keep record.every")
+    every = table.record.every or time.every or 1
+    if time.steps % every:
+        raise MistakeError(
+            f"record.every = {every}: time.steps = {time.steps} is no multiple of it, so the end "
+            "would not be recorded"
+        )
+    if not {"q", "p"} <= set(table.record.quantities):
+        raise MistakeError('record.quantities needs "q" and "p"; "energy" may be left out')
+    bodies = _bodies(table)
+    if table.kind not in (None, bodies.kind):
+        raise MistakeError(
+            f"kind = {table.kind!r}, but what moves is given by [[{bodies.name}]]: "
+            "particles come as [[particle]] or [chain], rotors as [[rotor]], circuits as [[inductor]]"
+        )
+    units: Units = table.units or ("si" if bodies.kind == "circuit" else "reduced")
+    if bodies.kind == "circuit" and units != "si":
+        raise MistakeError(f"units = {units!r}: a circuit is given in H, F, Ohm, C and Wb; leave units out")
+    return Scene(
+        name=name,
+        title=table.title,
+        source=table.source,
+        units=units,
+        kind=bodies.kind,
+        m=bodies.m,
+        q=bodies.q,
+        p=bodies.p,
+        terms=tuple(_terms(table, bodies)),
+        step=time.step,
+        steps=time.steps,
+        every=every,
+        tolerance=time.tolerance,
+        include=table.methods.include,
+        quantities=table.record.quantities,
+        text=text,
+    )
+
+
+def _bodies(table: Any) -> _Bodies:
+    given = [name for name in ("particle", "rotor", "inductor", "chain") if getattr(table, name)]
+    if not given:
+        raise MistakeError(
+            "nothing moves: a scene needs [[particle]], or [[rotor]], or [[inductor]], or [chain]"
+        )
+    if len(given) > 1:
+        raise MistakeError(f"[[{given[0]}]] and [[{given[1]}]] are both given; a scene has one kind of them")
+    name = given[0]
+    if name == "chain":
+        return _standing(table.chain)
+    columns = {
+        "particle": ("mass", "position", "momentum"),
+        "rotor": ("inertia", "angle", "momentum"),
+        "inductor": ("inductance", "charge", "flux"),
+    }[name]
+    kinds: dict[str, Kind] = {"particle": "particles", "rotor": "rotor", "inductor": "circuit"}
+    m, q, p = (np.array([getattr(row, column) for row in getattr(table, name)]) for column in columns)
+    return _Bodies(m=m, q=q, p=p, kind=kinds[name], name=name)
+
+
+def _standing(chain: tables.ChainTable) -> _Bodies:
+    n = chain.masses
+    q = np.zeros(n)
+    for j, wave in enumerate(chain.wave):
+        if wave.mode > n:
+            raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: a chain of {n} masses has {n} modes")
+        q += wave.amplitude * np.sin(np.pi * wave.mode * np.arange(1, n + 1) / (n + 1))
+    return _Bodies(m=np.full(n, chain.mass), q=q, p=np.zeros(n), kind="particles", name="chain")
+
+
+def _number(value: int, bodies: _Bodies, field: str) -> int:
+    n = len(bodies.m)
+    if not 0 <= value < n:
+        several = {"particle": "particles", "rotor": "rotors", "inductor": "inductors", "chain": "masses"}
+        raise MistakeError(f"{field} = {value}: there are {n} {several[bodies.name]}, numbered 0 to {n - 1}")
+    return value
+
+
+def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
+    if table.chain is not None:
+        yield from _links(table.chain)
+    yield from _springs(table.spring, bodies)
+    yield from _capacitors(table, bodies)
+    for key, (term, _) in tables.TERMS.items():
+        rows = getattr(table, key.replace("-", "_"))
+        if rows:
+            yield _by_columns(term, rows, bodies)
+    yield from _friction(table, bodies)
+
+
+def _links(chain: tables.ChainTable) -> Iterator[Term]:
+    ends = np.unique([0, chain.masses - 1])
+    # a chain of one mass hangs on both walls
+    k = np.full(len(ends), chain.stiffness * (2 if chain.masses == 1 else 1))
+    yield mechanics.WallSpring(i=ends, k=k, at=np.zeros(len(ends)))
+    if chain.masses > 1:
+        a = np.arange(chain.masses - 1)
+        yield mechanics.Spring(a=a, b=a + 1, k=np.full(len(a), chain.stiffness), rest=np.zeros(len(a)))
+
+
+def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator[Term]:
+    walls: dict[bool, list[tuple[int, float, float]]] = {False: [], True: []}
+    pairs: dict[bool, list[tuple[int, int, float, float]]] = {False: [], True: []}
+    for j, spring in enumerate(springs):
+        field = f"spring[{j}].ends"
+        for end in spring.ends:
+            if end != "wall":
+                _number(end, bodies, field)
+        match spring.ends:
+            case ("wall", "wall"):
+                raise MistakeError(f"{field}: a spring between two walls moves nothing")
+            case ("wall", int(particle)):
+                walls[spring.fast].append((particle, spring.stiffness, spring.wall + spring.rest))
+            case (int(particle), "wall"):
+                walls[spring.fast].append((particle, spring.stiffness, spring.wall - spring.rest))
+            case (int(one), int(other)):
+                _two_ends(one, other, field)
+                if spring.wall:
+                    raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
+                pairs[spring.fast].append((one, other, spring.stiffness, spring.rest))
+    for fast in (False, True):
+        if walls[fast]:
+            i, k, at = zip(*walls[fast], strict=True)
+            yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.array(at), fast=fast)
+        if pairs[fast]:
+            a, b, k, rest = zip(*pairs[fast], strict=True)
+            yield mechanics.Spring(
+                a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest), fast=fast
+            )
+
+
+def _two_ends(one: int, other: int, field: str) -> None:
+    if one == other:
+        raise MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
+
+
+def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
+    """A capacitor is a spring of stiffness 1/C: in one loop towards 0, between two towards each other."""
+    if (table.capacitor or table.resistor) and bodies.kind != "circuit":
+        raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
+    single: list[tuple[int, float]] = []
+    shared: list[tuple[int, int, float]] = []
+    for j, capacitor in enumerate(table.capacitor):
+        loops = [_number(loop, bodies, f"capacitor[{j}].loops") for loop in capacitor.loops]
+        if len(loops) == 1:
+            single.append((loops[0], 1 / capacitor.capacitance))
+        else:
+            _two_ends(loops[0], loops[1], f"capacitor[{j}].loops")
+            shared.append((loops[0], loops[1], 1 / capacitor.capacitance))
+    if single:
+        i, k = zip(*single, strict=True)
+        yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.zeros(len(i)))
+    if shared:
+        a, b, k = zip(*shared, strict=True)
+        yield mechanics.Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.zeros(len(a)))
+
+
+def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
+    """A term from rows of its table: what it acts on, and an array for each column."""
+    values = {}
+    for column in term.columns:
+        given = np.array([getattr(row, column.name) for row in rows])
+        values[column.field] = 1 / given if column.inverse else given
+    if term.bodies == 1:
+        field = f"{term.key}[{{}}].particle"
+        chosen = [_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]
+        found: Term = term(i=np.array(chosen), **values)
+        return found
+    for j, row in enumerate(rows):
+        one, other = (_number(end, bodies, f"{term.key}[{j}].ends") for end in row.ends)
+        _two_ends(one, other, f"{term.key}[{j}].ends")
+    a, b = zip(*(row.ends for row in rows), strict=True)
+    joined: Term = term(a=np.array(a), b=np.array(b), **values)
+    return joined
+
+
+def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:
+    rows = [(row.particle, row.coefficient, f"damping[{j}].particle") for j, row in enumerate(table.damping)]
+    rows += [(row.loop, row.resistance, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
+    if rows:
+        i = np.array([_number(particle, bodies, field) for particle, _, field in rows])
+        yield mechanics.Damping(i=i, c=np.array([c for _, c, _ in rows]), m=bodies.m[i])

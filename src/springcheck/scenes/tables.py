@@ -1,0 +1,180 @@
+"""What may stand in a scene file: one struct for each table, fields with their units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, cast
+
+import msgspec
+
+from springcheck import mechanics
+from springcheck.model import Kind, Units
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+Count = Annotated[int, msgspec.Meta(ge=1)]
+End = int | Literal["wall"]
+
+
+class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """A table of a scene file: what is not a field of it is refused."""
+
+
+class ParticleTable(Table, frozen=True):
+    """mass [M], position [L] and momentum [M L/T] at the start."""
+
+    mass: Positive
+    position: float = 0.0
+    momentum: float = 0.0
+
+
+class RotorTable(Table, frozen=True):
+    """A body that turns: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
+
+    inertia: Positive
+    angle: float = 0.0
+    momentum: float = 0.0
+
+
+class InductorTable(Table, frozen=True):
+    """The inductor of a loop: inductance [H], charge that has gone round [C] and flux [Wb] at the start."""
+
+    inductance: Positive
+    charge: float = 0.0
+    flux: float = 0.0
+
+
+class CapacitorTable(Table, frozen=True):
+    """A capacitor in one loop, or between two loops that go through it in opposite directions [F]."""
+
+    loops: Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=2)]
+    capacitance: Positive
+
+
+class ResistorTable(Table, frozen=True):
+    """A resistor of one loop [Ohm]."""
+
+    loop: int
+    resistance: Annotated[float, msgspec.Meta(ge=0)]
+
+
+class SpringTable(Table, frozen=True):
+    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L].
+
+    `fast` springs are taken in the short step of a method of multiple time steps.
+    """
+
+    ends: tuple[End, End]
+    stiffness: float
+    rest: float = 0.0
+    wall: float = 0.0
+    fast: bool = False
+
+
+class DampingTable(Table, frozen=True):
+    """Friction of one particle: force -coefficient p/mass, coefficient [M/T]."""
+
+    particle: int
+    coefficient: Annotated[float, msgspec.Meta(ge=0)]
+
+
+class WaveTable(Table, frozen=True):
+    """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
+
+    mode: Count
+    amplitude: float
+
+
+class ChainTable(Table, frozen=True):
+    """Equal masses [M] between two walls, neighbours joined by equal springs [M/T2].
+
+    Positions count from the rest of each mass; at the start the chain stands still in these waves.
+    """
+
+    masses: Count
+    mass: Positive
+    stiffness: Positive
+    wave: Annotated[tuple[WaveTable, ...], msgspec.Meta(min_length=1)]
+
+
+class TimeTable(Table, frozen=True):
+    """Step [T], number of steps, and the relative tolerance per step of adaptive solvers."""
+
+    step: float
+    steps: Count
+    every: Count | None = None
+    tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
+
+
+class MethodsTable(Table, frozen=True):
+    """Labels or globs of the methods to run; all that can serve the scene when left out."""
+
+    include: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] = ("*",)
+
+
+class RecordTable(Table, frozen=True):
+    """Every how many steps a frame is kept, and what of it."""
+
+    every: Count | None = None
+    quantities: tuple[Literal["q", "p", "energy"], ...] = ("q", "p", "energy")
+
+
+class SceneBase(Table, frozen=True):
+    """A scene file without the tables of the terms that need no more than their columns."""
+
+    title: str
+    time: TimeTable
+    source: str = ""
+    units: Units | None = None
+    kind: Kind | None = None
+    particle: tuple[ParticleTable, ...] = ()
+    rotor: tuple[RotorTable, ...] = ()
+    inductor: tuple[InductorTable, ...] = ()
+    capacitor: tuple[CapacitorTable, ...] = ()
+    resistor: tuple[ResistorTable, ...] = ()
+    chain: ChainTable | None = None
+    spring: tuple[SpringTable, ...] = ()
+    damping: tuple[DampingTable, ...] = ()
+    methods: MethodsTable = MethodsTable()
+    record: RecordTable = RecordTable()
+
+
+def _of_term(term: Any) -> type[Table]:
+    """The table of a term: the particle or the two ends on which it acts, and its columns."""
+    fields: list[Any] = [("particle", int) if term.bodies == 1 else ("ends", tuple[int, int])]
+    for column in term.columns:
+        kind = Positive if column.positive else float
+        fields.append((column.name, kind) if column.default is None else (column.name, kind, column.default))
+    table = msgspec.defstruct(f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True)
+    return cast(type[Table], table)
+
+
+TERMS: dict[str, tuple[Any, type[Table]]] = {
+    term.key: (term, _of_term(term)) for term in mechanics.TERMS if term.columns
+}
+"""Terms that are read by their columns alone, with their tables."""
+
+SceneTable = msgspec.defstruct(
+    "SceneTable",
+    [(key.replace("-", "_"), tuple[table, ...], ()) for key, (_, table) in TERMS.items()],  # type: ignore[valid-type]
+    bases=(SceneBase,),
+    frozen=True,
+    kw_only=True,
+    rename=lambda name: name.replace("_", "-"),
+)
+"""A whole scene file."""
+
+FIELDS: dict[str, type[Table]] = {
+    "": cast(type[Table], SceneTable),
+    "particle": ParticleTable,
+    "rotor": RotorTable,
+    "inductor": InductorTable,
+    "capacitor": CapacitorTable,
+    "resistor": ResistorTable,
+    "chain": ChainTable,
+    "spring": SpringTable,
+    "damping": DampingTable,
+    "time": TimeTable,
+    "methods": MethodsTable,
+    "record": RecordTable,
+    **{key: table for key, (_, table) in TERMS.items()},
+}
+"""The table of each name, for messages that say which fields there are."""
