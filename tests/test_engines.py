@@ -147,7 +147,7 @@ def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
 
 
 def test_opencl_forces_are_kept_in_fixed_point(need: Need) -> None:
-    label = "openmm:euler@OpenCL-double"
+    label = "openmm:verlet@OpenCL-double"
     need(label)
     scene = scenes.load_scene("spring")
     run = springcheck.run(scene, label)
@@ -158,13 +158,35 @@ def test_opencl_forces_are_kept_in_fixed_point(need: Need) -> None:
 
 
 def test_opencl_keeps_force_constants_in_single_precision(need: Need) -> None:
-    label = "openmm:euler@OpenCL-double"
+    label = "openmm:verlet@OpenCL-double"
     need(label)
     scene = scenes.load_scene("spring-uneven")
     run = springcheck.run(scene, label)
     as_double = replace(run, arithmetic=replace(run.arithmetic, parameters="double"))
     assert "step-defect" in judged(scene, as_double)
     assert "step-defect" not in judged(scene, run)
+
+
+def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Need) -> None:
+    """OpenMM 8.6.1 divides the fixed-point force by 0xFFFFFFFF in CustomIntegrator's kernel, and by
+    0x100000000 in VerletIntegrator's: every force is too large by one part in 2**32 - 1."""
+    scene = replace(
+        scenes.load_scene("spring-uneven"),
+        q=np.array([1e6]),
+        p=np.zeros(1),
+        steps=3,
+        terms=(mechanics.WallSpring(i=np.array([0]), k=np.array([2.875]), at=np.zeros(1)),),
+    )
+    for method, factor in (("semi-implicit-euler", 1.0), ("leapfrog", 0.0)):
+        label = f"openmm:{method}@OpenCL-double"
+        need(label)
+        run = springcheck.run(scene, label)
+        kick = np.longdouble(scene.step) * np.longdouble(-2.875) * np.longdouble(1e6)
+        too_large = float(run.p[1, 0] / kick - 1) * 2.0**32
+        assert abs(too_large - factor) < 1e-5
+        assert judged(scene, run) == []
+        as_documented = replace(run, arithmetic=replace(run.arithmetic, excess=0.0))
+        assert ("step-defect" in judged(scene, as_documented)) == bool(factor)
 
 
 def test_every_engine_has_methods_of_known_schemes() -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.model import Arithmetic, Outcome, Scene, Timing, Trajectory, Verdict
+from springcheck.model import Arithmetic, Comparison, Outcome, Scene, Timing, Trajectory, Verdict
 from springcheck.store import draft, reading
 
 LABELS = ["own:euler", "openmm:verlet@OpenCL-mixed", "sundials:adams"]
@@ -26,7 +26,7 @@ LABELS = ["own:euler", "openmm:verlet@OpenCL-mixed", "sundials:adams"]
 def scene(n: int = 3, steps: int = 40, **changed: object) -> Scene:
     m = np.array([3.7, 0.4, 1.9, 2.2, 8.0])[:n]
     plain = Scene(
-        name="chain", title="A chain", source="", m=m, q=0.1 * m, p=m, terms=(), step=-0.3, steps=steps,
+        name="chain", title="A chain", source="", m=m, q=0.1 * m, p=m, terms=(), step=-0.25, steps=steps,
         every=2, text='title = "A chain"\n# ½ of it\n', units="md",
     )  # fmt: skip
     return replace(plain, **changed)
@@ -70,11 +70,8 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
         one, two = getattr(a, name), getattr(b, name)
         assert (one is None) == (two is None)
         assert one is None or one.tobytes() == np.ascontiguousarray(two).tobytes(), name
-    rest = {"t": np.empty(0), "q": np.empty(0), "p": np.empty(0), "energy": None}
-    plain = [
-        {k: getattr(replace(x, **rest), k) for k in Trajectory.__slots__ if k not in rest} for x in (a, b)
-    ]
-    assert plain[0] == plain[1]
+    for name in set(Trajectory.__slots__) - {"t", "q", "p", "energy"}:
+        assert getattr(a, name) == getattr(b, name), name
 
 
 def test_trajectories_come_back_bit_for_bit_in_the_order_they_were_started(tmp_path: Path) -> None:
@@ -109,7 +106,7 @@ def test_a_run_that_stopped_early_is_stored_at_its_length(
         assert store.check(tmp_path / f"{frames}.h5") == []
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(cuts=st.lists(st.integers(1, 400), max_size=6), buffer=st.sampled_from([24, 1000, 9600, 1 << 22]))
 def test_the_digest_and_the_bytes_do_not_depend_on_how_the_frames_arrive(
     tmp_path_factory: pytest.TempPathFactory, cuts: list[int], buffer: int
@@ -121,7 +118,7 @@ def test_the_digest_and_the_bytes_do_not_depend_on_how_the_frames_arrive(
     with pytest.MonkeyPatch.context() as patch, store.open_new(path, "run") as journal:
         patch.setattr(draft, "BUFFER", buffer)
         with journal.draft("own:euler", s) as made:
-            for a, b in itertools.pairwise(edges):
+            for a, b in pairwise(edges):
                 made.append(one.t[a:b], one.q[a:b], one.p[a:b], one.energy[a:b])
             digest = made.finish(store.attributes(one))
         journal.commit(s)
@@ -213,7 +210,7 @@ def test_a_file_alone_tells_what_was_run_by_what_on_which_machine(tmp_path: Path
     assert known["method"] == "openmm:verlet@OpenCL-mixed"
     assert known["origin.openmm"] == "8.6.1"
     assert known["outcome"] == "diverged"
-    assert known["step"] == -0.3
+    assert known["step"] == -0.25
     for name in ("processor", "cores", "system", "python", "numpy", "springcheck", "sha256", "finished"):
         assert known[name], name
 
@@ -259,7 +256,7 @@ def test_windows_overlap_by_one_frame_and_make_up_the_whole(tmp_path: Path) -> N
     for rows in (1, 7, 110, 111, 112, 5000):
         pieces = list(store.windows(tmp_path / "s.h5", "sundials:adams", rows))
         assert all(len(piece.t) <= rows + 1 for piece in pieces)
-        assert all(np.array_equal(a.q[-1], b.q[0]) for a, b in itertools.pairwise(pieces))
+        assert all(np.array_equal(a.q[-1], b.q[0]) for a, b in pairwise(pieces))
         joined = np.concatenate([pieces[0].p, *(piece.p[1:] for piece in pieces[1:])])
         assert np.array_equal(joined, made.p)
 
@@ -297,13 +294,11 @@ def test_verdicts_comparison_tables_and_documents_come_back(tmp_path: Path) -> N
         )
         for passed in (True, False, None)
     )
-    comparison = store.Comparison(
-        labels=("a", "exact"), max_difference=np.array([[0, 2.5], [2.5, 0]]), unit="nm"
-    )
+    comparison = Comparison(labels=("a", "exact"), max_difference=2.5 - 2.5 * np.eye(2))
     table = store.Table(
         name="precision/own:euler",
         columns={"h": [0.1, 0.2], "error": np.eye(2), "n": np.array([1, 2]), "ok": np.array([True, False]),
-                 "note": ["", "α"]},
+                 "note": ["", "ä"]},
         units={"h": "ps"}, attributes={"order": 1.02, "by": "slope"}, signal="error", axes=("h", "."),
     )  # fmt: skip
     s = scene()
@@ -316,7 +311,7 @@ def test_verdicts_comparison_tables_and_documents_come_back(tmp_path: Path) -> N
     assert store.verdicts(path) == verdicts
     found = store.comparison(path)
     assert found is not None
-    assert (found.labels, found.unit) == (comparison.labels, "nm")
+    assert found.labels == comparison.labels
     assert np.array_equal(found.max_difference, comparison.max_difference)
     assert store.document(path, "report") == "all\nwell"
     back = store.read_tables(path)["precision/own:euler"]

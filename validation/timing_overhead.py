@@ -2,13 +2,22 @@
 
 Claim: what the study times (`simulate.bare`: the engine started by springcheck, stepped in one call, read
 once) lies within 5 % of the same engine driven by a bare loop written by hand below, without springcheck,
-measured in turn with it in this run; minimum of the repeats of each.
+measured in turn with it in this run; minimum of the repeats of each.  Runs take some 10 ms, so that some of
+three hundred fall between the interruptions of a busy machine.
 
-Command: python validation/timing_overhead.py        (60 s)
+Command: python validation/timing_overhead.py        (30 s)
 
-Expected (AMD EPYC, Zen 4, one core, openmm 8.6, ase 3.29, numba 0.68; time a step, bare loop first):
+Expected (AMD EPYC, Zen 4, one core, openmm 8.6, ase 3.29, numba 0.68):
 
-EXPECTED
+                               bare loop   springcheck   ratio
+    openmm:verlet                 114 ns        116 ns    1.02
+    ase:velocity-verlet           260 us        264 us    1.02
+    own:euler                    3.81 ns       3.82 ns    1.00
+    own:semi-implicit-euler      7.63 ns       7.63 ns    1.00
+    own:implicit-euler           8.45 ns       8.50 ns    1.01
+
+ASE calls the force of a scene with any terms, 19.6 us where one spring by hand takes 15.6, in a step of 260.
+Next to other busy programs ASE's ratio alone wavers by some 5 %; run this on a quiet machine.
 
 Exit status 0 when every ratio is within 5 % of 1, 1 otherwise.
 """
@@ -81,14 +90,14 @@ def ase_verlet(steps: int, h: float) -> float:
     return perf_counter() - began
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     for _ in range(steps):
         q, p = q + (p / m) * h, p + (-k * q) * h
     return q, p
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _semi_implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     for _ in range(steps):
         p = p + (-k * q) * h
@@ -96,7 +105,7 @@ def _semi_implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: 
     return q, p
 
 
-@numba.njit
+@numba.njit  # type: ignore[untyped-decorator]
 def _implicit_euler(steps: int, h: float, m: float, k: float, q: float, p: float) -> tuple[float, float]:
     inverse = 1 / (1 + h * h * (k / m))
     for _ in range(steps):
@@ -118,15 +127,15 @@ def compiled(loop: Callable[..., tuple[float, float]]) -> Run:
 
 
 BARE: dict[str, tuple[Run, int]] = {
-    "openmm:verlet": (openmm_verlet, 1_000_000),
-    "ase:velocity-verlet": (ase_verlet, 1_000),
-    "own:euler": (compiled(_euler), 30_000_000),
-    "own:semi-implicit-euler": (compiled(_semi_implicit_euler), 20_000_000),
-    "own:implicit-euler": (compiled(_implicit_euler), 20_000_000),
+    "openmm:verlet": (openmm_verlet, 50_000),
+    "ase:velocity-verlet": (ase_verlet, 50),
+    "own:euler": (compiled(_euler), 1_500_000),
+    "own:semi-implicit-euler": (compiled(_semi_implicit_euler), 1_000_000),
+    "own:implicit-euler": (compiled(_implicit_euler), 1_000_000),
 }
 
 
-def main(repeats: int = 15) -> int:
+def main(repeats: int = 300) -> int:
     """Measure in turn, print a line for each method, compare."""
     scene = scenes.load_scene("spring-uneven")
     best: dict[str, list[float]] = {name: [np.inf, np.inf] for name in BARE}

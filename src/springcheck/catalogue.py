@@ -15,7 +15,7 @@ def catalogue() -> dict[str, Any]:
         "engines": [_engine(name) for name in engines.names()],
         "checks": [
             {"name": check.__name__.replace("_", "-"), "sentence": (check.__doc__ or "").partition("\n")[0]}
-            for check in checks.CHECKS
+            for check in (*checks.CHECKS, *checks.THOROUGH)
         ],
     }
 

@@ -63,7 +63,13 @@ def _parser() -> argparse.ArgumentParser:
         "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
     )
     run.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
+    run.add_argument("--thorough", action="store_true", help="add the experiments: order, reversal, rounding")
     run.set_defaults(command=_run)
+
+    faults = commands.add_parser("faults", help="engines broken on purpose: what sees them, how small")
+    faults.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    faults.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    faults.set_defaults(command=_faults)
 
     precision = commands.add_parser("precision", help="error against run time, down to rounding")
     precision.add_argument("scene", metavar="SCENE", help="a shipped scene's name, or a scene file's path")
@@ -73,6 +79,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     precision.add_argument("--points", action="store_true", help="print every point")
     precision.set_defaults(command=_precision)
+
+    stability = commands.add_parser("stability", help="limits of stability, measured against theory")
+    stability.add_argument("scene", metavar="SCENE", help="a shipped scene's name, or a scene file's path")
+    _scene_options(stability)
+    stability.set_defaults(command=_stability)
+
+    extremes = commands.add_parser("extremes", help="the atlas of extreme cases")
+    _scene_options(extremes)
+    extremes.add_argument("--quick", action="store_true", help="fewer cells, in about 20 seconds")
+    extremes.set_defaults(command=_extremes)
 
     inspect = commands.add_parser("inspect", help="what is in a store")
     inspect.add_argument("file", metavar="FILE")
@@ -177,7 +193,14 @@ def _run(options: argparse.Namespace) -> int:
     scene = scenes.load_scene(options.scene)
     path = Path(options.output or f"{scene.name}.h5")
     with _progress(options) as started:
-        found = session.run(scene, path, methods=options.method, force=options.force, started=started)
+        found = session.run(
+            scene,
+            path,
+            methods=options.method,
+            force=options.force,
+            thorough=options.thorough,
+            started=started,
+        )
     if options.json:
         _document(session.document(found))
     else:
@@ -198,6 +221,35 @@ def _repeat(options: argparse.Namespace) -> int:
     else:
         _show([report.repeat_line(one) for one in found], quiet=options.quiet)
     return 0 if all(one.equal for one in found) else 1
+
+
+def _faults(options: argparse.Namespace) -> int:
+    from springcheck import engines, report, simulate
+    from springcheck.faults import ENGINES, study
+
+    labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
+    with _progress(options) as started:
+        found = study(
+            simulate.run, labels, workers=min(2, os.cpu_count() or 1), progress=_counting(started, "faults")
+        )
+    if options.json:
+        _document(found.document())
+    else:
+        _show(report.fault_report(found), quiet=options.quiet)
+    return 0 if found.sound else 1
+
+
+def _counting(started: Any, what: str) -> Callable[[int, int], None] | None:
+    """A progress bar of parts: called with the number done and that of all."""
+    if started is None:
+        return None
+    bars: list[Callable[[int], None]] = []
+
+    def counted(done: int, all_parts: int) -> None:
+        bars[:] = bars or [started(what, all_parts)]
+        bars[0](1)
+
+    return counted
 
 
 def _precision(options: argparse.Namespace) -> int:
@@ -222,6 +274,48 @@ def _precision(options: argparse.Namespace) -> int:
     if found.interrupted:
         return INTERRUPTED
     return 0 if any(point.complete for point in found.points) else 2
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from springcheck import report, scenes
+    from springcheck.session import LeftOut
+    from springcheck.studies import stability
+
+    scene = scenes.load_scene(options.scene)
+    path = Path(options.output or f"{scene.name}-stability.h5")
+    with _progress(options) as started:
+        found = stability.record(scene, path, options.method, force=options.force, progress=_naming(started))
+    if options.json:
+        _document(stability.document(found))
+    else:
+        left = [LeftOut(method=method, reason=reason) for method, reason in found.left_out]
+        lines = [*report.stability_report(found), *report.left_out(left)]
+        _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
+    return 0 if found.passed else 1
+
+
+def _extremes(options: argparse.Namespace) -> int:
+    from springcheck import report
+    from springcheck.session import LeftOut
+    from springcheck.studies import extremes
+
+    path = Path(options.output or "extremes.h5")
+    with _progress(options) as started:
+        found = extremes.record(
+            path, options.method, quick=options.quick, force=options.force, progress=_naming(started)
+        )
+    if options.json:
+        _document(extremes.document(found))
+    else:
+        left = [LeftOut(method=method, reason=reason) for method, reason in found.left_out]
+        lines = [*report.extremes_report(found), *report.left_out(left)]
+        _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
+    return 0 if found.passed else 1
+
+
+def _naming(started: Any) -> Callable[[str], None] | None:
+    """A line of progress for each thing that is begun."""
+    return None if started is None else lambda what: started(what, 1)(1)
 
 
 def _spending(started: Any, budget: float) -> Callable[[float, str], None] | None:

@@ -100,7 +100,7 @@ def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
         out.append(report.plain(f"table {name}"))
     if found.verdicts:
         out += [report.plain(), report.plain("Largest value of each check, as a fraction of its bound:")]
-        out.append(report.verdict_matrix(found.verdicts))
+        out += report.matrices(found.verdicts)
         out += report.failures(found.verdicts)
         if verdicts:
             out.append(report.verdicts_table(found.verdicts))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from springcheck.faults import FaultReport
 from springcheck.identify import Identification
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
+from springcheck.studies import stability
+from springcheck.studies.extremes import Atlas
 from springcheck.studies.outcome import MethodSummary, PrecisionStudy
 from springcheck.studies.points import Point
+from springcheck.studies.stability import Stability
 
 Lines = list[Table | Text]
 
@@ -30,7 +34,7 @@ def run_report(report: Report) -> Lines:
     out += [plain(f"  {run.method}: {run.message}") for run in report.runs if run.message]
     out += same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
-    out += [verdict_matrix(report.verdicts)]
+    out += matrices(report.verdicts)
     out += failures(report.verdicts)
     out += left_out(report.left_out)
     if report.judged_frames < report.scene.frames:
@@ -108,6 +112,21 @@ SHORT = {
 }
 
 
+MAP = {"propagator": "matrix", "determinant": "det", "symplecticity": "sympl", "reversibility": "reverse"}
+"""Experiments with the one-step map; those whose bound is 0 share the column `exact`."""
+
+LAWS = {
+    "order": "order",
+    "order-anharmonic": "order, well",
+    "rounding-bias": "bias",
+    "rounding-growth": "growth",
+    "convergence": "tolerance",
+}
+"""Experiments over many runs."""
+
+EXACT_EXPERIMENTS = frozenset({"mirror", "repeatability"})
+
+
 def ratio(verdict: Verdict) -> float:
     """Value as a fraction of the bound; infinite where an exact bound is missed."""
     if verdict.value == 0:
@@ -115,21 +134,35 @@ def ratio(verdict: Verdict) -> float:
     return verdict.value / verdict.bound if verdict.bound else float("inf")
 
 
-def verdict_matrix(verdicts: Sequence[Verdict]) -> Table:
+def matrices(verdicts: Sequence[Verdict]) -> Lines:
+    """The checks of the recorded states, and below them the experiments where there are any."""
+    tried = MAP.keys() | LAWS.keys() | EXACT_EXPERIMENTS
+    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], SHORT)]
+    for title, short, exact in (("steps", MAP, EXACT_EXPERIMENTS), ("laws", LAWS, frozenset[str]())):
+        mine = [v for v in verdicts if v.check in short or v.check in exact]
+        if any(v.passed is not None for v in mine):
+            out += [plain(), plain(f"Experiments with {title}, likewise:"), verdict_matrix(mine, short)]
+    return out
+
+
+def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> Table:
     """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
-    checks = [c for c in dict.fromkeys(v.check for v in verdicts) if c in SHORT]
+    checks = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
     table = grid()
     table.add_column("method", no_wrap=True)
     shown = [c for c in checks if any(v.check == c and v.passed is not None for v in verdicts)]
     for check in shown:
-        table.add_column(SHORT[check], justify="right", no_wrap=True)
-    table.add_column("exact", justify="right", no_wrap=True)
+        table.add_column(short[check], justify="right", no_wrap=True)
+    exact = any(v.check not in short for v in verdicts)
+    if exact:
+        table.add_column("exact", justify="right", no_wrap=True)
     for method in dict.fromkeys(v.method for v in verdicts):
         mine = {v.check: v for v in verdicts if v.method == method}
         cells = [_cell(mine.get(check)) for check in shown]
-        rest = [v for name, v in mine.items() if name not in SHORT and v.passed is not None]
+        rest = [v for name, v in mine.items() if name not in short and v.passed is not None]
         good = sum(1 for v in rest if v.passed)
-        cells.append(plain(f"{good}/{len(rest)}", "" if good == len(rest) else "bold red"))
+        if exact:
+            cells.append(plain(f"{good}/{len(rest)}", "" if good == len(rest) else "bold red"))
         table.add_row(plain(method), *cells)
     return table
 
@@ -354,3 +387,89 @@ def _points(points: Sequence[Point]) -> Table:
             str(point.force_calls),
         )
     return table
+
+
+def fault_report(found: FaultReport) -> Lines:
+    """Every fault with what rejects it and the smallest size that is seen; the right engines' runs."""
+    table = grid()
+    table.add_column("fault", no_wrap=True)
+    table.add_column("size", justify="right", no_wrap=True)
+    table.add_column("seen from", justify="right", no_wrap=True)
+    table.add_column("rejected by")
+    for result in found.results:
+        limit = min(result.limits.values(), default=None)
+        table.add_row(
+            plain(result.name, "bold red" if result.missed_by else ""),
+            plain("" if result.size is None else f"{result.size:.0e}"),
+            plain("" if limit is None else f"{limit:.1e}"),
+            plain(", ".join(result.rejected_by)),
+        )
+    out: Lines = [table, plain()]
+    for result in found.results:
+        if result.missed_by:
+            out.append(
+                plain(f"FAILED {result.name}: not rejected by {', '.join(result.missed_by)}", "bold red")
+            )
+    clean = found.clean
+    out += [plain(f"FALSE ALARM {alarm}", "bold red") for alarm in clean.alarms]
+    rejected = sum(bool(result.rejected_by) for result in found.results)
+    out.append(
+        plain(
+            f"{rejected} of {len(found.results)} faults rejected; {clean.runs} clean runs, "
+            f"{clean.verdicts} verdicts, {len(clean.alarms)} false alarms"
+        )
+    )
+    return out
+
+
+def stability_report(study: Stability) -> Lines:
+    """The whole report of `springcheck stability`."""
+    out: Lines = [plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"), plain()]
+    if study.limits:
+        table = grid()
+        for title in ("method", "limit h w", "theory", "off", "growth above", "predicted"):
+            table.add_column(title, justify="left" if title == "method" else "right")
+        for x in study.limits:
+            off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
+            grown = (
+                ("-", "-")
+                if np.isnan(x.growth_above)
+                else (f"{x.growth_above:.7f}", f"{x.growth_predicted:.7f}")
+            )
+            limit = "none" if np.isinf(x.limit) else f"{x.limit:.9f}"
+            theory = "none" if np.isinf(x.theory) else f"{x.theory:.9f}"
+            table.add_row(x.method, limit, theory, f"{off:.0e}", *grown, style="" if x.agrees else "bold red")
+        out += [table, plain()]
+    if study.costs:
+        table = grid()
+        for title in ("method", "ratio", "steps", "rejected", "force calls", "error", "outcome"):
+            table.add_column(title, justify="left" if title in ("method", "outcome") else "right")
+        for cost in study.costs:
+            error = "-" if np.isnan(cost.error) else f"{cost.error:.1e}"
+            table.add_row(
+                cost.method, f"{cost.ratio:.0e}", str(cost.steps), str(cost.rejected),
+                str(cost.force_calls), error, cost.outcome.partition(":")[0],
+            )  # fmt: skip
+        out += [table, plain()]
+    out += [plain(line) for line in stability.sentences(study)]
+    return out
+
+
+def extremes_report(atlas: Atlas) -> Lines:
+    """The whole report of `springcheck extremes`."""
+    outcomes = ("right", "unstable, as theory says", "engine's limit", "refused", "silently wrong")
+    table = grid()
+    for title in ("method", "cells", "right", "unstable", "limit", "refused", "wrong"):
+        table.add_column(title, justify="left" if title == "method" else "right")
+    for method in dict.fromkeys(cell.method for cell in atlas.cells):
+        counts = atlas.counts(method)
+        table.add_row(method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in outcomes))
+    out: Lines = [plain(f"{len(atlas.cells)} extreme cases", "bold"), plain(), table, plain()]
+    out += [plain(window.sentence) for window in atlas.windows]
+    wrong = atlas.wrong
+    out += [
+        plain(f"silently wrong: {cell.method} {cell.parameters}: {cell.reason}", "bold red")
+        for cell in wrong[:20]
+    ]
+    verdict = f"{len(wrong)} cells silently wrong" if wrong else "no cell is silently wrong"
+    return [*out, plain(verdict, "bold red" if wrong else "bold green")]

@@ -410,25 +410,26 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is multiplied by the
-    squared norm of the inverse of the matrix that it solves, the condition of its step.
+    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
+    solution of its equation.
     """
-    direction = h
-    q, p, h = np.abs(q), np.abs(p), abs(h)
+    direction = np.sign(h)
+    # in extended precision: the square of a step may leave the range of a double
+    q, p, size = np.abs(q), np.abs(p), np.abs(np.longdouble(h))
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
         for kind, c in stages:
             if kind == "drift":
-                q = q + c * h * p / m
+                q = q + c * size * p / m
             elif kind == "friction":
                 # a rounding of x in exp(-x) costs x exp(-x) p, and the decayed p is exp(-x) p: the sum is
                 # below p forwards in time; backwards p grows first
-                x = np.zeros_like(m) if rate is None else -c * np.sign(direction) * h * rate
+                x = np.zeros_like(m) if rate is None else -c * direction * size * rate
                 p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
             else:
-                p = p + c * h * _acting(kind, magnitude, parts)(q, p)
+                p = p + c * size * _acting(kind, magnitude, parts)(q, p)
         return q, p
-    rows = [[abs(float(c)) * h for c in row] for row in scheme.a]
+    rows = [[abs(float(c)) * size for c in row] for row in scheme.a]
     forces: list[Reals] = []
     velocities: list[Reals] = []
     for row in rows:
@@ -436,28 +437,34 @@ def magnitude_step(
         ps = _sum(list(zip(row, forces, strict=False)), p)
         own = row[len(forces)]
         if own:
-            slowed = np.ones_like(m) if rate is None else np.abs(1 + np.sign(direction) * own * rate)
-            condition = _condition(stiffness, own**2 / (m * slowed))
-            # the solution is larger than what it is made from by the condition, its error by that again
-            qs = (qs + own * (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed / m) * condition**2
+            slowed = np.ones_like(m) if rate is None else np.abs(1 + direction * own * rate)
+            kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
+            qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
             ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
         forces.append(magnitude(qs, ps))
         velocities.append(ps / m)
-    weights = [abs(float(c)) * h for c in scheme.b]
+    weights = [abs(float(c)) * size for c in scheme.b]
     return (
         _sum(list(zip(weights, velocities, strict=True)), q),
         _sum(list(zip(weights, forces, strict=True)), p),
     )
 
 
-def _condition(stiffness: Reals | None, factor: Reals) -> Reals:
-    """How much solving with 1 + factor * stiffness can enlarge an error, at least 1: (n,) or one number."""
+def _solved(given: Reals, factor: Reals, stiffness: Reals | None) -> Reals:
+    """What bounds the rounding of the solution of (1 + factor * stiffness) x = b, `given` bounding b.
+
+    Componentwise backward error: |A^-1| (|A| |x| + |b|) with |x| <= |A^-1| |b| (Higham, Accuracy and
+    Stability of Numerical Algorithms, 7.2).
+    """
     if stiffness is None:
-        return np.ones(1)
+        return given
     if stiffness.ndim == 1:
-        return np.maximum(1 / np.abs(1 + factor * stiffness), 1)
-    matrix = np.eye(len(factor)) + np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
-    return np.maximum(np.linalg.norm(np.linalg.inv(matrix), np.inf), np.ones(1))
+        change = factor * stiffness
+        inverse = 1 / np.abs(1 + change)
+        return np.asarray(((1 + np.abs(change)) * (inverse * given) + given) * inverse)
+    matrix = np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
+    inverse = np.abs(np.linalg.inv(np.eye(len(matrix)) + matrix)).T
+    return np.asarray(((given @ inverse) @ (np.eye(len(matrix)) + np.abs(matrix)).T + given) @ inverse)
 
 
 def roundings(scheme: Scheme) -> int:

@@ -105,9 +105,12 @@ def run(
     *,
     methods: Sequence[str] = (),
     force: bool = False,
+    thorough: bool = False,
     started: Started | None = None,
 ) -> Report:
     """Run, compare, store, judge.  Work that an interrupted call has stored is taken up.
+
+    `thorough` adds the experiments, whose runs are made on the side and not stored.
 
     Raises SpringcheckError for everything that a user can mend; what is finished then stays in the
     journal, and an existing file stays as it was.
@@ -134,8 +137,19 @@ def run(
         names = tuple(str(label) for label in labels)
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
+        if thorough:
+            report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, started)))
         journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
     return report
+
+
+def _experiments(scene: Scene, labels: Sequence[Label], started: Started | None) -> list[Verdict]:
+    """The verdicts of the experiments with every method."""
+    found: list[Verdict] = []
+    for label in labels:
+        progress = started(label, len(checks.THOROUGH)) if started else None
+        found += checks.judge_thoroughly(scene, str(label), simulate.run, progress=progress)
+    return found
 
 
 def judge(

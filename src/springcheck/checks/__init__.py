@@ -107,9 +107,16 @@ def name(check: Check | Experiment) -> str:
 
 
 def judge_thoroughly(
-    scene: Scene, label: str, run: Run, experiments: Sequence[Experiment] = THOROUGH
+    scene: Scene,
+    label: str,
+    run: Run,
+    experiments: Sequence[Experiment] = THOROUGH,
+    *,
+    progress: Callable[[int], None] | None = None,
 ) -> list[Verdict]:
     """Every experiment with a method, which `run(scene, label)` carries out on scenes made here.
+
+    `progress(1)` is called after each experiment.
 
     An experiment whose scene the method cannot serve (`run` raises MethodError) does not apply.
     """
@@ -120,6 +127,8 @@ def judge_thoroughly(
             verdicts.append(experiment(bench))
         except MethodError as error:
             verdicts.append(bench.not_applicable(name(experiment), str(error)))
+        if progress:
+            progress(1)
     return verdicts
 
 

@@ -94,13 +94,14 @@ def replicated(scene: Scene, copies: int) -> Scene:
     def many(term: Term) -> Any:
         record: Any = term
         values = {f.name: getattr(record, f.name) for f in fields(record)}
+        arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
         return replace(
             record,
             **{
                 name: (value + scene.n * np.arange(copies)[:, None]).ravel()
                 if value.dtype.kind == "i"
                 else np.tile(value, copies)
-                for name, value in values.items()
+                for name, value in arrays.items()
             },
         )
 

@@ -43,7 +43,13 @@ class Case:
     @cached_property
     def linear(self) -> bool:
         """Whether each normal mode has a one-step matrix of its own."""
-        return mechanics.has_modes(self.scene) and not self.scheme.mixes
+        return mechanics.has_modes(self.scene) and not self.mixed
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the scheme acts at different times by slow and by fast springs, and there are both."""
+        slow, _ = mechanics.split(self.scene.terms)
+        return self.scheme.mixes and any(term.key != "damping" for term in slow)
 
     @property
     def area_preserving(self) -> bool:

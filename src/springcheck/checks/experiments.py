@@ -19,6 +19,8 @@ def _no_matrix(bench: Bench) -> str | None:
         return "an adaptive solver has no one-step map; it is judged by its tolerance"
     if not mechanics.is_linear(bench.scene):
         return "an anharmonic scene's step is no matrix; the step defect judges it"
+    if not mechanics.has_modes(bench.scene):
+        return "friction couples the modes; the step defect judges it"
     if bench.scene.n > LARGEST:
         return f"of more than {LARGEST} particles the step defect says as much"
     return None
@@ -65,7 +67,8 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     q, p = case.next_states
     ideal = columns(q[0], p[0], -1)
     departure = columns(case.trajectory.q[1] - q[0], case.trajectory.p[1] - p[0], -1)
-    allowed = np.abs(columns(*(case.roundings * x[0] for x in case.allowance), 1))
+    roundings = [case.roundings * x[0] for x in case.allowance]
+    allowed = np.abs(columns(roundings[0], roundings[1], 1))
     return scaled(ideal), scaled(departure), scaled(allowed), scale
 
 
@@ -98,6 +101,8 @@ def symplecticity(bench: Bench) -> Verdict:
         return bench.not_applicable("symplecticity", why_not)
     if not bench.scheme.symplectic:
         return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
+    if mechanics.is_damped(bench.scene):
+        return bench.not_applicable("symplecticity", "friction contracts area")
     ideal, departure, allowed, _ = _matrices(bench)
     n = bench.scene.n
     form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
@@ -130,7 +135,7 @@ def symmetric(scheme: schemes.Scheme) -> bool:
 def _shifted(
     scene: Scene, scheme: schemes.Scheme, state: tuple[Floats, Floats], sign: int
 ) -> tuple[Floats, Floats]:
-    """The first stage of a two-stage scheme, forwards or backwards: where it is synchronised with its adjoint."""
+    """The state a first stage of a two-stage scheme on, or back: there its adjoint is synchronised."""
     q, p = (x.astype(np.longdouble) for x in state)
     h = np.longdouble(sign * scene.step)
     if scheme.stages[0][0] == "kick":
@@ -146,6 +151,8 @@ def reversibility(bench: Bench) -> Verdict:
     two_stage = len(scheme.stages) == 2
     if not scheme.one_step:
         return bench.not_applicable("reversibility", "an adaptive solver chooses other steps on its way back")
+    if mechanics.is_damped(bench.scene):
+        return bench.not_applicable("reversibility", "friction is not undone by going back")
     if not symmetric(scheme) and not two_stage:
         return bench.not_applicable(
             "reversibility", f"{scheme.title} is not its own adjoint: only another scheme undoes its steps"
@@ -196,6 +203,8 @@ def mirror(bench: Bench) -> Verdict:
     """A negative step does what flipped momenta do, bit for bit."""
     if not bench.scheme.one_step:
         return bench.not_applicable("mirror", "an adaptive solver is judged by its tolerance")
+    if mechanics.is_damped(bench.scene):
+        return bench.not_applicable("mirror", "friction knows forwards from backwards")
     steps = min(bench.scene.steps, 20)
     flipped = bench.run(replace(bench.scene, p=-bench.scene.p, steps=steps, every=1), bench.label)
     backwards = bench.run(replace(bench.scene, step=-bench.scene.step, steps=steps, every=1), bench.label)

@@ -97,7 +97,7 @@ def _closed(case: Case) -> str | None:
     reason = _no_map(case)
     if reason:
         return reason
-    if case.scheme.mixes:
+    if case.mixed:
         return "slow and fast springs act at different times: no normal mode stays by itself"
     if not case.linear:
         return (
@@ -223,7 +223,7 @@ def frequency(case: Case) -> Verdict:
         return case.not_applicable("frequency", "nothing has moved yet")
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
-    # beyond its limit a scheme of several stages can turn the other way
+    # on an inverted spring a scheme that goes back on part of its way can turn the other way
     backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)
     off = phase - expected
@@ -267,8 +267,9 @@ def momentum(case: Case) -> Verdict:
         return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
-    _, of_p = case.allowance
-    unit = np.maximum.accumulate(np.sum(of_p, axis=1))
+    # at both ends of each stretch between frames, for a motion that grows along it
+    _, of_p = case.allowance_at(run.q, run.p)
+    unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
     if case.steps[0] != 0:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
     limit = case.roundings * case.steps[1:].astype(np.float64)

@@ -65,12 +65,13 @@ def following(change: Callable[[Scene, float, int, State], State]) -> Make:
     return stepping(broken)
 
 
-def pulling(change: Callable[[Scene, float, Reals, Reals], Reals]) -> Make:
-    """Another force: change(scene, size, q, right force)."""
+def pulling(change: Callable[[float, float, Reals], Reals]) -> Make:
+    """Another force: change(largest force, size, right force)."""
 
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
         right = mechanics.force(scene.terms)
-        return textbook(scene, scheme, force=lambda q, p: change(scene, size, q, right(q, p)))
+        largest = reach(scene)
+        return textbook(scene, scheme, force=lambda q, p: change(largest, size, right(q, p)))
 
     return stepping(broken)
 
@@ -211,6 +212,8 @@ def coefficient(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 
 def skipped(every: int) -> Make:
+    """The last of so many steps is left out."""
+
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
         right = textbook(scene, scheme)
         return lambda i, q, p: (q, p) if i % every == every - 1 else right(i, q, p)
@@ -219,15 +222,18 @@ def skipped(every: int) -> Make:
 
 
 def doubled(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """Every 1000th step is taken twice."""
     right = textbook(scene, scheme)
     return lambda i, q, p: right(i, *right(i, q, p)) if i % 1000 == 999 else right(i, q, p)
 
 
 def unsigned(scene: Scene, size: float) -> Scene:
+    """The step's sign is lost."""
     return replace(scene, step=abs(scene.step))
 
 
 def single_state(scene: Scene, size: float, i: int, state: State) -> State:
+    """Both q and p rounded to single precision."""
     return tuple(x.astype(np.float32).astype(np.float64) for x in state)  # type: ignore[return-value]
 
 
@@ -257,6 +263,7 @@ def towards_zero(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 
 def half_step(scene: Scene, sign: int, run: Trajectory) -> Trajectory:
+    """Momenta half a step early (-1) or late (1), the start's as asked for."""
     force = mechanics.force(scene.terms)(run.q, run.p)
     p = np.asarray(run.p + sign * scene.step / 2 * force, np.float64)
     p[0] = scene.p
@@ -269,6 +276,7 @@ def delayed(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 
 
 def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """The two frames in the middle have changed places."""
     order = np.arange(len(run.t))
     middle = len(order) // 2
     if middle + 1 < len(order):
@@ -277,11 +285,13 @@ def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 
 
 def accumulated(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """Times are sums, not products."""
     t = np.concatenate([[0.0], np.cumsum(np.full(len(run.t) - 1, run.step * run.every))])
     return replace(run, t=t)
 
 
 def half_step_energy(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """Energies are those of momenta half a step early."""
     return replace(run, energy=_early_energy(scene, run))
 
 
@@ -355,6 +365,7 @@ def one_iteration(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 
 def claims_single(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+    """Says single precision and computes in double."""
     named = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
     return record(scene, scheme, textbook(scene, scheme), arithmetic=named)
 

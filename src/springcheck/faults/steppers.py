@@ -22,7 +22,7 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
     """The scheme's own step in double precision, with the scene's force or another."""
     pull = force or mechanics.force(scene.terms)
     m, h = scene.m, scene.step
-    if scheme.stages:
+    if scheme.stages and {kind for kind, _ in scheme.stages} <= {"kick", "drift"}:
         stages = [(kind == "kick", float(schemes.number(c, np.float64)) * h) for kind, c in scheme.stages]
 
         def split(i: int, q: Floats, p: Floats) -> State:
@@ -35,9 +35,11 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
 
         return split
     stiff = mechanics.stiffness(scene, scene.q).astype(np.float64) if scheme.implicit else None
+    slow, fast = mechanics.split(scene.terms)
+    parts = mechanics.force(slow), mechanics.force(fast)
 
     def tableau(i: int, q: Floats, p: Floats) -> State:
-        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff)
+        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts)
         return np.asarray(a, np.float64), np.asarray(b, np.float64)
 
     return tableau
@@ -83,7 +85,7 @@ def trajectory(
     return Trajectory(
         label=label,
         scheme=scheme.name,
-        t=np.arange(f) * scene.every * scene.step,
+        t=np.arange(f, dtype=np.float64) * scene.every * scene.step,
         q=q,
         p=p,
         energy=energies(scene, q, p) if "energy" in scene.quantities else None,

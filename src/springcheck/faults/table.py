@@ -106,14 +106,14 @@ FORCES = (
         about="a constant force, in units of the largest at the start",
         size=1e-12,
         caught_by=STEP,
-        make=seeded.pulling(lambda s, x, q, f: f + x * seeded.reach(s)),
+        make=seeded.pulling(lambda top, x, f: f + x * top),
     ),
     Fault(
         name="anharmonic",
         about="springs stiffen with the square of their stretch",
         size=1e-12,
         caught_by=("step-defect", "propagator"),
-        make=seeded.pulling(lambda s, x, q, f: f * (1 + x * (f / seeded.reach(s)) ** 2)),
+        make=seeded.pulling(lambda top, x, f: f * (1 + x * (f / top) ** 2)),
     ),
     Fault(
         name="action-not-reaction",
@@ -128,27 +128,27 @@ FORCES = (
         about="undeclared fixed-point force, a fraction of the largest at the start",
         size=2.0**-32,
         caught_by=STEP,
-        make=seeded.pulling(lambda s, x, q, f: np.trunc(f / (x * seeded.reach(s))) * (x * seeded.reach(s))),
+        make=seeded.pulling(lambda top, x, f: np.trunc(f / (x * top)) * (x * top)),
     ),
     Fault(
         name="small-forces-dropped",
         about="forces below a fraction of the largest are taken for none",
         size=1e-3,
         caught_by=("step-defect",),
-        make=seeded.pulling(lambda s, x, q, f: np.where(np.abs(f) < x * seeded.reach(s), 0.0, f)),
+        make=seeded.pulling(lambda top, x, f: np.where(np.abs(f) < x * top, 0.0, f)),
         scene="long spring",
     ),
     Fault(
         name="capped-force",
         about="forces are cut off at 0.9 of the largest at the start",
         caught_by=("step-defect", "closed-form"),
-        make=seeded.pulling(lambda s, x, q, f: np.clip(f, -0.9 * seeded.reach(s), 0.9 * seeded.reach(s))),
+        make=seeded.pulling(lambda top, x, f: np.clip(f, -0.9 * top, 0.9 * top)),
     ),
     Fault(
         name="single-force",
         about="forces in single precision",
         caught_by=STEP,
-        make=seeded.pulling(lambda s, x, q, f: f.astype(np.float32).astype(np.float64)),
+        make=seeded.pulling(lambda top, x, f: f.astype(np.float32).astype(np.float64)),
     ),
     Fault(
         name="stale-force",
@@ -256,7 +256,7 @@ STEPS = (
     Fault(
         name="thermostat",
         about="momenta are scaled at every step so that the energy stays",
-        caught_by=("step-defect", "determinant", "order-anharmonic"),
+        caught_by=("step-defect", "determinant", "reversibility"),
         make=seeded.following(seeded.rescaled),
     ),
     Fault(

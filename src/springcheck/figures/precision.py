@@ -51,34 +51,34 @@ def picture(document: Document) -> Figure:
     figure.legend(
         handles, labels, loc="outside right upper", frameon=False, handlelength=3.2, title="method (order)"
     )
-    figure.text(
-        0.995,
-        0.02,
-        "faint dots: the part of the\nerror that is rounding\nring: rounding floor",
-        ha="right",
-        va="bottom",
-        fontsize=8,
-        color="#444444",
-    )
+    rounding = any(point["rounding_error"] for point in document["points"])
+    about = [
+        *(["faint dots: the part of\n  the error that is rounding"] if rounding else []),
+        *(["ring: rounding floor"] if any(method["floor"] for method in document["methods"]) else []),
+    ]
+    figure.text(0.995, 0.02, "\n".join(about), ha="right", va="bottom", fontsize=8, color="#444444")
     return figure
 
 
 def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """A colour for each engine, a marker and a line style for each of its methods."""
-    found = list(dict.fromkeys(name.partition(":")[0] for name in names))
-    count = dict.fromkeys(found, 0)
+    """A colour for each engine, or for each method of a single one; a marker and a line style for each."""
+    engines = list(dict.fromkeys(name.partition(":")[0] for name in names))
+    families = engines if len(engines) > 1 else list(names)
+    count = dict.fromkeys(families, 0)
     out: dict[str, dict[str, Any]] = {}
     for i, name in enumerate(names):
-        engine = name.partition(":")[0]
+        family = name.partition(":")[0] if len(engines) > 1 else name
+        place = families.index(family)
+        # the first families are drawn hollow and larger, so that curves that coincide show both
+        hollow = place < max(1, len(families) // 2)
         out[name] = {
-            "color": COLOURS[found.index(engine) % len(COLOURS)],
-            "linestyle": LINES[count[engine] % len(LINES)],
+            "color": COLOURS[place % len(COLOURS)],
+            "linestyle": LINES[count[family] % len(LINES)],
             "marker": MARKERS[i % len(MARKERS)],
-            # the first engines are drawn hollow and larger, so that curves that coincide show both
-            "markerfacecolor": "none" if found.index(engine) < 2 else None,
-            "markersize": 6.5 if found.index(engine) < 2 else 3.2,
+            "markerfacecolor": "none" if hollow else None,
+            "markersize": 6.5 if hollow else 3.2,
         }
-        count[engine] += 1
+        count[family] += 1
     return out
 
 
@@ -131,17 +131,13 @@ def _frame(axes: Axes, document: Document) -> None:
 def _slopes(axes: Axes, document: Document) -> None:
     """Short lines of the orders that were found, from one point at the lower left, where no curve runs."""
     orders = sorted({round(m["order"]) for m in document["methods"] if m["order"] is not None})
-    x = axes.get_xlim()[0] * np.array([2.0, 2.0 * 10**0.8])
+    x = axes.get_xlim()[0] * np.array([1.8, 1.8 * 10**0.7])
     low, high = np.log10(axes.get_ylim())
-    start = 10 ** (low + 0.62 * (high - low))
+    start = 10 ** (low + 0.6 * (high - low))
+    grey: Any = {"fontsize": 8, "color": "#333333", "textcoords": "offset points"}
+    if orders:
+        axes.annotate("order", (float(x[0]), float(start)), xytext=(-4, 4), **grey)
     for order in orders:
-        y = start * np.array([1.0, 10.0 ** (-0.8 * order)])
+        y = start * np.array([1.0, 10.0 ** (-0.7 * order)])
         axes.plot(x, y, color="#333333", linewidth=0.9)
-        axes.annotate(
-            f"order {order}",
-            (float(x[1]), float(y[1])),
-            xytext=(3, -3),
-            textcoords="offset points",
-            fontsize=8,
-            color="#333333",
-        )
+        axes.annotate(f"{order}", (float(x[1]), float(y[1])), xytext=(3, -4), **grey)

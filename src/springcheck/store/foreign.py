@@ -1,11 +1,7 @@
-"""Trajectories that other programs wrote: any H5MD file with positions and velocities.
-
-Run as a program on a file, it says what is wrong with it, and nothing where it can be read.
-"""
+"""Trajectories that other programs wrote: any H5MD file with positions and velocities."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,10 +45,11 @@ def read_foreign(path: str | Path, most: int | None = None) -> dict[str, Foreign
     """
     path = Path(path)
     trust.trust(path, trust.FOREIGN)
-    return _load(path, most)
+    return load(path, most)
 
 
-def _load(path: Path, most: int | None = None) -> dict[str, Foreign]:
+def load(path: Path, most: int | None = None) -> dict[str, Foreign]:
+    """The same in this process, whatever the file does to libhdf5."""
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
         groups = file.get("particles")
         if not isinstance(groups, h5py.Group) or not len(groups):
@@ -107,7 +104,7 @@ def _first(rows: Any, most: int) -> Any:
 
 
 def _values(path: Path, dataset: Any, rows: Any = ()) -> Floats:
-    """A dataset, or rows of it, as float64; StoreError where it is none, or claims more than its file holds."""
+    """A dataset, or rows of it, as float64; StoreError where it is none or larger than its file."""
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu":
         raise StoreError(f"{path}: {getattr(dataset, 'name', 'a dataset')} is no array of numbers")
     claimed = dataset.size * dataset.dtype.itemsize
@@ -163,10 +160,3 @@ def _unit(node: Any) -> str:
         return ""
     unit = node.attrs.get("unit", node.attrs.get("units", ""))
     return unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
-
-
-if __name__ == "__main__":
-    try:
-        _load(Path(sys.argv[1]))
-    except StoreError as error:
-        sys.stdout.write(str(error))

@@ -197,8 +197,10 @@ def _datasets(file: Any, label: str) -> dict[str, Any]:
     """The arrays of a trajectory: time, and q, p, energy or None."""
     group = file[f"observables/{label}"]
     found = {name: group[name]["value"] if name in group else None for name in ("q", "p", "energy")}
-    time = next(group[name]["time"] for name, value in found.items() if value is not None)
-    return {"time": time, **found}
+    kept = [name for name, value in found.items() if value is not None]
+    if not kept:
+        raise KeyError(f"no numbers of {label}")
+    return {"time": group[kept[0]]["time"], **found}
 
 
 def _whole(path: Path, dataset: Any) -> Floats:

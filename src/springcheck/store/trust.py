@@ -12,59 +12,79 @@ import sys
 from functools import lru_cache
 from pathlib import Path
 
+import h5py
+
 from springcheck.errors import StoreError
 from springcheck.store import files, seal
 
-OURS, FOREIGN = "springcheck.store.checking", "springcheck.store.foreign"
-"""Modules that read a file in full when they are run on it."""
+OURS, FOREIGN = "ours", "foreign"
+"""What a file is read as when it is tried."""
+
+MODULE = "springcheck.store"
+LIMIT, SPEED = 20.0, 5e6
+"""Seconds that reading a file may take, whatever its size, and bytes a second on top."""
 
 
-def trust(path: Path, module: str) -> None:
+def trust(path: Path, kind: str) -> None:
     """Return when this process can read a file without harm; raise StoreError otherwise.
 
-    `module` tries a file that carries no seal.
+    `kind` says how a file that carries no seal is tried.
     """
     with files.told(path, "read"):
-        state = path.stat()
         with path.open("rb"):
             pass
-        _trusted(path.absolute(), module, (state.st_dev, state.st_ino, state.st_mtime_ns, state.st_size))
+        said = _against(path.absolute(), kind, _state(path))
+    if said:
+        raise StoreError(f"cannot read {path}: {said}")
 
 
 @lru_cache(maxsize=4096)
-def _trusted(path: Path, module: str, state: tuple[int, ...]) -> None:
-    """Once for each state of a file; failures are not remembered."""
+def _against(path: Path, kind: str, state: tuple[int, ...]) -> str:
+    """What speaks against a file, once for each state of it; nothing where it can be read."""
     found = seal.find(path)
+    if not h5py.is_hdf5(path):
+        return "it is no HDF5 file"
     if found is None:
-        said = guarded(module, path)
-        if module == FOREIGN and said:
-            raise StoreError(said)
-    elif not seal.is_whole(path, found):
-        raise StoreError(
-            f"cannot read {path}: it is damaged, it has changed since it was written "
-            f"(springcheck check {path} names the places)"
-        )
+        said, harmless = _tried(path, kind, state)
+        return "" if harmless else said
+    if not seal.is_whole(path, found):
+        return "it is damaged, it has changed since it was written; springcheck check names the places"
+    return ""
 
 
-def guarded(module: str, path: Path) -> str:
-    """Run a module of ours on a file in a process of its own -> what it printed.
+def _state(path: Path) -> tuple[int, ...]:
+    state = path.stat()
+    return state.st_dev, state.st_ino, state.st_mtime_ns, state.st_size
 
-    Raises StoreError when it crashes, or takes longer than 30 s and what 5 MB/s would take.
+
+def guarded(path: Path, kind: str) -> str:
+    """Read a file in a process of its own -> what that says (see `__main__`).
+
+    Raises StoreError when it crashes, or takes so long that it will never end.
     """
+    said, harmless = _tried(path.absolute(), kind, _state(path))
+    if not harmless:
+        raise StoreError(f"cannot read {path}: {said}")
+    return said
+
+
+@lru_cache(maxsize=4096)
+def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
+    """What the process says, and whether it lived to say it."""
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-m", module, str(path)],
+            [sys.executable, "-P", "-m", MODULE, kind, str(path)],
             capture_output=True,
             text=True,
-            timeout=30 + path.stat().st_size / 5e6,
+            timeout=LIMIT + path.stat().st_size / SPEED,
             check=False,
             stdin=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": paths},
         )
     except subprocess.TimeoutExpired:
-        raise StoreError(f"cannot read {path}: it is damaged, reading it does not end") from None
+        return "it is damaged, reading it does not end", False
     if done.returncode:
-        raise StoreError(f"cannot read {path}: it is damaged, reading it crashes the HDF5 library")
-    return done.stdout.strip()
+        return "it is damaged, reading it crashes the HDF5 library", False
+    return done.stdout.strip(), True

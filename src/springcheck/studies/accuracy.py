@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from springcheck import checks, exact, mechanics, schemes
+from springcheck import exact, mechanics, schemes
+from springcheck.checks.recorded import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.model import Extended, Floats, Integers, Reals, Scene
 
@@ -200,7 +201,7 @@ class _Rounding:
             return None
         matrices = schemes.matrix(scheme, h=h, m=np.ones(1), k=modes.w2, c=modes.rate)
         # below that, friction contracts area in one step more than extended precision has digits for
-        if np.any(schemes.rotation(matrices).determinant < checks.CONTRACTED):
+        if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
             return None
         symplectic = scheme.symplectic and not mechanics.is_damped(scene)
         return cls(scene=scene, modes=modes, matrices=matrices, symplectic=symplectic)

@@ -35,6 +35,7 @@ from springcheck.studies.sweeps import (
     blank,
     is_finished,
     repeats,
+    runs,
     to_time,
     warm_ups,
 )
@@ -48,8 +49,11 @@ TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 TICKS = 1000
 """A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
 
+STARTS = 0.02
+"""Seconds that starting several short runs for one timing may take."""
+
 READS = 3
-"""Timings of a run with every step read."""
+"""Timings of a run with every step read; one where starting is slow."""
 
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
@@ -68,7 +72,7 @@ def study(
     budget: float = BUDGET,
     progress: Progress | None = None,
 ) -> PrecisionStudy:
-    """Measure these methods on a scene within about `budget` seconds.
+    """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
     A method that cannot run, a run that diverges and a sweep that is cut off are points with their
     reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.
@@ -76,9 +80,10 @@ def study(
     Raises:
         SceneError: the true motion of the scene is not known, or nothing moves in it.
     """
-    began = perf_counter()
     known = truth(scene)
     sweeps = [begin(scene, label, known) for label in labels]
+    # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
+    began = perf_counter()
     interrupted = False
 
     def tell(what: str) -> None:
@@ -125,9 +130,12 @@ def _open(sweeps: list[Sweep]) -> list[Sweep]:
 def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
     """The next point of each of these sweeps: errors one by one, then timings in turn."""
     points: list[Point] = []
+    spent: list[float] = []
     for sweep in sweeps:
         tell(f"{sweep.label}, errors")
+        began = perf_counter()
         points.append(_errors(sweep, known))
+        spent.append(perf_counter() - began)
     tell(f"timing {len(sweeps)} methods in turn")
     clocks = [
         _Clock(sweep=sweep, scene=to_time(known.scene, sweep))
@@ -136,12 +144,15 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> No
     ]
     _time(clocks)
     timed = {id(clock.sweep): clock for clock in clocks}
-    for sweep, point in zip(sweeps, points, strict=True):
+    for sweep, point, seconds in zip(sweeps, points, spent, strict=True):
         clock = timed.get(id(sweep))
         sweep.points.append(point if clock is None else clock.onto(point))
         if clock and not clock.gave_up:
             before, sweep.cost = sweep.cost, min(run.timing.run for run in clock.runs)
             sweep.read = min(clock.reads, default=np.inf)
+            sweep.start = min(run.timing.start for run in clock.runs)
+            used = runs(sweep.cost + sweep.start) * sweep.cost
+            sweep.overhead = max(0.0, seconds + clock.spent - used)
             if sweep.method.adaptive and before:
                 sweep.growth = max(1.2, sweep.cost / before)
         sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
@@ -194,32 +205,38 @@ class _Clock:
     runs: list[simulate.Bare] = field(default_factory=list)
     reads: list[float] = field(default_factory=list)
     gave_up: str = ""
+    spent: float = 0.0
 
     def warm_up(self, shortest: float) -> None:
         """Find how many runs fit into one timing, and how many timings are worth taking."""
         expected = self.sweep.cost * self.sweep.growth
-        if warm_ups(expected):
+        if warm_ups(expected + self.sweep.start):
             warm = self._bare()
             expected = warm.timing.run if warm else 0.0
-        self.copies = max(1, min(64, ceil(shortest / max(expected, 1e-9))))
-        self.count = repeats(expected)
+        most = ceil(STARTS / max(self.sweep.start, 1e-9))
+        self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
+        self.count = repeats(expected + self.sweep.start)
 
     def turn(self, number: int) -> None:
         """One repeat."""
         run = self._bare(copies=self.copies)
         if run:
             self.runs.append(run)
-        if number < READS and self.sweep.read * self.sweep.growth <= READ_SECONDS:
+        reads = READS if self.sweep.start < STARTS else 1
+        if number < reads and self.sweep.read * self.sweep.growth <= READ_SECONDS:
             read = self._bare(copies=self.copies, read=True)
             if read:
                 self.reads.append(read.timing.run)
 
     def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
+        began = perf_counter()
         try:
             return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
         except Stopped as stop:
             self.gave_up = str(stop)
             return None
+        finally:
+            self.spent += perf_counter() - began
 
     def onto(self, point: Point) -> Point:
         """The point with its timings."""

@@ -43,6 +43,10 @@ class Sweep:
     """How rounding adds up in it."""
     cost: float = 0.0
     """Seconds of one bare run at the last point."""
+    start: float = 0.0
+    """Seconds of a start."""
+    overhead: float = 0.0
+    """Seconds that the last point took beside its runs: starts, comparisons, reading."""
     growth: float = 2.0
     """What one point costs, compared with the one before."""
     read: float = 0.0
@@ -81,6 +85,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
             began = perf_counter()
             simulate.bare(sweep.scene, label, planned=PLANNED)
             sweep.first_start = perf_counter() - began
+            sweep.start = simulate.bare(sweep.scene, label, planned=PLANNED).timing.start
         except MethodError as error:
             reason = str(error)
         except Stopped:
@@ -132,12 +137,12 @@ def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
     ready = [
         sweep
         for i, sweep in enumerate(sweeps)
-        if (i in aside and _price(sweep) <= left) or _price(sweep) <= share
+        if (i in aside and price(sweep) <= left) or price(sweep) <= share
     ]
     if ready or not sweeps:
         return ready
-    cheapest = min(sweeps, key=_price)
-    return [cheapest] if _price(cheapest) <= left else []
+    cheapest = min(sweeps, key=price)
+    return [cheapest] if price(cheapest) <= left else []
 
 
 def _need(sweep: Sweep, duration: float) -> float:
@@ -150,12 +155,12 @@ def _need(sweep: Sweep, duration: float) -> float:
     run, last, total = sweep.cost, float(points[-1].steps or 1), 0.0
     while last < 1.2 * steps:
         run, last = 2 * run, 2 * last
-        total += run * _runs(run)
+        total += sweep.overhead + run * runs(run + sweep.start)
     return total
 
 
-def _runs(seconds: float) -> int:
-    """Runs that a point of so many seconds takes: errors, warm-up and repeats."""
+def runs(seconds: float) -> int:
+    """Runs that a point takes where one takes so many seconds: errors, warm-up and repeats."""
     return 1 + warm_ups(seconds) + repeats(seconds)
 
 
@@ -169,10 +174,10 @@ def warm_ups(seconds: float) -> int:
     return 1 if seconds < 0.1 else 0
 
 
-def _price(sweep: Sweep) -> float:
+def price(sweep: Sweep) -> float:
     """Seconds that the next point will take."""
     run = sweep.cost * sweep.growth
-    return run * _runs(run)
+    return sweep.overhead + run * runs(run + sweep.start)
 
 
 def is_finished(sweep: Sweep) -> bool:

@@ -27,6 +27,7 @@ import numpy as np
 import openmm as mm
 
 from springcheck import mechanics
+from springcheck.engines import quiet
 from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
 from springcheck.schemes import SCHEMES
@@ -123,7 +124,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     context.setPositions(positions)
     context.setVelocities(velocities)
     return _Context(
-        scene=scene, m=m, origins=origins, context=context, integrator=integrator, half_kick=early
+        m=m, origins=origins, context=context, integrator=integrator, force=force, half_kick=early
     )
 
 
@@ -143,9 +144,8 @@ def _origins(scene: Scene, method: Method) -> Floats:
     origins = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
     springs = [t for t in scene.terms if isinstance(t, mechanics.WallSpring | mechanics.Spring)]
-    stiffnesses = [k for term in springs for k in term.k.tolist()]
     hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
-    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and min(stiffnesses, default=0.0) >= 0
+    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
@@ -288,7 +288,9 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         raise MethodError(f"{label}: OpenMM has no platform {name} on this machine; it has {', '.join(here)}")
     properties = {"Precision": label.precision} if label.precision else {}
     try:
-        return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
+        # OpenMM's C++ warns on standard output, where results go, that an OpenCL is a processor's
+        with quiet.caught(1):
+            return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
 
@@ -310,11 +312,11 @@ class _Context:
     def __init__(
         self,
         *,
-        scene: Scene,
         m: Floats,
         origins: Floats,
         context: mm.Context,
         integrator: mm.Integrator,
+        force: Force,
         half_kick: float,
     ) -> None:
         self.force_calls = 0
@@ -323,7 +325,7 @@ class _Context:
         self._integrator = integrator
         self._m = m
         self._origins = origins if np.any(origins) else None
-        self._force = _pull(scene)
+        self._force = force
         self._half_kick = half_kick
         self._x = np.zeros((context.getSystem().getNumParticles(), 3))
         self._v = np.zeros_like(self._x)

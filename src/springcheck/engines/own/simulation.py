@@ -133,7 +133,7 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
     walls = _single_walls(scene)
     if walls is not None:
         k, at = walls
-        inverse = (1 / (slowed + h * h * (k / m)),) if implicit else ()
+        inverse = (1 / (slowed + h * (h * (k / m))),) if implicit else ()
         if scene.n == 1 and at[0] == 0:
             constants = tuple(float(x[0]) for x in (m, k, *inverse))
             return Layout(

@@ -7,11 +7,14 @@ that the energy of the start allows each component, because q and p may differ i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import sksundae
 from sksundae.cvode import CVODE
 
 from springcheck import mechanics
+from springcheck.engines import quiet
 from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
 
 MOST_STEPS = 10_000_000
@@ -40,7 +43,9 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
 
 def absolute_tolerance(scene: Scene) -> Floats:
     """`scene.tolerance` times the amplitude of each component of (q, p) at the energy of the start (2n,)."""
-    return np.asarray(scene.tolerance * np.concatenate(mechanics.amplitudes(scene)))
+    found = scene.tolerance * np.concatenate(mechanics.amplitudes(scene))
+    # a component that never moves needs a weight too; any will do
+    return np.asarray(np.where(found > 0, found, scene.tolerance))
 
 
 MOST_ALIKE = 1e3
@@ -68,11 +73,41 @@ def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     return slope, pull
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InternalSteps:
+    """What CVODE did on its way to the end of a scene."""
+
+    accepted: int
+    attempted: int
+    """Different times at which it asked for the force: rejected steps are those it did not accept, the
+    trials of its first step among them."""
+    force_calls: int
+    t: float
+    """Where it ended: before the end of the scene only where `most` steps did not suffice."""
+    q: Floats
+    p: Floats
+
+
+def internal_steps(scene: Scene, method: Method, *, most: int = MOST_STEPS) -> InternalSteps:
+    """Run a scene by at most so many internal steps, and count.  Stopped: CVODE gave up, and said why."""
+    # SUNDIALS' logger prints on standard output, where results go
+    with quiet.caught(1) as said:
+        try:
+            solver = _Solver(scene, "Adams" if method.name == "adams" else "BDF", scene.step)
+            return solver.count(scene.step * scene.steps, most)
+        except (RuntimeError, Stopped) as error:
+            stopped = error
+    rows = stopped.rows if isinstance(stopped, Stopped) else 0
+    raise Stopped(rows, " ".join((said[0] or str(stopped)).split()[:40])) from stopped
+
+
 class _Solver:
     """CVODE, stepped from output to output.  Outputs between internal steps are interpolated by CVODE."""
 
     def __init__(self, scene: Scene, method: str, step: float) -> None:
         self.force_calls = 0
+        self.asked: set[float] | None = None
+        """Times at which the force was asked for, where somebody counts them."""
         n, m = scene.n, scene.m
         force = mechanics.force(scene.terms)
         as_matrix = _suits_matrix(scene)
@@ -82,12 +117,16 @@ class _Solver:
 
         def by_terms(t: float, y: Floats, yp: Floats) -> None:
             self.force_calls += 1
+            if self.asked is not None:
+                self.asked.add(t)
             q, p = y[:n], y[n:]
             yp[:n] = p / m
             yp[n:] = force(q, p)
 
         def by_matrix(t: float, y: Floats, yp: Floats) -> None:
             self.force_calls += 1
+            if self.asked is not None:
+                self.asked.add(t)
             np.dot(slope, y, out=yp)
             if pulled:
                 np.add(yp, pull, out=yp)
@@ -113,14 +152,46 @@ class _Solver:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         n, take = self._n, self._solver.step
-        for row in range(len(q)):
-            self._done += every
+        row, failure = 0, ""
+        # SUNDIALS' logger prints on standard output, where results go
+        with quiet.caught(1) as said:
+            for row in range(len(q)):
+                self._done += every
+                try:
+                    result = take(self._done * self._step)
+                except RuntimeError as error:
+                    failure = str(error)
+                    break
+                if not result.success:
+                    failure = str(result.message)
+                    break
+                y = result.y
+                q[row] = y[:n]
+                p[row] = y[n:]
+        if failure:
+            raise Stopped(row, " ".join([failure, *said]).strip())
+
+    def count(self, end: float, most: int) -> InternalSteps:
+        """Go to `end` one internal step at a time."""
+        self.asked = set()
+        accepted, t = 0, 0.0
+        y = np.empty(2 * self._n)
+        while abs(t) < abs(end) and accepted < most:
             try:
-                result = take(self._done * self._step)
+                result = self._solver.step(end, method="onestep", tstop=end)
             except RuntimeError as error:
-                raise Stopped(row, str(error)) from error
-            if not result.success:
-                raise Stopped(row, str(result.message))
-            y = result.y
-            q[row] = y[:n]
-            p[row] = y[n:]
+                raise Stopped(accepted, str(error)) from error
+            if not result.success or result.t == t:
+                raise Stopped(accepted, str(result.message))
+            t, y = float(result.t), result.y
+            accepted += 1
+        # the start is asked for too, and is no step
+        attempted = len(self.asked - {0.0})
+        return InternalSteps(
+            accepted=accepted,
+            attempted=attempted,
+            force_calls=self.force_calls,
+            t=t,
+            q=y[: self._n].copy(),
+            p=y[self._n :].copy(),
+        )

@@ -1,0 +1,312 @@
+"""The study of the faults: what rejects each of them, how small it may be, and no alarm without one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+from springcheck import checks, mechanics, schemes
+from springcheck.checks import Experiment, Run
+from springcheck.errors import MethodError
+from springcheck.faults import clean, steppers
+from springcheck.faults.seeded import Fault, Where
+from springcheck.faults.table import FAULTS
+from springcheck.model import Scene, Trajectory
+
+
+@cache
+def scene(where: Where) -> Scene:
+    """The scenes of the faults: no mass, stiffness, rest point or step that is 1, h w about 0.1."""
+    if where == "chain":
+        made = clean.scene(
+            np.array([1.3, 0.7, 2.1]),
+            (
+                mechanics.Spring(
+                    a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])
+                ),
+            ),
+            np.array([0.2, 1.0, 1.9]),
+            np.array([0.4, -0.3, 0.5]),
+            step=0.05,
+            steps=200,
+        )
+    else:
+        made = clean.scene(
+            np.array([3.7]),
+            (clean.walls(np.array([2.9]), np.array([0.0])),),
+            np.array([0.3]),
+            np.array([0.7]),
+            step=0.1,
+            steps=2100 if where == "long spring" else 200,
+        )
+    return replace(made, name=where)
+
+
+SLOW = frozenset({"order", "order-anharmonic", "rounding-bias", "rounding-growth", "convergence"})
+"""Experiments that do not look at the scene, and take most of the time."""
+CLEAN = 320
+"""Random scenes for the plain engine; each meets one scheme."""
+ENGINES = ("own:*", "openmm:*", "ase:*")
+"""Methods of fixed step whose right runs are judged too."""
+BY_ENGINES = 40
+"""Random scenes for each method of the engines."""
+SMALLEST, LARGEST = 1e-20, 0.3
+"""Sizes between which a detection limit is looked for."""
+HALVINGS = 4
+"""Of a decade: limits are known to a factor 10**(1/16) = 1.15."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What the checks say of one fault."""
+
+    name: str
+    about: str
+    size: float | None
+    rejected_by: tuple[str, ...]
+    missed_by: tuple[str, ...]
+    """Checks that should have rejected it and did not."""
+    limits: dict[str, float]
+    """Smallest size that each check rejects."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clean:
+    """Right engines: trajectories judged, verdicts passed on them, and those that were false alarms."""
+
+    runs: int
+    verdicts: int
+    alarms: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultReport:
+    """The whole study."""
+
+    results: tuple[Result, ...]
+    clean: Clean
+
+    @property
+    def sound(self) -> bool:
+        """Every fault was rejected by every check that must reject it, and nothing else was."""
+        return not self.clean.alarms and not any(result.missed_by for result in self.results)
+
+    def document(self) -> dict[str, Any]:
+        """As one JSON document."""
+        return {
+            "faults": [
+                {
+                    "name": result.name,
+                    "about": result.about,
+                    "size": result.size,
+                    "rejected_by": list(result.rejected_by),
+                    "missed_by": list(result.missed_by),
+                }
+                for result in self.results
+            ],
+            "limits": {result.name: result.limits for result in self.results if result.limits},
+            "clean_runs": self.clean.runs,
+            "clean_verdicts": self.clean.verdicts,
+            "false_alarms": list(self.clean.alarms),
+        }
+
+
+class _Probe:
+    """One fault on its scene, judged at any size; what is computed once is kept."""
+
+    def __init__(self, fault: Fault) -> None:
+        self._fault = fault
+        self._scene = scene(fault.scene)
+        self._recorded: dict[float | None, dict[str, bool | None]] = {}
+        self._benches: dict[float | None, checks.Bench] = {}
+        self._kept: dict[tuple[str, float | None], bool | None] = {}
+
+    def passed(self, check: str, size: float | None) -> bool | None:
+        """Whether the fault of this size passes a check; None where that does not apply."""
+        if check in _RECORDED:
+            if size not in self._recorded:
+                run = self._fault.run(self._scene, size=size)
+                self._recorded[size] = {v.check: v.passed for v in checks.judge(self._scene, run)}
+            return self._recorded[size][check]
+        if (check, size) not in self._kept:
+            self._kept[check, size] = self._experiment(check, size)
+        return self._kept[check, size]
+
+    def _experiment(self, check: str, size: float | None) -> bool | None:
+        def run(s: Scene, label: str) -> Trajectory:
+            return self._fault.run(s, label, size=size)
+
+        if size not in self._benches:
+            self._benches[size] = checks.Bench(scene=self._scene, label=self._fault.name, run=run)
+        return _EXPERIMENTS[check](self._benches[size]).passed
+
+    def limit(self, check: str) -> float | None:
+        """The smallest size that the check rejects, by bisection; None where it rejects none."""
+        size = self._fault.size
+        assert size is not None
+        seen = self.passed(check, size) is False
+        while SMALLEST < size < LARGEST:
+            following = size / 10 if seen else size * 10
+            if (self.passed(check, following) is False) != seen:
+                break
+            size = following
+        else:
+            return None
+        low, high = sorted((size, following))
+        for _ in range(HALVINGS):
+            middle = float(np.sqrt(low * high))
+            if self.passed(check, middle) is False:
+                high = middle
+            else:
+                low = middle
+        return high
+
+
+_RECORDED = {checks.name(check): check for check in checks.CHECKS}
+_EXPERIMENTS: dict[str, Experiment] = {checks.name(check): check for check in checks.THOROUGH}
+
+
+def examine(fault: Fault, *, limits: bool = True) -> Result:
+    """What the checks say of a fault at its size in the table, and down to which size they see it."""
+    probe = _Probe(fault)
+    names = (*_RECORDED, *_EXPERIMENTS)
+    rejected = tuple(name for name in names if probe.passed(name, fault.size) is False)
+    found: dict[str, float] = {}
+    if limits and fault.size is not None:
+        for name in names:
+            if probe.passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
+                continue
+            limit = probe.limit(name)
+            if limit is not None:
+                found[name] = limit
+    return Result(
+        name=fault.name,
+        about=fault.about,
+        size=fault.size,
+        rejected_by=rejected,
+        missed_by=tuple(name for name in fault.caught_by if name not in rejected),
+        limits=found,
+    )
+
+
+def clean_scene(seed: int) -> Clean:
+    """A random scene by the plain engine, one of all schemes, through every check that looks at it."""
+    rng = np.random.default_rng([2026, seed])
+    where = clean.random_scene(rng)
+    scheme = schemes.SCHEMES[str(rng.choice(_FIXED))]
+    return _judged(where, f"plain:{scheme.name}", _plain(scheme), seed, _QUICK)
+
+
+def clean_laws(name: str) -> Clean:
+    """The laws that hold over many runs, for the plain engine and one scheme."""
+    slow = tuple(check for check in checks.THOROUGH if checks.name(check) in SLOW)
+    return _judged(scene("spring"), f"plain:{name}", _plain(schemes.SCHEMES[name]), -1, slow)
+
+
+def clean_engine(run: Run, label: str, seed: int) -> Clean:
+    """A random scene by a method of an engine."""
+    where = clean.random_scene(np.random.default_rng([2027, seed]))
+    return _judged(where, label, run, seed, _QUICK)
+
+
+_FIXED = tuple(
+    name
+    for name, scheme in schemes.SCHEMES.items()
+    if scheme.one_step and not scheme.flow and not scheme.mixes
+)
+_QUICK = tuple(check for check in checks.THOROUGH if checks.name(check) not in SLOW)
+
+
+def _plain(scheme: schemes.Scheme) -> Run:
+    def run(s: Scene, label: str) -> Trajectory:
+        return steppers.record(s, scheme, steppers.textbook(s, scheme), label=label)
+
+    return run
+
+
+def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Experiment, ...]) -> Clean:
+    try:
+        verdicts = checks.judge(where, run(where, label))
+    except MethodError:
+        return Clean(runs=0, verdicts=0, alarms=())
+    verdicts += checks.judge_thoroughly(where, label, run, experiments)
+    return Clean(
+        runs=1,
+        verdicts=sum(verdict.passed is not None for verdict in verdicts),
+        alarms=tuple(
+            f"{label}, scene {seed}: {v.check} {v.value:.3g} of {v.bound:.3g}"
+            for v in verdicts
+            if v.passed is False
+        ),
+    )
+
+
+def study(
+    run: Run | None = None,
+    labels: Sequence[str] = (),
+    *,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> FaultReport:
+    """All faults, their limits, and the clean runs; `run` and `labels` add those of the engines.
+
+    `progress(done, all)` is called as parts finish.  With more than one worker, parts are computed in
+    processes of their own, and `run` must be a function that they can import.
+    """
+    parts: list[Callable[[], Result | Clean]] = [partial(_examine, fault.name) for fault in FAULTS]
+    parts += [partial(clean_laws, name) for name in _FIXED]
+    parts += [partial(_clean_scenes, first) for first in range(0, CLEAN, _BATCH)]
+    if run is not None:
+        parts += [
+            partial(_clean_engine, run, label, first)
+            for label in labels
+            for first in range(0, BY_ENGINES, _BATCH)
+        ]
+    done: list[Result | Clean] = []
+    for part in _carried_out(parts, workers):
+        done.append(part)
+        if progress:
+            progress(len(done), len(parts))
+    cleans = [part for part in done if isinstance(part, Clean)]
+    order = [fault.name for fault in FAULTS]
+    results = sorted((part for part in done if isinstance(part, Result)), key=lambda r: order.index(r.name))
+    return FaultReport(results=tuple(results), clean=_together(cleans))
+
+
+_BATCH = 20
+
+
+def _examine(name: str) -> Result:
+    return examine(next(fault for fault in FAULTS if fault.name == name))
+
+
+def _clean_scenes(first: int) -> Clean:
+    return _together([clean_scene(seed) for seed in range(first, first + _BATCH)])
+
+
+def _clean_engine(run: Run, label: str, first: int) -> Clean:
+    return _together([clean_engine(run, label, seed) for seed in range(first, first + _BATCH)])
+
+
+def _together(parts: Sequence[Clean]) -> Clean:
+    return Clean(
+        runs=sum(part.runs for part in parts),
+        verdicts=sum(part.verdicts for part in parts),
+        alarms=tuple(alarm for part in parts for alarm in part.alarms),
+    )
+
+
+def _carried_out(parts: Sequence[Callable[[], Result | Clean]], workers: int) -> Iterator[Result | Clean]:
+    if workers <= 1:
+        for part in parts:
+            yield part()
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(part) for part in parts]):
+            yield future.result()

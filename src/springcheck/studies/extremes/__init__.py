@@ -1,0 +1,217 @@
+"""The atlas of extreme cases: every method over the decades, every cell with an outcome and its reason.
+
+A cell is right (each step within its bound), unstable as theory says, at the engine's limit (off, and we
+say why), or refused.  A cell that is off without a named reason is silently wrong, and fails the study.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import engines, store
+from springcheck.errors import MethodError
+from springcheck.model import Label
+from springcheck.studies.extremes import grid, refusals, running, solving
+from springcheck.studies.extremes.judging import Cell
+from springcheck.studies.stability import propagators
+
+__all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows"]
+
+PLATFORMS = ("openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
+             "openmm:verlet@OpenCL-double")  # fmt: skip
+"""Beside every method on its first platform."""
+
+CALM = (0.01, 1.9)
+"""h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """The forces between which a method is right at every h w in `CALM`, as decades of the scene's unit."""
+
+    method: str
+    sentence: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Atlas:
+    """All cells, the windows, and the methods that are not here."""
+
+    cells: tuple[Cell, ...]
+    windows: tuple[Window, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+    @property
+    def wrong(self) -> tuple[Cell, ...]:
+        """Cells that are silently wrong."""
+        return tuple(cell for cell in self.cells if cell.outcome == "silently wrong")
+
+    @property
+    def passed(self) -> bool:
+        """Whether anything was measured and no cell is silently wrong."""
+        return bool(self.cells) and not self.wrong
+
+    def counts(self, method: str | None = None) -> Counter[str]:
+        """Cells by outcome, of one method or of all."""
+        return Counter(cell.outcome for cell in self.cells if method in (None, cell.method))
+
+
+def measure(
+    methods: Sequence[str] = (), *, quick: bool = False, progress: Callable[[str], None] | None = None
+) -> Atlas:
+    """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
+
+    Raises:
+        MethodError: a label names nothing, or none of the methods is here.
+    """
+    chosen = engines.match(tuple(methods) or ("*", *PLATFORMS))
+    cells: list[Cell] = []
+    left_out = []
+    for label in chosen:
+        if "wall-spring" not in engines.method(label).terms:
+            left_out.append((str(label), "it moves no particles on springs"))
+            continue
+        absent = engines.absence(label.engine) or (
+            None if engines.method(label).adaptive else propagators.absence(label)
+        )
+        if absent:
+            left_out.append((str(label), absent))
+            continue
+        if progress:
+            progress(str(label))
+        cells += of_method(label, quick=quick)
+    if not cells:
+        raise MethodError("none of these methods is here: " + "; ".join(map(": ".join, left_out)))
+    if not methods:
+        cells += refusals.cells()
+    return Atlas(cells=tuple(cells), windows=tuple(windows(cells)), left_out=tuple(left_out))
+
+
+def record(
+    path: str | Path,
+    methods: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Atlas:
+    """Like `measure`, kept in a store: one table of cells for each method, and the document.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    with store.open_new(path, "\n".join(["extremes", *methods]), force=force) as journal:
+        atlas = measure(methods, quick=quick, progress=progress)
+        for method in dict.fromkeys(cell.method for cell in atlas.cells):
+            cells = [cell for cell in atlas.cells if cell.method == method]
+            numbers: dict[str, list[float] | list[str]] = {
+                name: [cell.parameters.get(name, np.nan) for cell in cells]
+                for name in ("m", "k", "q", "p", "h", "steps", "tolerance")
+            }
+            judged: dict[str, list[float] | list[str]] = {
+                "outcome": [str(cell.outcome) for cell in cells],
+                "reason": [cell.reason for cell in cells],
+                "value": [cell.value for cell in cells],
+                "bound": [cell.bound for cell in cells],
+            }
+            journal.add(store.Table(name=f"extremes/{method}", columns=numbers | judged))
+        journal.commit(documents={"extremes": json.dumps(document(atlas), allow_nan=False)})
+    return atlas
+
+
+def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
+    """All cells of one method."""
+    if engines.method(label).adaptive:
+        return [solving.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
+
+    def together(spec: grid.Spec) -> tuple[str, float]:
+        return spec.block, spec.h
+
+    found: list[Cell] = []
+    groups = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
+    if quick and label.platform not in ("", "Reference"):
+        # a context costs such a platform a quarter of a second: the groups with the most cells
+        groups = sorted(groups, key=len)[-3:]
+    for specs in groups:
+        found += running.cells(label, specs)
+    return found + solving.last(label, grid.lengths(label, quick=quick))
+
+
+def windows(cells: Sequence[Cell]) -> list[Window]:
+    """For each method the decades of force around 1 to 1e6 in which every calm cell is right."""
+    found = []
+    for method in dict.fromkeys(cell.method for cell in cells):
+        calm: dict[int, list[bool]] = {}
+        for cell in cells:
+            if (
+                cell.method == method
+                and cell.block == "force"
+                and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
+            ):
+                calm.setdefault(_decade(cell), []).append(cell.outcome in RIGHT)
+        decades = sorted(calm)
+        middle = [j for j, decade in enumerate(decades) if 0 <= decade <= 6 and all(calm[decade])]
+        if not middle:
+            continue
+        low = high = middle[0]
+        while low > 0 and all(calm[decades[low - 1]]):
+            low -= 1
+        while high < len(decades) - 1 and all(calm[decades[high + 1]]):
+            high += 1
+        whole = low == 0 and high == len(decades) - 1
+        name = engines.engine(method.partition(":")[0]).title
+        span = f"1e{decades[low]} and 1e{decades[high]}"
+        sentence = f"{name} ({method}): right for forces between {span}, in the scene's unit of force"
+        if whole:
+            sentence += ", all that was tried"
+        found.append(
+            Window(method=method, sentence=sentence, low=10.0 ** decades[low], high=10.0 ** decades[high])
+        )
+    return found
+
+
+RIGHT = ("right", "unstable, as theory says")
+"""Outcomes that are no fault of an engine's arithmetic."""
+
+
+def _decade(cell: Cell) -> int:
+    k, q = cell.parameters["k"], cell.parameters["q"]
+    return int(np.round(np.log10(k) + np.log10(q)))
+
+
+def document(atlas: Atlas) -> dict[str, Any]:
+    """Plain data for JSON; what is not a finite number is None."""
+    return {
+        "passed": atlas.passed,
+        "counts": dict(atlas.counts()),
+        "cells": [
+            {
+                "method": cell.method,
+                "block": cell.block,
+                "parameters": {name: _finite(value) for name, value in cell.parameters.items()},
+                "outcome": cell.outcome,
+                "reason": cell.reason,
+                "value": _finite(cell.value),
+                "bound": _finite(cell.bound),
+            }
+            for cell in atlas.cells
+        ],
+        "windows": [
+            {"method": w.method, "sentence": w.sentence, "low": _finite(w.low), "high": _finite(w.high)}
+            for w in atlas.windows
+        ],
+        "left_out": [{"method": method, "reason": reason} for method, reason in atlas.left_out],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,196 @@
+"""The grid of extreme cases: decades of mass, stiffness, amplitude, step and length of run."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck import mechanics
+from springcheck.model import Label, Scene, Term
+from springcheck.studies.stability.propagators import MASS, STEP
+
+STEPS = 20
+"""Of the cells that are judged step by step."""
+
+TURNS = (1e-8, 1e-6, 1e-4, 1e-2, 0.1, 1.0, 1.9, 1.99, 2.01, 2.5, 5.0, 10.0)
+"""h w of the plane of forces."""
+
+DECADES = (
+    -300, -200, -150, -100, -50, -40, -30, -20, -15, -12, -11, -10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 0,
+    1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15, 20, 30, 40, 50, 100, 150, 200, 300,
+)  # fmt: skip
+"""Powers of ten of the largest force of the start, in the scene's unit: closer where engines differ."""
+
+SIZES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
+"""Powers of ten of masses and stiffnesses."""
+
+STRETCH = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
+"""Powers of ten of steps."""
+
+LENGTHS = (1, 10, 1000, 100_000, 1_000_000)
+LONGEST = 100_000_000
+"""Steps of the runs that are judged by their end; LONGEST for the methods in `FAST` alone."""
+
+FAST = frozenset({"own:euler", "own:semi-implicit-euler", "own:implicit-euler"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec:
+    """One spring, one start, one step, one length: a cell before it is run."""
+
+    block: str
+    m: float
+    k: float
+    q: float
+    p: float
+    h: float
+    steps: int = STEPS
+    tolerance: float = 1e-9
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number is one that a scene may hold."""
+        numbers = (self.m, self.k, self.q, self.p, self.h)
+        return bool(np.all(np.isfinite(numbers))) and self.m > 0 and self.h != 0
+
+    @property
+    def force(self) -> float:
+        """Force of the start, or what the momentum would build up to."""
+        with np.errstate(all="ignore"):
+            k, m = np.longdouble(abs(self.k)), np.longdouble(self.m)
+            return float(max(k * abs(self.q), np.sqrt(k / m) * abs(self.p)))
+
+    @property
+    def turn(self) -> float:
+        """|h| w."""
+        return float(abs(np.longdouble(self.h)) * np.sqrt(abs(np.longdouble(self.k)) / np.longdouble(self.m)))
+
+
+def specs(*, quick: bool = False) -> list[Spec]:
+    """All cells of methods of fixed step that are judged step by step."""
+    with np.errstate(over="ignore", under="ignore"):
+        found = [*_forces(), *_sizes(), *_steps(), *_special()]
+    if quick:
+        # every third decade of the planes; of the steps and the special cases all
+        found = [x for j, x in enumerate(found) if x.block in ("step", "special") or j % 3 == 0]
+    return [x for x in found if x.finite]
+
+
+def _forces() -> Iterator[Spec]:
+    """The plane of h w and force: mass and step stay, amplitude = force / k."""
+    for turn, decade in itertools.product(TURNS, DECADES):
+        k = MASS * (turn / STEP) ** 2
+        q = float(np.float64(10.0**decade) / np.float64(k))
+        yield Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)
+
+
+def _sizes() -> Iterator[Spec]:
+    """The plane of mass and stiffness at h w = 0.3, amplitude 1."""
+    for a, b in itertools.product(SIZES, SIZES):
+        m, k = 3.7 * 10.0**a, 2.9 * 10.0**b
+        # a power of 2, so that cells of one ratio share a step
+        w = float(2.0 ** np.round(np.log2(2.9 / 3.7) / 2 + (b - a) / 2 * np.log2(10)))
+        yield Spec(block="size", m=m, k=k, q=1.0, p=0.6 * np.sqrt(m) * np.sqrt(k), h=0.25 / w)
+
+
+def _steps() -> Iterator[Spec]:
+    """Steps of every size and both signs at h w = 0.3, and free motion where no stiffness is large enough."""
+    for decade, sign in itertools.product(STRETCH, (1, -1)):
+        h = sign * 3.1 * 10.0**decade
+        k = 3.7 * np.float64(0.3 / 3.1 / 10.0 ** np.float64(decade)) ** 2
+        yield Spec(block="step", m=3.7, k=float(k) if np.isfinite(k) else 0.0, q=0.8, p=0.0, h=h)
+
+
+def _special() -> Iterator[Spec]:
+    """k = 0, k < 0, nothing at all, the smallest and the largest numbers; all with one step."""
+    for k, q, p in (
+        (0.0, 0.3, 0.7), (0.0, 0.0, 0.0), (0.0, 1e300, 1e300), (0.0, 1e-300, 1e-300), (2.9, 0.0, 0.0),
+        (2.9, 0.0, 0.7), (2.9, 0.3, 0.0), (-2.9, 0.3, 0.7), (-2.9, 0.0, 0.0), (-1e-300, 0.3, 0.7),
+        (-1e-3, 0.3, -0.7), (-1e3, 0.3, 0.7), (-1e6, 0.3, 0.7), (-1e12, 0.3, 0.7), (-1e300, 0.3, 0.7),
+        (2.9, 5e-324, 0.0), (2.9, 0.0, 5e-324), (2.9, 1e-310, 1e-310), (1e-310, 0.3, 0.7),
+        (5e-324, 0.3, 0.7), (2.9, 1.7e308, 0.0), (2.9, 0.0, 1.7e308), (1e300, 1e300, 0.0),
+        (1.7e308, 0.3, 0.7), (1e-300, 1e-300, 0.0), (2.9, -0.3, -0.7), (2.9, 0.3, 1e-16), (2.9, 1e16, 0.7),
+    ):  # fmt: skip
+        for m in (3.7, 0.37):
+            yield Spec(block="special", m=m, k=k, q=q, p=p, h=0.11)
+
+
+def lengths(label: Label, *, quick: bool = False) -> list[Spec]:
+    """Cells that are judged by the end of a long run."""
+    plain = str(label)
+    steps = list(LENGTHS)
+    if label.engine == "ase":
+        steps = [1, 10, 1000] if quick else [1, 10, 1000, 4000]
+    elif label.platform or quick:
+        steps = [1, 10, 1000, 10_000]
+    if plain in FAST:
+        steps.append(LONGEST // 100 if quick else LONGEST)
+    turns: tuple[float, ...] = (1e-4, 0.01, 0.1, 1.0, 1.9)
+    if label.platform and quick:
+        # every run costs a context, a quarter of a second
+        steps, turns = [1000], turns[2:]
+    found = []
+    for n in steps:
+        for turn in turns if n < LONGEST // 100 else (0.1,):
+            k = MASS * (turn / STEP) ** 2
+            # forces of 2**10 keep fixed-point sums at their best
+            q = 1024.0 / k
+            found.append(
+                Spec(block="length", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP, steps=n)
+            )
+    return found
+
+
+def solver_specs(*, quick: bool = False) -> list[Spec]:
+    """Cells of adaptive solvers, each a run of its own: 20 outputs."""
+    found: list[Spec] = []
+    with np.errstate(over="ignore", under="ignore"):
+        for decade, tolerance in itertools.product(
+            (-300, -200, -150, -100, -30, -10, 0, 10, 30, 100, 150, 200, 300),
+            (1e-3, 1e-6, 1e-9, 1e-12, 1e-15),
+        ):
+            q = 10.0**decade
+            found.append(Spec(block="force", m=3.7, k=2.9, q=q, p=0.0, h=0.3, tolerance=tolerance))
+        found += [x for x in _sizes() if x.finite][:: 4 if quick else 1]
+        found += [x for x in _steps() if x.finite]
+        found += [x for x in _special() if x.finite]
+        for turn in TURNS:
+            k = MASS * (turn / STEP) ** 2
+            found.append(Spec(block="turn", m=MASS, k=k, q=0.3, p=0.7, h=STEP))
+    return [x for x in found if x.finite]
+
+
+def scene(cells: list[Spec], label: Label, requires: frozenset[str]) -> Scene:
+    """Cells of one step and one length as a scene of particles side by side."""
+    first = cells[0]
+    n = len(cells)
+    index = np.arange(n)
+    m = np.array([x.m for x in cells])
+    fast = "springs marked fast" in requires
+    terms: list[Term] = [
+        mechanics.WallSpring(i=index, k=np.array([x.k for x in cells]), at=np.zeros(n), fast=fast)
+    ]
+    if "damping" in requires:
+        # the method is there for friction: h c/m = 1/80
+        rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
+        with np.errstate(over="ignore", under="ignore"):
+            c = np.minimum(rate * m, 1e300)
+        terms.append(mechanics.Damping(i=index, c=np.where(first.block == "force", c, 0.0), m=m))
+    every = max(1, first.steps // 10) if first.block == "length" else 1
+    return Scene(
+        name="extreme",
+        title="extreme cases side by side",
+        source="springcheck",
+        m=m,
+        q=np.array([x.q for x in cells]),
+        p=np.array([x.p for x in cells]),
+        terms=tuple(terms),
+        step=first.h,
+        steps=first.steps,
+        every=every,
+        tolerance=first.tolerance,
+        quantities=("q", "p"),
+    )

@@ -1,0 +1,238 @@
+"""One cell's outcome: its steps against the scheme's own, and a named reason where one is off.
+
+Every step from a finite state is judged by itself, in extended precision, whose range (1e4932) holds what
+leaves double's.  A step that is off its bound needs a reason that holds for this very cell: an
+intermediate result outside the range of the engine's numbers, or its fixed-point sum of forces.  A step
+that is off without a reason makes the cell silently wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from springcheck import checks, engines, model, schemes
+from springcheck.checks.case import SMALLEST
+from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Trajectory
+from springcheck.studies.extremes.grid import Spec
+
+Outcome: TypeAlias = Literal[
+    "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"
+]
+
+GROWN = 2.0
+"""Growth of the amplitude over a run from which a cell is called unstable."""
+
+DIGITS = 2.0**-24
+"""A fixed-point sum serves a force that it resolves to single precision at least."""
+
+RANGES = {
+    "double": (2.0**-1022, float(np.finfo(np.float64).max)),
+    "single": (2.0**-126, 3.4028234663852886e38),
+}
+"""Smallest normal and largest number of a width."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One cell of the atlas."""
+
+    method: str
+    block: str
+    parameters: dict[str, float]
+    outcome: Outcome
+    reason: str
+    value: float
+    """Largest distance of a step from the scheme's own, in roundings; the global error for a solver."""
+    bound: float
+
+
+def parameters(spec: Spec) -> dict[str, float]:
+    """What makes a cell, for the document."""
+    return {
+        "m": spec.m, "k": spec.k, "q": spec.q, "p": spec.p, "h": spec.h, "steps": spec.steps,
+        "h_w": spec.turn, "force": spec.force,
+    }  # fmt: skip
+
+
+def range_of(how: Arithmetic) -> tuple[float, float]:
+    """Smallest normal and largest number that the arithmetic computes forces with."""
+    return RANGES["single" if how.force >= 2.0**-24 else "double"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sizes:
+    """Sizes of what a step forms along the way, over the pair of frames (f-1, n), extended precision."""
+
+    largest: Extended
+    smallest: Extended
+    force: Extended
+
+
+def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2: Extended) -> Sizes:
+    """Intermediates of a step from (q, p) to its exact successor (q2, p2).
+
+    Whatever order an engine works in, it forms positions, momenta, velocities, forces, accelerations and
+    the changes that they make.  OpenMM also forms 1/m, 1/h, and the square of a bond's length.
+    """
+    m = scene.m.astype(np.longdouble)
+    h = np.abs(np.longdouble(scene.step))
+    k = np.abs(_stiffness(scene))
+    x, y = np.maximum(np.abs(q), np.abs(q2)), np.maximum(np.abs(p), np.abs(p2))
+    force = k * x
+    parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
+    parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]
+    if label.engine == "openmm":
+        parts += [np.broadcast_to(part, x.shape) for part in (1 / m, m, h, 1 / h)]
+        # the length of a bond is the root of a square, and the force is divided by it
+        parts += [x * x, y / m * (y / m) * h * h]
+    whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
+    nonzero = np.where(whole > 0, whole, np.inf)
+    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
+
+
+def _stiffness(scene: Scene) -> Extended:
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for term in scene.terms:
+        k = getattr(term, "k", None)
+        if k is not None:
+            np.add.at(out, term.i, k)  # type: ignore[attr-defined]
+    return out
+
+
+def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
+    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there."""
+    how = engines.load(label.engine).arithmetic(label)
+    with np.errstate(all="ignore"):
+        case = checks.Case(trajectory=as_trajectory(label, scene, q, p, how), scene=scene)
+        exact_q, exact_p = case.next_states
+        of_q, of_p = case.allowance
+        dq, dp = np.abs(exact_q - q[1:]), np.abs(exact_p - p[1:])
+        ratio = _largest(dq, dp, of_q, of_p)
+        # without what underflow may take
+        low_p = SMALLEST * (1 + scene.m)
+        low_q = SMALLEST + np.abs(np.longdouble(scene.step)) / scene.m * low_p
+        felt = np.abs(np.longdouble(scene.step)) * np.abs(_stiffness(case.judged)) * low_q
+        strict = _largest(dq, dp, of_q - low_q, of_p - low_p - felt)
+        from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
+        inside = sizes(
+            label, case.judged, q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), exact_q, exact_p
+        )
+        growth = growth_of(case, scene)
+    bound = float(case.roundings)
+    low, high = range_of(how)
+    cells = []
+    for i, spec in enumerate(specs):
+        here = from_finite[:, i]
+        bad = here & ~(ratio[:, i] <= bound)
+        value = float(np.max(np.where(here, np.minimum(ratio[:, i], 1e300), 0), initial=0.0))
+        unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
+        outcome: Outcome
+        if not bad.any():
+            reason = said if len(q) <= spec.steps else ""
+            outcome = "unstable, as theory says" if unstable else "right"
+            # a force that grows is small at first
+            peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
+            coarse = how.quantum > DIGITS * peak > 0
+            if reason:
+                outcome, reason = "silently wrong", f"stopped for no reason that is known here: {said}"
+            elif np.any(here & ~(strict[:, i] <= bound)):
+                outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
+            elif coarse:
+                outcome = "engine's limit"
+                reason = f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits"
+        else:
+            j = int(np.argmax(bad))
+            named = _reason(label, how, scene.step, spec, inside, i, np.flatnonzero(bad), low, high)
+            if named is None:
+                outcome, reason = (
+                    "silently wrong",
+                    f"step {j + 1} is off by {value:.3g} roundings of {bound:g}",
+                )
+            elif unstable and "beyond" in named and j > 0:
+                outcome, reason = "unstable, as theory says", f"grown out of range by step {j + 1}: {named}"
+            else:
+                outcome, reason = "engine's limit", named
+        cells.append(
+            Cell(
+                method=str(label), block=spec.block, parameters=parameters(spec), outcome=outcome,
+                reason=reason, value=value, bound=bound,
+            )
+        )  # fmt: skip
+    return cells
+
+
+def _reason(
+    label: Label,
+    how: Arithmetic,
+    step: float,
+    spec: Spec,
+    inside: Sizes,
+    i: int,
+    bad: np.ndarray,
+    low: float,
+    high: float,
+) -> str | None:
+    """A reason that holds at every step that is off, or None."""
+    if how.parameters == "single":
+        with np.errstate(over="ignore", under="ignore"):
+            kept = abs(np.float32(spec.k))
+        if spec.k and not RANGES["single"][0] <= kept <= RANGES["single"][1]:
+            return f"the force constant {spec.k:.3g} is beyond single precision, in which it is kept"
+    peak = np.max(inside.force[:, i], initial=0)
+    reasons = {
+        "fixed-point sum of forces overflows beyond 2**31": inside.force[bad, i] >= how.overflow,
+        f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
+            len(bad), how.quantum > DIGITS * peak
+        ),
+        f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
+        f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
+    }
+    for text, holds in reasons.items():
+        if np.all(holds):
+            return text
+    whole = np.any(np.stack(list(reasons.values())), axis=0)
+    if np.all(whole):
+        return " and ".join(text for text, holds in reasons.items() if np.any(holds))
+    return None
+
+
+def _largest(dq: Extended, dp: Extended, of_q: Extended, of_p: Extended) -> Extended:
+    """The larger of dq/of_q and dp/of_p; nothing off nothing is 0, and what is not a number is infinite."""
+    parts = [np.where(d == 0, 0, d / np.where(of > 0, of, 0)) for d, of in ((dq, of_q), (dp, of_p))]
+    ratio = np.maximum(*parts)
+    return np.asarray(np.where(np.isnan(ratio), np.inf, ratio))
+
+
+def growth_of(case: checks.Case, scene: Scene) -> Floats:
+    """Logarithm of the spectral radius of each cell's own one-step matrix."""
+    k = _stiffness(scene)
+    w = np.sqrt(np.abs(k) / scene.m.astype(np.longdouble))
+    # in units of the period, so that no entry leaves the range
+    turn = np.abs(np.longdouble(scene.step)) * w
+    matrices = schemes.matrix(case.scheme, h=1.0, m=np.ones(scene.n), k=turn * turn * np.sign(k))
+    found = schemes.rotation(matrices)
+    smallest = np.finfo(np.longdouble).tiny
+    return np.asarray(np.log(np.maximum(np.abs(found.determinant), smallest)) / 2 + found.growth, np.float64)
+
+
+def as_trajectory(label: Label, scene: Scene, q: Floats, p: Floats, how: Arithmetic) -> Trajectory:
+    """Frames as a trajectory that `checks.Case` takes, whatever its numbers are."""
+    method = engines.method(label)
+    return Trajectory(
+        label=str(label),
+        scheme=method.scheme,
+        t=np.arange(len(q), dtype=np.float64) * scene.every * scene.step,
+        q=q,
+        p=p,
+        step=scene.step,
+        every=scene.every,
+        outcome=model.Outcome(status="complete", step=scene.steps),
+        timing=model.Timing(start=0.0, run=0.0),
+        force_calls=0,
+        arithmetic=how,
+        rebuilds_velocity=method.rebuilds_velocity,
+    )

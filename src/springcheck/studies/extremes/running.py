@@ -1,0 +1,59 @@
+"""Running cells: many of one step in one run, as far as an engine that gives up lets them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from springcheck import engines
+from springcheck.errors import MethodError
+from springcheck.model import Floats, Label, Scene, Stopped
+from springcheck.studies.extremes import grid, judging
+from springcheck.studies.extremes.grid import Spec
+from springcheck.studies.extremes.judging import Cell
+
+
+def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, str]:
+    """Every frame as the engine leaves it, the start first, finite or not, and what it said if it stopped.
+
+    The driver ends a run at the first number that is not finite; here that is one cell among many.
+    """
+    with np.errstate(all="ignore"):
+        started = engines.load(label.engine).start(scene, engines.method(label), label, scene.step)
+        q, p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
+        q[0], p[0] = scene.q, scene.p
+        try:
+            started.advance(scene.every, q[1:], p[1:])
+        except Stopped as stop:
+            return q[: stop.rows + 1], p[: stop.rows + 1], str(stop)
+    return q, p, ""
+
+
+def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
+    """Run and judge cells of one step and one length, in as few runs as the engine allows."""
+    requires = engines.method(label).requires
+    scene = grid.scene(list(specs), label, requires)
+    try:
+        q, p, said = raw(scene, label)
+    except MethodError as error:
+        return [_own_refusal(label, spec, str(error)) for spec in specs]
+    found = judging.judge(label, specs, scene, q, p, said)
+    if not said:
+        return found
+    if len(specs) == 1:
+        return found
+    # the engine gave up over some: those that had left its numbers are done, the others run again
+    over = [x.outcome not in ("silently wrong", "right") and bool(x.reason) for x in found]
+    if not any(over) or all(over):
+        half = len(specs) // 2
+        return cells(label, specs[:half]) + cells(label, specs[half:])
+    rest = iter(cells(label, [spec for spec, done in zip(specs, over, strict=True) if not done]))
+    return [cell if done else next(rest) for cell, done in zip(found, over, strict=True)]
+
+
+def _own_refusal(label: Label, spec: Spec, message: str) -> Cell:
+    return Cell(
+        method=str(label), block=spec.block, parameters=judging.parameters(spec), outcome="engine's limit",
+        reason=f"it refuses: {message}", value=float("nan"), bound=float("nan"),
+    )  # fmt: skip

@@ -1,0 +1,134 @@
+"""Cells of adaptive solvers and of long runs: each judged by its end against the motion that it claims."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from springcheck import checks, engines, exact, simulate
+from springcheck.checks import recorded
+from springcheck.model import Label, Scene, Stopped
+from springcheck.studies.extremes import grid, judging
+from springcheck.studies.extremes.grid import Spec
+from springcheck.studies.extremes.judging import Cell, Outcome
+
+TIGHT = 1e-14
+"""A tolerance below this asks a step of a solver for less than a hundred roundings."""
+
+
+MOST = 20_000
+"""Internal steps that a cell may take: a tenth of a second."""
+
+
+def solve(label: Label, spec: Spec) -> Cell:
+    """One cell by an adaptive solver, judged at its end."""
+    scene = grid.scene([spec], label, frozenset())
+    driver: Any = engines.load(label.engine)
+    said, value, bound, whole = "", np.nan, np.nan, False
+    with np.errstate(all="ignore"):
+        try:
+            done = driver.internal_steps(scene, engines.method(label), most=MOST)
+        except Stopped as stop:
+            said = f"; it says: {stop}"
+        else:
+            whole = abs(done.t) >= abs(scene.step * scene.steps)
+            said = "" if whole else f"; {MOST} internal steps end at t = {done.t:.3g}"
+            if whole:
+                value, bound = _distance(label, scene, done)
+        reason = _reason(scene, spec)
+    if whole and value <= bound:
+        return _cell(label, spec, "right", "", value, bound)
+    if reason or not whole:
+        return _cell(label, spec, "engine's limit", (reason or "it gives up") + said, value, bound)
+    return _cell(
+        label, spec, "silently wrong", f"off by {value:.3g} where {bound:.3g} is allowed", value, bound
+    )
+
+
+def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float]:
+    """Global error at the end and its bound, both in units of the start."""
+    q, p = np.stack([scene.q, done.q]), np.stack([scene.p, done.p])
+    if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.terms[0].k)):  # type: ignore[attr-defined]
+        # nothing moves, and nothing may
+        return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0]))
+    ends = replace(scene, every=scene.steps)
+    run = judging.as_trajectory(label, ends, q, p, engines.load(label.engine).arithmetic(label))
+    run = replace(run, tolerance=scene.tolerance, force_calls=done.force_calls)
+    found = recorded.tolerance(checks.Case(trajectory=run, scene=ends))
+    return found.value, found.bound
+
+
+def _reason(scene: Scene, spec: Spec) -> str | None:
+    """What is outside of CVODE's numbers: a state, a weight, a rate, or a tolerance too tight."""
+    low, high = judging.RANGES["double"]
+    steps = np.arange(scene.steps + 1)
+    q, p = exact.true_motion(scene, steps, scene.step)
+    m, k = np.longdouble(spec.m), abs(np.longdouble(spec.k))
+    h = abs(np.longdouble(spec.h))
+    x, y = np.max(np.abs(q)), np.max(np.abs(p))
+    if not max(x, y) <= high:
+        return f"the motion itself leaves {high:.1e}"
+    parts = [x, y, k * x, y / m, 1 / m, k, k / m, h, h * scene.steps, k * x * x, y * y / m]
+    parts += [part * spec.tolerance for part in (x, y)]
+    parts += [1 / (part * spec.tolerance) for part in (x, y) if part > 0]
+    # the weighted norm squares rates over weights
+    parts += [(k * x / (y * spec.tolerance)) ** 2 if y > 0 else np.longdouble(0)]
+    parts += [(y / m / (x * spec.tolerance)) ** 2 if x > 0 else np.longdouble(0)]
+    sizes = np.array([part for part in parts if part > 0], dtype=np.longdouble)
+    if sizes.size and np.max(sizes) > high:
+        return f"its right-hand side or its weighted norm forms numbers beyond {high:.1e}"
+    if sizes.size and np.min(sizes) < low:
+        return f"its right-hand side or its weights are below {low:.1e}"
+    if spec.tolerance < TIGHT:
+        return f"a tolerance of {spec.tolerance:g} a step is too tight for double precision"
+    return None
+
+
+def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
+    """Cells of one long run each, judged by the closed form of the scheme's motion at ten frames."""
+    found = []
+    for spec in specs:
+        scene = grid.scene([spec], label, engines.method(label).requires)
+        with np.errstate(all="ignore"):
+            run = simulate.run(scene, label)
+            case = checks.Case(trajectory=run, scene=scene)
+            verdict = recorded.closed_form(case)
+            if verdict.passed is None and len(run.t) > 1:
+                verdict = recorded.step_defect(case)
+            growth = judging.growth_of(case, scene)[0]
+        unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
+        outcome: Outcome = "unstable, as theory says" if unstable else "right"
+        reason = ""
+        value, bound = verdict.value, verdict.bound
+        if run.outcome.status != "complete":
+            # the driver ends a run at the last finite frame; the next one is out of range by theory
+            high = judging.RANGES["double"][1]
+            # OpenMM squares the length of a bond
+            room = (0.5 if label.engine == "openmm" else 1) * np.log(high) - np.log(
+                max(abs(spec.q), abs(spec.p))
+            )
+            left = growth * (run.outcome.step + scene.every) > room
+            quantum = case.trajectory.arithmetic.overflow
+            gone = growth * run.outcome.step > np.log(quantum / spec.force) if np.isfinite(quantum) else False
+            reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"
+            if not (unstable and (left or gone)):
+                outcome, reason = "silently wrong", f"{run.outcome.status}: {run.outcome.message}"
+        if outcome != "silently wrong" and len(run.t) > 1 and not value <= bound:
+            outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
+        found.append(_cell(label, spec, outcome, reason, value, bound))
+    return found
+
+
+def _cell(label: Label, spec: Spec, outcome: Outcome, reason: str, value: float, bound: float) -> Cell:
+    return Cell(
+        method=str(label),
+        block=spec.block,
+        parameters=judging.parameters(spec) | {"tolerance": spec.tolerance},
+        outcome=outcome,
+        reason=reason,
+        value=float(value),
+        bound=float(bound),
+    )

@@ -1,0 +1,174 @@
+"""What stiffness costs: steps, force calls and error of every method as two scales move apart.
+
+Two families: the chain of a soft and a stiff spring (the shipped `two-scales` with another ratio of
+stiffnesses), and a spring in ever more friction (`overdamped` with another damping ratio).  Every run
+goes as far as the slow motion needs to show; the error is that of the slow motion at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from springcheck import engines, exact, mechanics, scenes, schemes, simulate
+from springcheck.errors import MethodError
+from springcheck.model import Label, Scene, Stopped
+
+Family = Literal["two-scales", "overdamped"]
+
+RATIOS: dict[Family, tuple[float, ...]] = {
+    "two-scales": tuple(10.0**e for e in range(0, 13, 2)),
+    "overdamped": tuple(10.0**e for e in range(7)),
+}
+"""Stiffness ratios, and damping ratios c / (2 sqrt(k m))."""
+
+OUTPUTS = 2000
+"""Steps of a method that no fast mode holds down."""
+
+TOLERANCE = 1e-6
+"""Of adaptive solvers: relative, per step."""
+
+MOST = {"ase": 4_000, "sundials": 20_000}
+MOST_ELSEWHERE = 1_500_000
+"""Steps that a run may take before it is not worth its time: half a second to two."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """One run of a family."""
+
+    family: Family
+    method: str
+    ratio: float
+    step: float
+    """Step of the method, or the mean internal step of a solver [T]."""
+    steps: int
+    """Steps to the end; where a run was not worth it, those that it would take."""
+    rejected: int
+    """Internal steps that a solver tried and did not keep; 0 for methods of fixed step."""
+    force_calls: int
+    error: float
+    """Error of the slow motion at the end, in units of its amplitude; NaN where there is no end."""
+    outcome: str
+
+
+def scene(family: Family, ratio: float) -> Scene:
+    """The shipped scene of a family with another ratio, over one turn of the slow motion at least."""
+    found = scenes.load_scene(family)
+    first, second = found.terms
+    if family == "two-scales":
+        stiff: Any = replace(second, k=first.k * ratio)  # type: ignore[attr-defined, type-var]
+        end = 8.0
+    else:
+        c = 2 * ratio * np.sqrt(first.k * found.m)  # type: ignore[attr-defined]
+        stiff = replace(second, c=c)  # type: ignore[type-var]
+        end = 5.0
+    return replace(
+        found, terms=(first, stiff), step=end / OUTPUTS, steps=OUTPUTS, every=OUTPUTS, tolerance=TOLERANCE
+    )
+
+
+def step_for(found: Scene, label: Label) -> float:
+    """The step of a method: half its limit on the fastest mode, an OUTPUTS-th of the end at most."""
+    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    held = found.step
+    if np.isfinite(scheme.limit):
+        fastest = float(np.sqrt(np.max(exact.modes(found).w2)))
+        held = min(held, (scheme.limit / 2 or 0.1) / fastest)
+        if scheme.name != "langevin-middle" and mechanics.is_damped(found):
+            # friction in the force of an explicit method: h c/m < 2
+            held = min(held, 0.5 / float(np.max(mechanics.rates(found))))
+    return held
+
+
+def measure(
+    labels: Sequence[Label],
+    family: Family,
+    ratios: Sequence[float] = (),
+    *,
+    progress: Callable[[int], None] | None = None,
+) -> list[Cost]:
+    """One row for every method that serves the family, at every ratio."""
+    rows = []
+    for label in labels:
+        for ratio in ratios or RATIOS[family]:
+            found = scene(family, ratio)
+            if engines.refusal(found, label) is None and not _is_other(label):
+                solver = engines.method(label).adaptive
+                rows.append(
+                    _solver(found, label, family, ratio) if solver else _fixed(found, label, family, ratio)
+                )
+            if progress:
+                progress(1)
+    return rows
+
+
+def _is_other(label: Label) -> bool:
+    """A platform in another precision answers another question."""
+    return bool(label.platform)
+
+
+def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
+    end = found.step * found.steps
+    steps = int(np.ceil(end / step_for(found, label)))
+    run = replace(found, step=end / steps, steps=steps, every=steps, quantities=("q", "p"))
+    most = MOST.get(label.engine, MOST_ELSEWHERE)
+    common = {"family": family, "method": str(label), "ratio": ratio, "step": run.step, "steps": steps}
+    if steps > most:
+        return Cost(
+            **common,  # type: ignore[arg-type]
+            rejected=0, force_calls=steps, error=float("nan"), outcome=f"not run: {steps:.1e} steps",
+        )  # fmt: skip
+    try:
+        done = simulate.run(run, label)
+    except MethodError as refused:
+        return Cost(**common, rejected=0, force_calls=0, error=float("nan"), outcome=str(refused))  # type: ignore[arg-type]
+    error = float("nan")
+    if done.outcome.status == "complete":
+        error = slow_error(run, done.q[-1], done.p[-1], steps)
+    return Cost(
+        **common,  # type: ignore[arg-type]
+        rejected=0, force_calls=done.force_calls, error=error, outcome=done.outcome.status,
+    )  # fmt: skip
+
+
+def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
+    driver: Any = engines.load(label.engine)
+    end = found.step * found.steps
+    common: dict[str, Any] = {"family": family, "method": str(label), "ratio": ratio}
+    try:
+        done = driver.internal_steps(found, engines.method(label), most=MOST[label.engine])
+    except Stopped as stop:
+        return Cost(
+            **common, step=float("nan"), steps=stop.rows, rejected=0, force_calls=0, error=float("nan"),
+            outcome=f"stopped: {stop}",
+        )  # fmt: skip
+    whole = done.t >= end
+    steps = done.accepted if whole else int(done.accepted * end / done.t)
+    return Cost(
+        **common,
+        step=done.t / done.accepted,
+        steps=steps,
+        rejected=max(done.attempted - done.accepted, 0),
+        force_calls=done.force_calls,
+        error=slow_error(found, done.q, done.p, found.steps) if whole else float("nan"),
+        outcome="complete" if whole else f"not run to the end: {steps:.1e} steps",
+    )
+
+
+def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
+    """Distance of a state from the true slow motion at the end, in units of the slow amplitude."""
+    modes = exact.modes(found)
+    j = int(np.argmin(modes.w2))
+    w = np.sqrt(modes.w2[j])
+    true = modes.into(*exact.true_motion(found, np.array([steps]), found.step, modes))
+    here = modes.into(np.asarray(q), np.asarray(p))
+    y, v = (here[i][j] - true[i][0, j] for i in range(2))
+    # the mass in honey has its slow motion in q alone: its momentum is slaved to it
+    if mechanics.is_damped(found):
+        return float(abs(y) / np.max(np.abs(modes.into(found.q, found.p)[0])))
+    start = modes.into(found.q, found.p)
+    return float(np.hypot(w * y, v) / np.hypot(w * start[0][j], start[1][j]))

@@ -1,0 +1,189 @@
+"""The measured limit of a method: the largest h w up to which its own propagator stays bounded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck import engines, schemes, simulate
+from springcheck.model import Extended, Floats, Label, Trajectory
+from springcheck.studies.stability import propagators
+from springcheck.studies.stability.propagators import STEP, Springs
+
+FIRST, LAST, COARSE = 1e-9, 1e6, 4096
+"""The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
+
+FINE = 1024
+"""Springs in each refinement of the bracket, each 1/1000 of the one before."""
+
+AGREED = 1e-6
+"""What every limit in double precision is held to."""
+
+NEXT = 1e-3
+"""Relative distance from the limit at which stepping confirms it."""
+
+ROUGH = 0.1
+"""h w at which growth is stepped where the limit is 0."""
+
+LARGE = 1e3
+"""h w at which decay is stepped where there is no limit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Limit:
+    """What was measured of one method on one spring."""
+
+    method: str
+    scheme: str
+    limit: float
+    """Largest h w with a bounded propagator; infinity where none up to `LAST` is unbounded."""
+    theory: float
+    bound: float
+    """How far `limit` may be from `theory`: what one step's rounding hides, `AGREED` at least."""
+    growth_above: float
+    """Measured growth of the amplitude per step just above the limit (its logarithm); NaN: no limit."""
+    growth_predicted: float
+    growth_below: float
+    """The same just below it, or at `LARGE` where there is no limit."""
+    growth_below_predicted: float
+    edge: float
+    """Exponent of the growth in the number of steps at the limit itself; NaN where there is none."""
+    edge_predicted: float
+    turn: Floats
+    """h w of the points drawn (j,)."""
+    radius: Floats
+    """Measured spectral radius there."""
+    radius_predicted: Floats
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the limit is where theory puts it."""
+        return self.limit == self.theory or abs(self.limit - self.theory) <= self.bound
+
+
+def measure(label: Label) -> Limit:
+    """Find a method's limit, step to both sides of it and at it, and compare with its scheme."""
+    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    limit = first_exit(label, propagators.measured)
+    hidden = first_exit(label, propagators.theory)
+    theory = scheme.limit
+    off = 0.0 if np.isinf(theory) else abs(hidden - theory)
+    how = propagators.arithmetic(label)
+    # theory at its own rounding shows what cannot be told; the roundings of k and of the step come on top
+    bound = max(AGREED, 4 * off + 4 * propagators.noise(label) * (0 if np.isinf(theory) else theory))
+    turn = _points(theory)
+    springs = Springs(label=label, turn=turn)
+    rounding = propagators.noise(label)
+    above = below = edge = np.nan, np.nan
+    if theory == 0:
+        above = _growth(label, ROUGH)
+    elif np.isinf(theory):
+        below = _growth(label, LARGE)
+    else:
+        above, below = _growth(label, theory * (1 + NEXT)), _growth(label, theory * (1 - NEXT))
+        if how.state <= 2.0**-53:
+            edge = _edge(label, theory)
+    return Limit(
+        method=str(label),
+        scheme=scheme.title,
+        limit=limit,
+        theory=theory,
+        bound=bound,
+        growth_above=above[0],
+        growth_predicted=above[1],
+        growth_below=below[0],
+        growth_below_predicted=below[1],
+        edge=edge[0],
+        edge_predicted=edge[1],
+        turn=turn,
+        radius=propagators.radius(propagators.measured(springs), rounding)[0],
+        radius_predicted=propagators.radius(propagators.theory(springs), rounding)[0],
+    )
+
+
+def first_exit(label: Label, matrices: Callable[[Springs], Floats | Extended]) -> float:
+    """Where the propagator first stops being bounded, to a part in 1e10; infinity where it does not."""
+    grid = np.geomspace(FIRST, LAST, COARSE)
+    rounding = propagators.noise(label)
+    for _ in range(5):
+        springs = Springs(label=label, turn=grid)
+        inside = propagators.bounded(matrices(springs), rounding)
+        turn = np.asarray(springs.true_turn, np.float64)
+        if inside.all():
+            return float("inf")
+        j = int(np.argmin(inside))
+        if j == 0:
+            return 0.0
+        low, high = turn[j - 1], turn[j]
+        if high - low <= 1e-10 * high:
+            break
+        if springs.single and high - low <= 2.0**-22 * high:
+            break
+        grid = np.linspace(low, high, FINE)
+    return float((low + high) / 2)
+
+
+def _points(theory: float) -> Floats:
+    """Where the spectral radius is drawn: over the decade around the limit, closer near it."""
+    centre = theory if 0 < theory < np.inf else 2.0
+    wide = np.geomspace(centre / 20, centre * 5, 41)
+    near = centre * (1 + np.array([-0.02, -0.005, 0.0, 0.005, 0.02]))
+    return np.unique(np.concatenate([wide, near]))
+
+
+def _run(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats, Springs]:
+    """A run of one spring, and its amplitude sqrt(x**2 + y**2) in scaled coordinates (f,)."""
+    springs = Springs(label=label, turn=np.array([turn]))
+    of_q, of_p = propagators.units(springs)
+    # a thousandth of the scan's force leaves room to grow
+    start = propagators.scene(springs, of_q * 1e-3, of_p * 0.7e-3, steps=steps)
+    run = simulate.run(start, label)
+    return run, np.hypot(run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0]), springs
+
+
+def _growth(label: Label, turn: float) -> tuple[float, float]:
+    """Logarithm of the growth per step: stepped, and that of the largest eigenvalue.
+
+    The slope of log amplitude over the last quarter of a run that is long enough for the growing
+    eigenvector to stand alone by 1e-7, as far as amplitudes reach; over whole turns where the motion
+    is an ellipse.
+    """
+    springs = Springs(label=label, turn=np.array([turn]))
+    matrix = propagators.theory(springs)
+    found = schemes.rotation(matrix)
+    predicted = float(0.5 * np.log(np.abs(found.determinant[0])) + found.growth[0])
+    steps = 400
+    if predicted != 0:
+        steps = int(np.clip(16 / abs(predicted), 40, 400))
+    run, size, _ = _run(label, turn, steps)
+    usable = np.flatnonzero(np.isfinite(size) & (size > 0))
+    first = usable[-1] * 3 // 4
+    n = np.arange(first, usable[-1] + 1)
+    if found.angle[0] != 0:
+        form = schemes.invariant(matrix, h=STEP)[0]
+        of_q, of_p = propagators.units(springs)
+        x, y = run.q[n, 0] / of_q[0], run.p[n, 0] / of_p[0]
+        # along the invariant ellipse the amplitude does not waver
+        ellipse = np.abs(form[0] * x * x + form[1] * x * y + form[2] * y * y)
+        logs = 0.5 * np.log(ellipse.astype(np.float64))
+    else:
+        logs = np.log(size[n])
+    return float(np.polyfit(n.astype(np.float64), logs, 1)[0]), predicted
+
+
+def _edge(label: Label, theory: float) -> tuple[float, float]:
+    """Exponent of growth with the number of steps at the limit: 1 where the two eigenvectors are one."""
+    steps = 1000
+    _, size, springs = _run(label, theory, steps)
+    n = np.arange(steps // 10, steps + 1)
+    matrix = propagators.theory(springs)[0]
+    half = (matrix[0, 0] + matrix[1, 1]) / 2
+    discriminant = half * half - (matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
+    rest = abs(matrix[0, 0] - half) + abs(matrix[0, 1]) + abs(matrix[1, 0])
+    defective = abs(discriminant) <= 1e-12 and rest > 1e-6
+    if len(size) <= steps or np.any(size[n] <= 0):
+        return float("nan"), float(defective)
+    slope = np.polyfit(np.log(n), np.log(size[n]), 1)[0]
+    return float(slope), float(defective)

@@ -1,0 +1,183 @@
+"""One-step propagators read off an engine: springs of any frequency, two starts each, one step.
+
+A scan is one scene of many independent springs, so thousands of frequencies cost one run.  Everything is
+in scaled coordinates (q/A, p/(m w A)): entries are of the size of h w and powers of it, whatever the
+units, and A is chosen so that the largest force of every spring is `FORCE`, where fixed-point sums of
+forces have digits to both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck import engines, mechanics, schemes, simulate
+from springcheck.errors import MethodError
+from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Term
+
+FORCE = 1024.0
+"""Largest force on a scanned spring, in the scene's unit of force."""
+
+MASS = 3.75
+"""Of every scanned spring: not 1, and exact in single precision."""
+
+STEP = 0.125
+"""Of every scan: a power of 2, so that h w is known to a rounding of sqrt(k/m)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Springs:
+    """Springs side by side under one method: h w (n,), and friction rate times step, one number or (n,)."""
+
+    label: Label
+    turn: Floats
+    brake: Floats | float = 0.0
+
+    @property
+    def single(self) -> bool:
+        """Whether the engine keeps force constants in single precision."""
+        return arithmetic(self.label).parameters == "single"
+
+    @property
+    def k(self) -> Floats:
+        """Stiffness of each; rounded to single where the engine would round it."""
+        k = MASS * (self.turn / STEP) ** 2
+        return np.asarray(k.astype(np.float32).astype(np.float64) if self.single else k)
+
+    @property
+    def true_turn(self) -> Extended:
+        """h w of the stiffnesses that the engine is given."""
+        return np.asarray(STEP * np.sqrt(self.k.astype(np.longdouble) / MASS))
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """How the label's platform rounds."""
+    return engines.load(label.engine).arithmetic(label)
+
+
+def noise(label: Label) -> float:
+    """Relative rounding of an entry of a propagator: all roundings of one step, of one sign."""
+    how = arithmetic(label)
+    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    return schemes.roundings(scheme) * (max(how.state, how.force) + how.quantum / FORCE)
+
+
+def scene(
+    springs: Springs, q: Floats, p: Floats, *, copies: int = 1, steps: int = 1, every: int = 1
+) -> Scene:
+    """A scene of `copies` of these springs, one set behind the other, from q, p (copies * n,)."""
+    n = copies * len(springs.turn)
+    k = np.tile(springs.k, copies)
+    requires = engines.method(springs.label).requires
+    fast = "springs marked fast" in requires
+    terms: list[Term] = [mechanics.WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
+    if np.any(springs.brake) or "damping" in requires:
+        c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
+        terms.append(mechanics.Damping(i=np.arange(n), c=c, m=np.full(n, MASS)))
+    return Scene(
+        name="scan",
+        title="springs side by side",
+        source="springcheck",
+        m=np.full(n, MASS),
+        q=q,
+        p=p,
+        terms=tuple(terms),
+        step=STEP,
+        steps=steps,
+        every=every,
+        quantities=("q", "p"),
+    )
+
+
+def units(springs: Springs) -> tuple[Floats, Floats]:
+    """Units of position and momentum of each spring: A = FORCE/k and m w A."""
+    a = FORCE / springs.k
+    return a, MASS * (np.asarray(springs.true_turn, np.float64) / STEP) * a
+
+
+def measured(springs: Springs) -> Floats:
+    """The engine's own one-step matrices (n, 2, 2); not a number where a step does not end finite."""
+    n = len(springs.turn)
+    of_q, of_p = units(springs)
+    none = np.zeros(n)
+    start = scene(springs, np.concatenate([of_q, none]), np.concatenate([none, of_p]), copies=2)
+    run = simulate.run(start, springs.label)
+    out = np.full((n, 2, 2), np.nan)
+    if len(run.t) == 2:
+        out[:, 0, :] = run.q[1].reshape(2, n).T / of_q[:, None]
+        out[:, 1, :] = run.p[1].reshape(2, n).T / of_p[:, None]
+    elif n > 1:
+        # an engine that gives up over one spring takes the others with it: halves find which
+        for half in (slice(None, n // 2), slice(n // 2, None)):
+            brake = springs.brake if np.ndim(springs.brake) == 0 else np.asarray(springs.brake)[half]
+            out[half] = measured(Springs(label=springs.label, turn=springs.turn[half], brake=brake))
+    return out
+
+
+def theory(springs: Springs) -> Extended:
+    """The scheme's one-step matrices (n, 2, 2), extended precision."""
+    scheme = schemes.SCHEMES[engines.method(springs.label).scheme]
+    k = springs.k.astype(np.longdouble)
+    friction = np.broadcast_to(springs.brake, springs.turn.shape) * np.longdouble(MASS / STEP)
+    out = schemes.matrix(scheme, h=STEP, m=np.full(len(k), MASS), k=k, c=friction)
+    w = springs.true_turn / STEP
+    out[:, 0, 1] *= MASS * w
+    out[:, 1, 0] /= MASS * w
+    return out
+
+
+def radius(matrices: Floats | Extended, rounding: float) -> tuple[Floats, Floats]:
+    """Spectral radii (n,) of 2 x 2 matrices, and how far rounding of the entries can move each.
+
+    Where the discriminant is within its rounding of 0 the two eigenvalues are taken for equal: at an
+    edge of stability a change of eps in the trace would move them by sqrt(eps).
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1]
+    c, d = matrices[:, 1, 0], matrices[:, 1, 1]
+    with np.errstate(over="ignore", invalid="ignore"):
+        half, size = (a + d) / 2, np.abs(a * d) + np.abs(b * c)
+        determinant = a * d - b * c
+        discriminant = half * half - determinant
+        near = np.abs(discriminant) <= 4 * rounding * (half * half + size)
+        root = np.sqrt(np.where(near, 0, np.abs(discriminant)))
+        turning = near | (discriminant < 0)
+        found = np.where(turning, np.sqrt(np.abs(determinant)), np.abs(half) + root)
+        safe = np.maximum(found, np.finfo(np.float64).tiny)
+        of_turning = rounding * size / safe
+        of_real = rounding * (np.abs(a) + np.abs(d)) + rounding * (half * half + size) / np.maximum(
+            root, 1e-300
+        )
+        moved = np.where(turning, of_turning, of_real)
+    return np.asarray(found, np.float64), np.asarray(moved, np.float64)
+
+
+def bounded(matrices: Floats | Extended, rounding: float) -> np.ndarray:
+    """Whether powers of each matrix stay bounded, to rounding of its entries; what is not finite does not."""
+    found, moved = radius(matrices, rounding)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0))
+
+
+def one_step_labels(labels: tuple[Label, ...]) -> tuple[Label, ...]:
+    """Those that have a one-step map and move particles on springs."""
+    return tuple(
+        label
+        for label in labels
+        if schemes.SCHEMES[engines.method(label).scheme].one_step
+        and "wall-spring" in engines.method(label).terms
+    )
+
+
+def absence(label: Label) -> str | None:
+    """Why a label cannot be measured here: its library or its platform is missing."""
+    reason = engines.absence(label.engine)
+    if reason:
+        return reason
+    try:
+        springs = Springs(label=label, turn=np.array([0.5]))
+        a, _ = units(springs)
+        simulate.run(scene(springs, a, np.zeros(1)), label)
+    except MethodError as error:
+        return str(error)
+    return None

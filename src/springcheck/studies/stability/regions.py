@@ -1,0 +1,97 @@
+"""The region of stability of a damped spring in the plane of h w and the damping ratio c / (2 sqrt(k m))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck import engines
+from springcheck.model import Floats, Label
+from springcheck.studies.stability import propagators
+from springcheck.studies.stability.propagators import Springs
+
+TURN = (0.05, 20.0)
+"""h w from and to."""
+
+RATIO_FROM = 0.025
+"""The smallest damping ratio; the largest follows, because both axes have the same ratio of neighbours."""
+
+UNIFORM = frozenset({"openmm:langevin-middle"})
+"""Methods with one friction rate for all particles of a run."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Region:
+    """Measured and predicted spectral radii on a grid."""
+
+    method: str
+    turn: Floats
+    """h w (i,)."""
+    ratio: Floats
+    """Damping ratio (j,)."""
+    radius: Floats
+    """Measured (j, i)."""
+    radius_predicted: Floats
+    stable: np.ndarray
+    stable_predicted: np.ndarray
+    """Theory without the allowance for rounding that `stable` has."""
+    off: float
+    """Largest distance of the radii, in units of what rounding of the propagator's entries can do."""
+    undecided: int
+    """Points at which rounding of the entries decides: theory is within it of the border."""
+    wrong: int
+    """Points, not among these, at which measurement and theory disagree."""
+
+    @property
+    def points(self) -> int:
+        """How many were measured."""
+        return int(self.radius.size)
+
+
+def measure(label: Label, points: int = 200) -> Region:
+    """Measure points * points damped springs: one run, or one for each friction rate where a run has one."""
+    turn = np.geomspace(*TURN, points)
+    ratio = RATIO_FROM * turn / turn[0]
+    row, column = (x.ravel() for x in np.indices((points, points)))
+    brake = 2 * ratio[row] * turn[column]
+    measured = np.empty((points * points, 2, 2))
+    if str(label).partition("@")[0] in UNIFORM:
+        # on axes of the same ratio the rate 2 ratio h w is constant where row + column is
+        for total in range(2 * points - 1):
+            these = np.flatnonzero(row + column == total)
+            rate = float(brake[these[0]])
+            brake[these] = rate
+            measured[these] = propagators.measured(Springs(label=label, turn=turn[column[these]], brake=rate))
+    else:
+        measured[:] = propagators.measured(Springs(label=label, turn=turn[column], brake=brake))
+    predicted = propagators.theory(Springs(label=label, turn=turn[column], brake=brake))
+    rounding = propagators.noise(label)
+    radius, moved = propagators.radius(measured, rounding)
+    truth, moved_truth = propagators.radius(predicted, rounding)
+    allowed = np.maximum(moved, moved_truth)
+    # what may differ in the product h c/m of a friction of many steps is its own rounding
+    allowed += rounding * (1 + brake)
+    stable = propagators.bounded(measured, rounding)
+    inside = truth <= 1
+    undecided = np.abs(truth - 1) <= allowed
+    shape = (points, points)
+    return Region(
+        method=str(label),
+        turn=turn,
+        ratio=ratio,
+        radius=radius.reshape(shape),
+        radius_predicted=truth.reshape(shape),
+        stable=stable.reshape(shape),
+        stable_predicted=inside.reshape(shape),
+        off=float(np.max(np.abs(radius - truth) / allowed)),
+        undecided=int(np.count_nonzero(undecided)),
+        wrong=int(np.count_nonzero((stable != inside) & ~undecided)),
+    )
+
+
+def labels(given: tuple[Label, ...]) -> tuple[Label, ...]:
+    """Those that have a one-step map and know friction."""
+    return tuple(
+        label for label in propagators.one_step_labels(given) if "damping" in engines.method(label).terms
+    )

@@ -1,0 +1,151 @@
+"""The resonances of multiple time steps: where r-RESPA grows although both of its steps are short enough.
+
+A slow kick every half turn of the fast spring finds it always at the same phase.  The bands are measured
+on copies of a chain in one run: every copy has all stiffnesses scaled by one factor, which is the same as
+another step.  Biesiadecki & Skeel, J. Comput. Phys. 109 (1993) 318.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from springcheck import engines, exact, mechanics, schemes, simulate
+from springcheck.errors import SceneError
+from springcheck.model import Extended, Floats, Label, Reals, Scene, Term
+
+TURN = (1.0, 7.0)
+"""h w of the fast spring, from and to."""
+
+COPIES = 1200
+"""Copies of the chain in the first scan: a band of 0.01 holds two of them."""
+
+GROWTH = 1e-7
+"""Growth per step from which a step counts as growing: eigenvalues of a 4 x 4 matrix that are nearly equal
+are known to the square root of the rounding only."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Resonance:
+    """Spectral radii along h w of the fast spring, and the bands in which they exceed 1."""
+
+    method: str
+    scene: str
+    turn: Floats
+    radius: Floats
+    radius_predicted: Floats
+    bands: tuple[tuple[float, float], ...]
+    bands_predicted: tuple[tuple[float, float], ...]
+
+
+def fast_frequency(scene: Scene) -> float:
+    """Angular frequency of the scene's fastest mode with its fast springs alone [1/T]."""
+    _, fast = mechanics.split(scene.terms)
+    return float(np.sqrt(np.max(exact.modes(replace(scene, terms=fast)).w2)))
+
+
+def measure(scene: Scene, label: Label) -> Resonance:
+    """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
+    reason = engines.refusal(scene, label)
+    if reason:
+        raise SceneError(f"{label}: {reason}")
+    turn = np.linspace(*TURN, COPIES)
+    radius = radii(scene, label, turn, _by_engine)
+    predicted = radii(scene, label, turn, _by_scheme)
+    return Resonance(
+        method=str(label),
+        scene=scene.name,
+        turn=turn,
+        radius=radius,
+        radius_predicted=predicted,
+        bands=_bands(turn, radius, lambda x: radii(scene, label, x, _by_engine)),
+        bands_predicted=_bands(turn, predicted, lambda x: radii(scene, label, x, _by_scheme)),
+    )
+
+
+Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
+
+
+def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
+    """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
+    n, copies = scene.n, len(turn)
+    scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
+    # one set of copies for each unit vector, in coordinates in which q and p/(m w) are alike
+    w = fast_frequency(scene) * np.sqrt(scale)
+    q, p = np.zeros((2 * n, copies, n)), np.zeros((2 * n, copies, n))
+    for i in range(n):
+        q[i, :, i] = 1
+        p[n + i, :, i] = scene.m[i] * w
+    size = 2 * n * copies
+    many = replace(
+        scene,
+        m=np.tile(scene.m, size),
+        q=q.ravel(),
+        p=p.ravel(),
+        terms=tuple(_copied(term, n, np.tile(scale, 2 * n)) for term in scene.terms),
+        steps=1,
+        every=1,
+    )
+    after_q, after_p = stepper(many, label)
+    x = np.asarray(after_q).reshape(2 * n, copies, n)
+    y = np.asarray(after_p).reshape(2 * n, copies, n) / (scene.m * w[:, None])
+    matrices = np.concatenate([x, y], axis=-1).transpose(1, 2, 0)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices.astype(np.float64))), axis=-1))
+
+
+def _copied(term: Term, n: int, scale: Floats) -> Term:
+    """A term's springs once for each copy, the j-th with its stiffness times scale[j], at rest in 0."""
+    shift = n * np.arange(len(scale))[:, None]
+    if isinstance(term, mechanics.WallSpring):
+        i = (term.i + shift).ravel()
+        return replace(term, i=i, k=np.outer(scale, term.k).ravel(), at=np.zeros(len(i)))
+    if isinstance(term, mechanics.Spring):
+        a, b = (term.a + shift).ravel(), (term.b + shift).ravel()
+        return replace(term, a=a, b=b, k=np.outer(scale, term.k).ravel(), rest=np.zeros(len(a)))
+    raise SceneError(f"a scan of resonances knows springs only, not {term.key!r}")
+
+
+def _by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
+    run = simulate.run(scene, label)
+    return run.q[1], run.p[1]
+
+
+def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
+    slow, fast = mechanics.split(scene.terms)
+    law: dict[str, Any] = {"parts": (mechanics.force(slow), mechanics.force(fast))}
+    q, p = schemes.step(
+        schemes.SCHEMES[engines.method(label).scheme],
+        scene.q.astype(np.longdouble),
+        scene.p.astype(np.longdouble),
+        h=scene.step,
+        m=scene.m,
+        force=mechanics.force(scene.terms),
+        **law,
+    )
+    return np.asarray(q, np.longdouble), np.asarray(p, np.longdouble)
+
+
+def _bands(
+    turn: Floats, radius: Floats, again: Callable[[Floats], Floats]
+) -> tuple[tuple[float, float], ...]:
+    """Edges of the runs of growing points, refined until they are known to 1e-9."""
+    growing = radius > 1 + GROWTH
+    edges = np.flatnonzero(growing[1:] != growing[:-1])
+    found = [_edge(turn[j], turn[j + 1], again) for j in edges]
+    if growing[0]:
+        found.insert(0, float(turn[0]))
+    if growing[-1]:
+        found.append(float(turn[-1]))
+    return tuple(zip(found[::2], found[1::2], strict=True))
+
+
+def _edge(low: float, high: float, again: Callable[[Floats], Floats]) -> float:
+    while high - low > 1e-9:
+        turn = np.linspace(low, high, 66)
+        growing = again(turn) > 1 + GROWTH
+        j = int(np.flatnonzero(growing[1:] != growing[:-1])[0])
+        low, high = float(turn[j]), float(turn[j + 1])
+    return (low + high) / 2

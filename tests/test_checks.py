@@ -1,0 +1,160 @@
+"""The checks of recorded trajectories: no alarm on a right engine, at any scene and in any piece of a run;
+bounds that are tight; and an answer, never an exception, where a check does not apply."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, mechanics, scenes, schemes
+from springcheck.faults import clean, steppers
+from springcheck.model import Arithmetic, Scene, Trajectory, Verdict
+
+Need = Callable[[str], None]
+
+PLAIN = [
+    name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow and not s.mixes
+]  # fmt: skip
+ENGINES = [
+    "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:verlet", "openmm:leapfrog",
+    "openmm:euler", "openmm:semi-implicit-euler", "ase:velocity-verlet",
+]  # fmt: skip
+
+
+def plain(scene: Scene, name: str) -> Trajectory:
+    scheme = schemes.SCHEMES[name]
+    return steppers.record(scene, scheme, steppers.textbook(scene, scheme))
+
+
+def alarms(verdicts: list[Verdict]) -> list[str]:
+    return [f"{v.check} {v.value:.3g} of {v.bound:.3g}" for v in verdicts if v.passed is False]
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_no_check_rejects_the_textbook_step_on_random_scenes(name: str) -> None:
+    for seed in range(12):
+        scene = clean.random_scene(np.random.default_rng([1, seed]))
+        assert alarms(checks.judge(scene, plain(scene, name))) == [], seed
+
+
+@pytest.mark.parametrize("label", ENGINES)
+def test_no_check_rejects_an_engine_on_random_scenes(label: str, need: Need) -> None:
+    need(label)
+    for seed in range(12):
+        scene = clean.random_scene(np.random.default_rng([2, seed]), steps=60)
+        assert alarms(checks.judge(scene, springcheck.run(scene, label))) == [], seed
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-euler", "rk4"])
+def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
+    for seed in range(8):
+        rng = np.random.default_rng([3, seed])
+        scene = clean.random_scene(rng)
+        run = plain(scene, name)
+        size = int(rng.integers(2, 30))
+        pieces = []
+        for first in range(0, len(run.t), size):
+            part = slice(first, first + size + 1)
+            piece = replace(run, t=run.t[part], q=run.q[part], p=run.p[part], energy=run.energy[part])
+            pieces.append(checks.judge(scene, piece))
+        assert alarms(checks.worst(pieces)) == [], seed
+
+
+def test_a_slip_between_two_pieces_shows_in_the_closed_form_of_those_after_it() -> None:
+    scene = replace(scenes.load_scene("spring-uneven"), steps=100)
+    run = plain(scene, "velocity-verlet")
+    late = slice(50, None)
+    q = run.q[late] + 1e-11
+    piece = replace(run, t=run.t[late], q=q, p=run.p[late], energy=mechanics.energy(scene, q, run.p[late]))
+    assert any(alarm.startswith("closed-form") for alarm in alarms(checks.judge(scene, piece)))
+
+
+def test_the_step_defect_s_bound_is_within_a_thousand_times_of_what_is_seen() -> None:
+    ratios = []
+    for seed in range(40):
+        scene = replace(clean.random_scene(np.random.default_rng([4, seed])), every=1)
+        for v in checks.judge(scene, plain(scene, "velocity-verlet"), [checks.CHECKS[3]]):
+            assert v.check == "step-defect"
+            ratios.append(v.bound / v.value)
+    assert np.median(ratios) < 100
+    assert max(ratios) < 1e4
+
+
+@pytest.mark.parametrize(("precision", "steps"), [("double", 200), ("mixed", 200), ("single", 200)])
+def test_the_arithmetic_of_opencl_is_the_one_it_is_said_to_have(
+    precision: str, steps: int, need: Need
+) -> None:
+    label = f"openmm:verlet@OpenCL-{precision}"
+    need(label)
+    seen = []
+    for seed in range(6):
+        scene = clean.random_scene(np.random.default_rng([6, seed]), decades=1.5, steps=steps)
+        run = springcheck.run(scene, label) if scene.step > 0 else None
+        if run is None or np.max(mechanics.magnitude(scene.terms)(run.q, run.p)) > run.arithmetic.overflow:
+            continue
+        verdicts = checks.judge(scene, run)
+        assert alarms(verdicts) == [], seed
+        seen += [v for v in verdicts if v.check == "arithmetic" and v.passed is not None]
+    assert seen
+
+
+def test_fixed_point_forces_lose_up_to_one_quantum_for_each_spring_and_no_more(need: Need) -> None:
+    label = "openmm:verlet@OpenCL-double"
+    need(label)
+    scene = scenes.load_scene("chain")
+    case = checks.Case(trajectory=springcheck.run(scene, label), scene=scene)
+    lost = np.max(np.abs(case.next_states[1] - case.trajectory.p[1:])) / scene.step / 2.0**-32
+    # two springs pull at each particle, and what is cut off is spread evenly below one quantum
+    assert 1 < lost < 2
+
+
+def test_an_arithmetic_that_cannot_show_is_not_judged() -> None:
+    scene = clean.scene(
+        np.array([1.7]), (clean.walls(np.zeros(1), np.zeros(1)),), np.ones(1), np.ones(1), step=0.1, steps=50
+    )
+    fixed = Arithmetic(name="fixed", quantum=2.0**-32)
+    run = replace(plain(scene, "velocity-verlet"), arithmetic=fixed)
+    verdict = next(v for v in checks.judge(scene, run) if v.check == "arithmetic")
+    assert verdict.passed is None
+
+
+def test_a_trajectory_of_one_frame_is_judged_without_an_exception() -> None:
+    for name in ("spring", "chain"):
+        scene = scenes.load_scene(name)
+        run = plain(scene, "velocity-verlet")
+        first = replace(run, t=run.t[:1], q=run.q[:1], p=run.p[:1], energy=run.energy[:1])
+        verdicts = checks.judge(scene, first)
+        assert alarms(verdicts) == []
+        assert next(v for v in verdicts if v.check == "step-defect").passed is None
+
+
+def test_what_is_not_a_number_passes_no_check() -> None:
+    scene = scenes.load_scene("spring-uneven")
+    run = plain(scene, "velocity-verlet")
+    q = run.q.copy()
+    q[7] = np.nan
+    verdicts = {v.check: v.passed for v in checks.judge(scene, replace(run, q=q))}
+    assert verdicts["step-defect"] is False
+    assert verdicts["closed-form"] is False
+
+
+def test_a_large_step_of_an_inverted_spring_can_turn_backwards() -> None:
+    """Forest-Ruth goes back on part of its way; on an inverted spring M_qp < 0 and the map turns there."""
+    found = 0
+    for hw in np.linspace(1.6, 2.0, 20):
+        scene = clean.scene(
+            np.array([3.7]),
+            (clean.walls(np.array([-2.9]), np.array([0.4])),),
+            np.array([1.1]),
+            np.array([0.7]),
+            step=hw / np.sqrt(2.9 / 3.7),
+            steps=60,
+        )
+        one = schemes.matrix(schemes.SCHEMES["forest-ruth"], h=scene.step, m=scene.m, k=-np.array([2.9]))
+        found += bool(one[0, 0, 1] < 0)
+        assert alarms(checks.judge(scene, plain(scene, "forest-ruth"))) == []
+    assert found

@@ -1,0 +1,132 @@
+"""The experiments: they pass right engines, name what does not apply, and find what they are made to find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+from springcheck import checks, mechanics, scenes, schemes, simulate
+from springcheck.checks import experiments, laws
+from springcheck.errors import MethodError
+from springcheck.faults import clean, steppers
+from springcheck.model import Scene, Trajectory
+
+Need = Callable[[str], None]
+
+ENGINES = [
+    "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:verlet", "openmm:leapfrog",
+    "openmm:euler", "openmm:semi-implicit-euler", "ase:velocity-verlet", "sundials:adams", "sundials:bdf",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("label", ENGINES)
+def test_every_engine_passes_every_experiment_that_applies(label: str, need: Need) -> None:
+    need(label)
+    verdicts = checks.judge_thoroughly(scenes.load_scene("spring-uneven"), label, simulate.run)
+    assert [v for v in verdicts if v.passed is False] == []
+    assert sum(v.passed is True for v in verdicts) >= 2
+    assert all(v.why for v in verdicts)
+
+
+def plain(name: str) -> checks.Run:
+    scheme = schemes.SCHEMES[name]
+    return lambda scene, label: steppers.record(scene, scheme, steppers.textbook(scene, scheme), label=label)
+
+
+@pytest.mark.parametrize("name", ["ruth3", "forest-ruth", "yoshida4", "rk2-heun", "rk4", "implicit-midpoint"])
+def test_schemes_of_every_order_pass_every_experiment(name: str) -> None:
+    verdicts = checks.judge_thoroughly(scenes.load_scene("chain"), name, plain(name))
+    assert [v for v in verdicts if v.passed is False] == []
+    found = {v.check: v for v in verdicts}
+    assert found["order"].passed is True
+    assert found["order-anharmonic"].passed is True
+
+
+def test_a_method_that_cannot_serve_an_experiment_s_scene_is_not_judged_by_it() -> None:
+    def run(scene: Scene, label: str) -> Trajectory:
+        raise MethodError("it has no such term")
+
+    verdicts = checks.judge_thoroughly(scenes.load_scene("spring"), "none:at-all", run)
+    assert {v.passed for v in verdicts} == {None}
+    assert {v.why for v in verdicts} == {"it has no such term"}
+    assert [v.check for v in verdicts] == [checks.name(check) for check in checks.THOROUGH]
+
+
+def test_the_reference_of_the_well_agrees_with_its_elliptic_function() -> None:
+    """q = A cn(W t - u0 | 1/2) with A**4 = 4 E/b and W = A sqrt(b/m): another route to the same number."""
+    mpmath.mp.dps = 40
+    m, b = (mpmath.mpf(float(x[0])) for x in (laws.WELL.m, laws.WELL.terms[0].b))
+    q0, p0 = (mpmath.mpf(float(x[0])) for x in (laws.WELL.q, laws.WELL.p))
+    half = mpmath.mpf(1) / 2
+    amplitude = (4 * (p0**2 / (2 * m) + b * q0**4 / 4) / b) ** (half / 2)
+    w = amplitude * mpmath.sqrt(b / m)
+    u = w * mpmath.mpf(float(laws.DURATION)) - mpmath.ellipf(mpmath.acos(q0 / amplitude), half)
+    true = amplitude * mpmath.ellipfun("cn", u, m=half)
+    slope = -m * amplitude * w * mpmath.ellipfun("sn", u, m=half) * mpmath.ellipfun("dn", u, m=half)
+    q, p = laws.extrapolated(laws.WELL, laws.DURATION)
+    # seven levels of extrapolation enlarge the rounding of long double some tenfold
+    assert abs(mpmath.mpf(str(q[0])) - true) < 2e-17
+    assert abs(mpmath.mpf(str(p[0])) - slope) < 2e-17
+
+
+def test_symmetric_schemes_are_those_that_are_their_own_adjoint() -> None:
+    found = {name for name, s in schemes.SCHEMES.items() if s.one_step and experiments.symmetric(s)}
+    assert {"velocity-verlet", "position-verlet", "implicit-midpoint", "trapezoidal", "forest-ruth"} <= found
+    assert not {"explicit-euler", "implicit-euler", "semi-implicit-euler", "ruth3", "rk4"} & found
+
+
+def test_openmm_s_rebuilt_velocity_drifts_as_its_arithmetic_implies(need: Need) -> None:
+    """h fl(1/h) - 1 = -8.9e-17 a step at h = 0.013, nothing at h = 2**-7; without the prediction it fails."""
+    need("openmm:verlet")
+    bench = checks.Bench(scene=scenes.load_scene("spring-uneven"), label="openmm:verlet", run=simulate.run)
+    assert laws.rounding_bias(bench).passed is True
+    run = bench.once(laws.ensemble(laws.ODD))
+    assert laws.predicted_drift(run) == pytest.approx(-8.88e-17, rel=1e-2)
+    assert laws.predicted_drift(bench.once(laws.ensemble(laws.EVEN))) == 0.0
+
+    def silent(scene: Scene, label: str) -> Trajectory:
+        return replace(simulate.run(scene, label), rebuilds_velocity=False)
+
+    unexplained = checks.Bench(scene=bench.scene, label="openmm:verlet", run=silent)
+    assert laws.rounding_bias(unexplained).passed is False
+
+
+def test_a_power_law_with_its_second_term_is_fitted_to_its_order() -> None:
+    h = [0.2 / 2**j for j in range(6)]
+    error = [3.1 * x**3 * (1 + 0.8 * x) for x in h]
+    slope, se, rounding = laws.fitted(h, error, [0.0] * 6, second=1)
+    assert abs(slope - 3) < laws.T_THREE * se
+    assert se < 1e-3
+    assert rounding == 0.0
+
+
+def test_copies_of_a_scene_do_not_act_on_each_other() -> None:
+    from springcheck.checks.bench import replicated
+
+    chain = scenes.load_scene("chain")
+    many = replicated(chain, 3)
+    one = mechanics.force(chain.terms)(chain.q, chain.p)
+    q = np.concatenate([chain.q, chain.q + 0.1, chain.q])
+    three = mechanics.force(many.terms)(q, np.zeros(9))
+    assert np.array_equal(three[:3], one)
+    assert np.array_equal(three[6:], one)
+    assert not np.array_equal(three[3:6], one)
+
+
+def test_an_anharmonic_scene_has_no_matrix_but_turns_back() -> None:
+    scene = replace(laws.WELL, step=0.05, steps=100, quantities=("q", "p", "energy"))
+    verdicts = {v.check: v for v in checks.judge_thoroughly(scene, "plain", plain("velocity-verlet"))}
+    assert verdicts["propagator"].passed is None
+    assert verdicts["reversibility"].passed is True
+
+
+def test_a_free_chain_and_an_inverted_spring_pass_the_experiments() -> None:
+    for seed in range(30):
+        scene = clean.random_scene(np.random.default_rng([5, seed]))
+        quick = [e for e in checks.THOROUGH if e.__module__.endswith("experiments")]
+        verdicts = checks.judge_thoroughly(scene, "plain", plain("velocity-verlet"), quick)
+        assert [v for v in verdicts if v.passed is False] == [], seed

@@ -1,0 +1,97 @@
+"""The atlas of extreme cases: no cell is silently wrong, and one that is made wrong is found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springcheck import engines
+from springcheck.studies import extremes
+from springcheck.studies.extremes import grid, judging, refusals, running
+
+Need = Callable[[str], None]
+METHODS = [str(label) for label in engines.match(("*",)) if "wall-spring" in engines.method(label).terms]
+GPU = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
+
+
+@pytest.mark.parametrize("name", [*METHODS, *GPU])
+def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
+    need(name)
+    atlas = extremes.measure([name], quick=True)
+    assert not atlas.wrong, atlas.wrong[:3]
+    assert len(atlas.cells) >= 100
+    assert atlas.counts()["right"] >= 20
+
+
+def test_the_whole_grid_has_two_thousand_cells_for_three_methods_alone() -> None:
+    assert 3 * len(grid.specs()) >= 2000
+
+
+def test_fixed_point_forces_have_their_window(need: Need) -> None:
+    need("openmm:verlet@OpenCL-double")
+    cells = extremes.of_method(engines.parse("openmm:verlet@OpenCL-double"))
+    (window,) = extremes.windows(cells)
+    # 2**-32 of resolution leaves single precision from 2**-8 on; beyond 2**31 the sum overflows
+    assert 1e-3 <= window.low <= 1e-2
+    assert 1e8 <= window.high <= 1e9
+    assert "right for forces between 1e-2 and 1e8" in window.sentence
+
+
+def broken(change: Callable[[Any, Any], None], monkeypatch: pytest.MonkeyPatch) -> list[judging.Cell]:
+    """Cells of an engine whose numbers are changed behind its back."""
+    right = running.raw
+
+    def wrong(scene: Any, label: Any) -> Any:
+        q, p, said = right(scene, label)
+        change(q, p)
+        return q, p, said
+
+    monkeypatch.setattr(running, "raw", wrong)
+    specs = [spec for spec in grid.specs() if spec.block == "force"]
+    return running.cells(engines.parse("own:semi-implicit-euler"), specs)
+
+
+def test_a_step_that_is_a_little_off_is_silently_wrong_in_every_normal_cell(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def change(q: Any, p: Any) -> None:
+        with np.errstate(all="ignore"):
+            q[7] *= 1 + 1e-13
+
+    cells = broken(change, monkeypatch)
+    wrong = [cell for cell in cells if cell.outcome == "silently wrong"]
+    assert len(wrong) > 0.9 * len(cells)
+
+
+def test_a_nan_in_an_ordinary_cell_is_silently_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    def change(q: Any, p: Any) -> None:
+        q[7] = np.nan
+
+    cells = broken(change, monkeypatch)
+    ordinary = [cell for cell in cells if 1e-30 < cell.parameters["force"] < 1e30]
+    assert {cell.outcome for cell in ordinary if cell.parameters["h_w"] < 3} == {"silently wrong"}
+
+
+def test_bad_input_is_refused_with_a_reason() -> None:
+    cells = refusals.cells()
+    assert len(cells) >= 25
+    assert {cell.outcome for cell in cells} == {"refused"}
+    assert all(cell.reason and "Traceback" not in cell.reason for cell in cells)
+
+
+def test_the_document_has_the_promised_fields() -> None:
+    atlas = extremes.measure(["own:implicit-euler"], quick=True)
+    found = json.loads(json.dumps(extremes.document(atlas), allow_nan=False))
+    fields = {"method", "parameters", "outcome", "reason", "value", "bound"}
+    assert all(fields <= set(cell) for cell in found["cells"])
+    assert found["windows"][0]["sentence"].startswith("springcheck (own:implicit-euler): right for forces")
+
+
+def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() -> None:
+    spec = grid.Spec(block="step", m=3.7, k=0.0, q=0.8, p=0.0, h=3e300)
+    (cell,) = running.cells(engines.parse("own:implicit-euler"), [spec])
+    assert cell.outcome == "right"

@@ -1,0 +1,144 @@
+"""Negative controls: every fault is rejected by the checks that must reject it, every check has a fault that
+it rejects, and relative errors of 1e-12 in stiffness, mass or step are seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import springcheck
+from springcheck import checks, scenes, simulate
+from springcheck.faults import FAULTS, Fault, Result, examine, trial
+from springcheck.faults.seeded import stiffer
+
+Need = Callable[[str], None]
+
+
+@cache
+def result(fault: Fault) -> Result:
+    return examine(fault, limits=False)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) -> None:
+    assert fault.caught_by
+    assert result(fault).missed_by == ()
+
+
+def test_every_check_rejects_a_fault_that_it_must_reject() -> None:
+    named = {check for fault in FAULTS for check in fault.caught_by}
+    every = {checks.name(check) for check in (*checks.CHECKS, *checks.THOROUGH)}
+    assert named == every
+
+
+def test_there_are_at_least_thirty_faults_of_different_names() -> None:
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS) >= 30
+
+
+@pytest.mark.parametrize("name", ["stiffness", "mass", "step"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_relative_errors_from_1e12_up_are_rejected_by_the_step_and_the_motion(name: str, sign: int) -> None:
+    fault = next(fault for fault in FAULTS if fault.name == name)
+    scene = trial.scene("spring")
+    for decade in range(-12, -1):
+        run = fault.run(scene, size=sign * 10.0**decade)
+        failed = {v.check for v in checks.judge(scene, run) if v.passed is False}
+        assert {"step-defect", "closed-form", "frequency"} <= failed, decade
+
+
+@pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:verlet", "openmm:leapfrog"])
+def test_an_engine_that_was_given_a_spring_1e12_too_stiff_is_rejected(label: str, need: Need) -> None:
+    need(label)
+    scene = scenes.load_scene("spring-uneven")
+    run = simulate.run(stiffer(scene, 1 + 1e-12), label)
+    failed = {v.check for v in checks.judge(scene, run) if v.passed is False}
+    # the energies stored are those of the stiffer spring
+    assert "step-defect" in failed
+
+
+def test_a_limit_is_the_smallest_size_that_is_seen() -> None:
+    fault = next(fault for fault in FAULTS if fault.name == "friction")
+    limits = examine(fault).limits
+    assert limits["step-defect"] < 1e-14
+    scene = trial.scene(fault.scene)
+    for factor, seen in ((1.05, True), (0.5, False)):
+        run = fault.run(scene, size=factor * limits["step-defect"])
+        verdict = next(v for v in checks.judge(scene, run) if v.check == "step-defect")
+        assert (verdict.passed is False) == seen
+    # no step shows a friction of a rounding, but 4096 of 256 springs do
+    assert limits["rounding-bias"] < 2.0**-53
+
+
+def test_clean_scenes_raise_no_alarm_and_are_counted() -> None:
+    parts = [trial.clean_scene(seed) for seed in range(24)]
+    assert [alarm for part in parts for alarm in part.alarms] == []
+    assert sum(part.runs for part in parts) == 24
+    assert all(part.verdicts >= 5 for part in parts)
+
+
+def test_a_broken_engine_among_the_clean_ones_is_a_false_alarm_that_is_reported() -> None:
+    fault = next(fault for fault in FAULTS if fault.name == "friction")
+    found = trial.clean_engine(fault.run, "friction", 0)
+    assert found.alarms
+
+
+def test_the_report_is_one_json_document() -> None:
+    results = tuple(result(fault) for fault in FAULTS[:3])
+    report = trial.FaultReport(results=results, clean=trial.Clean(runs=3, verdicts=30, alarms=()))
+    document = json.loads(json.dumps(report.document(), allow_nan=False))
+    assert document["clean_runs"] == 3
+    assert document["false_alarms"] == []
+    assert document["faults"][0]["rejected_by"]
+    assert report.sound
+    missed = replace(results[0], missed_by=("step-defect",))
+    assert not replace(report, results=(missed,)).sound
+
+
+def test_a_fault_that_only_the_rounding_law_sees_passes_everything_else() -> None:
+    assert set(result(next(f for f in FAULTS if f.name == "cut-off")).rejected_by) == {
+        "rounding-bias",
+        "rounding-growth",
+    }
+
+
+def test_the_package_exposes_its_scenes_to_a_plain_run() -> None:
+    scene = trial.scene("spring")
+    assert [v for v in checks.judge(scene, springcheck.run(scene, "own:euler")) if v.passed is False] == []
+
+
+def test_faults_of_the_command_line_print_one_document(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from springcheck import cli
+
+    few = FAULTS[:2]
+    monkeypatch.setattr(trial, "FAULTS", few)
+    monkeypatch.setattr(trial, "CLEAN", 20)
+    monkeypatch.setattr(trial, "BY_ENGINES", 0)
+    monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert cli.main(["faults", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
+    assert document["limits"]["stiffness"]["step-defect"] < 1e-14
+    assert document["clean_runs"] == 21
+    assert cli.main(["faults"]) == 0
+    assert "2 of 2 faults rejected" in capsys.readouterr().out
+
+
+def test_a_thorough_run_reports_its_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from springcheck import cli
+
+    store = str(tmp_path / "s.h5")
+    arguments = ["run", "spring-uneven", "--method", "own:semi-implicit-euler", "-o", store]
+    assert cli.main([*arguments, "--thorough"]) == 0
+    out = capsys.readouterr().out
+    assert "Experiments with laws" in out
+    assert max(map(len, out.splitlines())) <= 100
+    assert cli.main([*arguments, "--force"]) == 0
+    assert "Experiments" not in capsys.readouterr().out

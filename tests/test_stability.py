@@ -1,0 +1,126 @@
+"""Limits, damped regions and resonances lie where theory puts them; what is put elsewhere is seen.
+
+Limits: 1e-6 in double precision; in single, four roundings of one step (`limits.measure`).  Resonances:
+1e-6 against edges found in mpmath at 120 digits.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import engines, scenes, schemes
+from springcheck.model import Extended
+from springcheck.studies import stability
+from springcheck.studies.stability import costs, limits, propagators, regions, resonance
+from springcheck.studies.stability.propagators import Springs
+
+LABELS = [str(label) for label in propagators.one_step_labels(engines.match(("*",)))]
+SINGLE = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
+REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "stiff" / "multiple-time-steps.json"
+Need = Callable[[str], None]
+
+
+@pytest.mark.parametrize("name", LABELS)
+def test_the_limit_is_that_of_the_scheme_to_1e_6(name: str, need: Need) -> None:
+    need(name)
+    found = limits.measure(engines.parse(name))
+    assert found.bound <= 1e-6 or found.theory == 0
+    assert found.agrees, found
+    assert found.limit == found.theory or abs(found.limit - found.theory) <= 1e-6
+    if np.isfinite(found.theory):
+        assert found.growth_above > 0
+        assert abs(found.growth_above / found.growth_predicted - 1) < 1e-6
+    if 0 < found.theory < np.inf:
+        assert abs(found.growth_below) < 1e-9
+        assert abs(found.edge - 1) < 0.02
+    np.testing.assert_allclose(found.radius, found.radius_predicted, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_the_limit_in_lower_precision_keeps_its_stated_bound(name: str, need: Need) -> None:
+    need(name)
+    found = limits.measure(engines.parse(name))
+    assert found.bound < 1e-4
+    assert found.agrees, found
+
+
+def test_a_kick_that_is_a_hundred_thousandth_too_strong_moves_the_limit_out_of_its_bound() -> None:
+    label = engines.parse("own:semi-implicit-euler")
+
+    def strong(springs: Springs) -> Extended:
+        off = schemes.Scheme(
+            name="off", title="", order=1, limit=2.0, symplectic=True,
+            stages=(("kick", "1.00001"), ("drift", schemes.ONE)),
+        )  # fmt: skip
+        k, w = springs.k.astype(np.longdouble), springs.true_turn / propagators.STEP
+        out = schemes.matrix(off, h=propagators.STEP, m=np.full(len(k), propagators.MASS), k=k)
+        out[:, 0, 1] *= propagators.MASS * w
+        out[:, 1, 0] /= propagators.MASS * w
+        return out
+
+    right = limits.measure(label)
+    moved = replace(right, limit=limits.first_exit(label, strong))
+    assert right.agrees
+    assert not moved.agrees
+    assert abs(moved.limit - 2 / np.sqrt(1.00001)) < 1e-9
+
+
+@pytest.mark.parametrize("name", [x for x in LABELS if "damping" in engines.method(engines.parse(x)).terms])
+def test_the_damped_plane_is_divided_as_theory_says(name: str, need: Need) -> None:
+    need(name)
+    found = regions.measure(engines.parse(name), points=60)
+    assert found.points == 3600
+    assert found.wrong == 0
+    assert found.off <= 1
+    if found.method != "own:implicit-euler":
+        assert 0.1 < np.mean(found.stable) < 0.9
+
+
+def test_resonances_of_multiple_time_steps_are_those_of_the_exact_matrix(need: Need) -> None:
+    need("openmm:mts")
+    wanted = np.array(json.loads(REFERENCE.read_text(encoding="utf-8"))["bands"], dtype=np.float64)
+    found = resonance.measure(scenes.load_scene("multiple-time-steps"), engines.parse("openmm:mts"))
+    np.testing.assert_allclose(np.array(found.bands), wanted, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.array(found.bands_predicted), wanted, rtol=0, atol=1e-6)
+    assert wanted[0, 1] == pytest.approx(16 * np.sin(np.pi / 16), abs=1e-14)
+
+
+def test_a_scene_without_fast_springs_has_no_resonances() -> None:
+    with pytest.raises(Exception, match="springs marked fast"):
+        resonance.measure(scenes.load_scene("spring"), engines.parse("openmm:mts"))
+
+
+def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None:
+    need("sundials:bdf")
+    (bdf,) = costs.measure([engines.parse("sundials:bdf")], "two-scales", [1e10])
+    (adams,) = costs.measure([engines.parse("sundials:adams")], "two-scales", [1e10])
+    assert bdf.outcome == "complete"
+    assert bdf.error < 1e-3
+    assert adams.steps > 100 * bdf.steps
+
+
+def test_the_document_has_the_promised_fields(need: Need) -> None:
+    need("own:euler")
+    study = stability.measure(scenes.load_scene("overdamped"), ["own:*"])
+    found = json.loads(json.dumps(stability.document(study), allow_nan=False))
+    assert study.passed
+    for method in found["methods"]:
+        assert {"method", "limit", "theory", "growth_above", "growth_predicted", "points"} <= set(method)
+        assert len(method["points"]) >= 40
+    assert {region["wrong"] for region in found["regions"]} == {0}
+
+
+def test_a_wrong_growth_fails_the_study(need: Need) -> None:
+    need("own:euler")
+    study = stability.measure(scenes.load_scene("spring"), ["own:semi-implicit-euler"])
+    assert study.passed
+    (limit,) = study.limits
+    wrong = replace(study, limits=(replace(limit, growth_above=limit.growth_above * (1 + 1e-4)),))
+    assert not wrong.passed
+    assert "growth" in stability.failures(wrong)[0]
