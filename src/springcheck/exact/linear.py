@@ -92,7 +92,21 @@ def modes(scene: Scene) -> Modes:
         w2, vectors = _eigen(np.asarray(scaled, np.longdouble))
         # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
         w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
-    return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
+    pulls = np.where(w2 == 0, _drag(scene, pull * root_m) @ vectors, pull @ vectors)
+    return Modes(w2=w2, pull=pulls, rate=rate, root_m=root_m, vectors=vectors)
+
+
+def _drag(scene: Scene, force: Extended) -> Extended:
+    """The part of a force (n,) that moves free groups as a whole, per root of mass.
+
+    Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
+    """
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for group in mechanics.free_groups(scene):
+        m, total = scene.m[group].astype(np.longdouble), np.sum(force[group])
+        if abs(total) > len(group) * EPS * np.sum(np.abs(force[group])):
+            out[group] = np.sqrt(m) * total / np.sum(m)
+    return out
 
 
 PI = 4 * np.arctan(np.longdouble(1))
