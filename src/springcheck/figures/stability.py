@@ -152,7 +152,7 @@ def costs(found: Sequence[Cost]) -> Figure:
             y = np.array([float(getattr(cost, field)) for cost in rows])
             y = np.where((y > 0) & (y < 30 if field == "error" else y > 0), y, np.nan)
             axes.plot(
-                x, y, color=COLOURS[i % len(COLOURS)], linestyle=LINES[i % len(LINES)],
+                x, y, color=COLOURS[i % len(COLOURS)], linestyle=LINES[(i + i // 7) % len(LINES)],
                 marker=MARKERS[i % len(MARKERS)], markerfacecolor="white", label=method,
             )  # fmt: skip
         axes.set_xscale("log")
@@ -163,5 +163,5 @@ def costs(found: Sequence[Cost]) -> Figure:
         )
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside right upper", frameon=False)
-    figure.suptitle(f"{found[0].family}: what stiffness costs (steps of runs not worth doing are shown too)")
+    figure.suptitle(f"{found[0].family}: what stiffness costs (steps of unfinished runs are estimates)")
     return figure
