@@ -31,7 +31,8 @@ def _kind(index: bytes) -> str:
 def gather(q: Reals, index: Integers) -> Reals:
     """Values (..., s) of q (..., n) at index (s,); q itself where that is all of it."""
     everything = len(index) == q.shape[-1] and _kind(index.tobytes()) == "counting"
-    return q if everything else np.asarray(q[..., index])
+    # take, because the layout of q[..., index] makes the order of a later sum depend on the number of states
+    return q if everything else np.take(q, index, axis=-1)
 
 
 def scatter(out: Reals, index: Integers, values: Reals) -> None:
@@ -346,16 +347,41 @@ def is_damped(scene: Scene) -> bool:
     return bool(np.any(rates(scene) != 0))
 
 
+MOST_JOINED = 256
+"""Joined particles up to which normal modes are computed: their cost in extended precision grows with the
+cube, 5 s here.  The modes of a uniform chain are known at any length."""
+
+
 def has_modes(scene: Scene) -> bool:
-    """Whether the motion falls apart into modes: linear, and friction that couples none of them.
+    """Whether the motion falls apart into modes: linear, friction couples none of them, and they can be had.
 
     Friction does not couple modes where no term joins two particles, or where every particle is slowed
     down at the same rate (to a rounding of c/m).
     """
     if not is_linear(scene):
         return False
+    if is_separate(scene):
+        return True
     rate = rates(scene)
-    return is_separate(scene) or bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
+    alike = bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
+    return alike and (scene.n <= MOST_JOINED or is_uniform_chain(scene))
+
+
+def is_uniform_chain(scene: Scene) -> bool:
+    """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
+    walls = [term for term in scene.terms if isinstance(term, WallSpring)]
+    links = [term for term in scene.terms if isinstance(term, Spring)]
+    if len(walls) != 1 or len(links) != 1 or scene.n < 2 or np.any(scene.m != scene.m[0]):
+        return False
+    wall, link = walls[0], links[0]
+    row = np.arange(scene.n - 1)
+    return bool(
+        np.array_equal(wall.i, [0, scene.n - 1])
+        and np.array_equal(link.a, row)
+        and np.array_equal(link.b, row + 1)
+        and np.all(wall.k == wall.k[0])
+        and np.all(link.k == wall.k[0])
+    )
 
 
 def split(terms: Iterable[Term]) -> tuple[tuple[Term, ...], tuple[Term, ...]]:
@@ -506,28 +532,32 @@ def rest_positions(scene: Scene) -> Floats | None:
 
 def free_groups(scene: Scene) -> tuple[Integers, ...]:
     """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
-    parent = list(range(scene.n))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
     held = np.zeros(scene.n, dtype=bool)
     for term in scene.terms:
         if term.bodies == 1:
             held[particles(term)[0][term.rigidity > 0]] = True
     if np.all(held):
         return ()
-    for term in scene.terms:
-        if term.bodies == 2:
-            a_all, b_all = particles(term)
-            for a, b in zip(a_all.tolist(), b_all.tolist(), strict=True):
-                parent[root(a)] = root(b)
-    roots = np.array([root(i) for i in range(scene.n)])
-    loose = np.setdiff1d(roots, roots[held])
-    return tuple(np.flatnonzero(roots == r) for r in loose)
+    lowest = _lowest_joined(scene)
+    loose = np.setdiff1d(lowest, lowest[held])
+    return tuple(np.flatnonzero(lowest == r) for r in loose)
+
+
+def _lowest_joined(scene: Scene) -> Integers:
+    """The lowest particle to which each is joined, through however many others (n,)."""
+    lowest = np.arange(scene.n)
+    bonds = [particles(term) for term in scene.terms if term.bodies == 2]
+    while True:
+        before = lowest.copy()
+        for a, b in bonds:
+            low = np.minimum(lowest[a], lowest[b])
+            for end in (a, b):
+                np.minimum.at(lowest, lowest[end], low)
+        # what a particle points to points further: every round halves the way
+        while np.any(lowest[lowest] != lowest):
+            lowest = lowest[lowest]
+        if np.array_equal(lowest, before):
+            return lowest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

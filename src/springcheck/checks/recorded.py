@@ -101,7 +101,8 @@ def _closed(case: Case) -> str | None:
         return "slow and fast springs act at different times: no normal mode stays by itself"
     if not case.linear:
         return (
-            "the discrete motion of an anharmonic scene, or of one that friction couples, has no closed form"
+            "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
+            f"or more than {mechanics.MOST_JOINED} particles are joined"
         )
     if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
         return "a mode under a constant pull has no closed form here"

@@ -60,7 +60,8 @@ def modes(scene: Scene) -> Modes:
     """
     if not mechanics.has_modes(scene):
         raise ValueError(
-            f"scene {scene.name!r} has no normal modes: it is not linear, or friction couples them"
+            f"scene {scene.name!r} has no normal modes here: it is not linear, friction couples them, "
+            f"or more than {mechanics.MOST_JOINED} particles are joined"
         )
     root_m = np.sqrt(scene.m.astype(np.longdouble))
     zero = np.zeros(scene.n, dtype=np.longdouble)
@@ -69,6 +70,9 @@ def modes(scene: Scene) -> Modes:
     if mechanics.is_separate(scene):
         k = mechanics.own_stiffness(scene, zero)
         return Modes(w2=k / scene.m, pull=pull, rate=rate, root_m=root_m, vectors=None)
+    if scene.n > SMALL and mechanics.is_uniform_chain(scene):
+        w2, vectors = _standing_waves(scene)
+        return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
     rows = _spring_rows(scene, root_m) if scene.n <= SMALL else None
     if rows is not None:
         w2, vectors = _graded(rows)
@@ -80,6 +84,18 @@ def modes(scene: Scene) -> Modes:
         # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
         w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
     return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
+
+
+def _standing_waves(scene: Scene) -> tuple[Extended, Extended]:
+    """Squared frequencies and shapes of a uniform chain between walls: sines (Lagrange 1788)."""
+    n = scene.n
+    r = np.arange(1, n + 1)
+    k = next(term.k[0] for term in scene.terms if isinstance(term, mechanics.Spring))
+    pi = 4 * np.arctan(np.longdouble(1))
+    half = np.sin(pi * r / (2 * (n + 1)))
+    # the phase is a whole number of 1/(n + 1) half turns, and taken modulo whole turns exactly
+    shape = np.sin(pi * (np.outer(r, r) % (2 * (n + 1))) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1))
+    return np.asarray(4 * k / scene.m[0].astype(np.longdouble) * half * half), np.asarray(shape)
 
 
 def _spring_rows(scene: Scene, root_m: Extended) -> Extended | None:
