@@ -57,6 +57,9 @@ class Terms:
     mass_unknown: bool = False
     rounding: float = ROUNDING
     jitter: float = 0.0
+    bias: float = 0.0
+    """How far entries may be off in units of the residuals of their rows, whatever the number of pairs:
+    coarse rounding that cuts off, or repeats itself from turn to turn, is no noise that averages away."""
     log_stiffness: float | None = None
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
 
@@ -295,5 +298,6 @@ def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats) -> Floats:
     path = 1 if scheme.flow else roundings(scheme)
     coherent = terms.rounding * path * s * largest
     clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
-    total = found.covariance + clock + coherent[:, None, None] ** 2 * np.eye(4)
+    bias = np.diag(np.repeat(terms.bias * found.residual, 2) ** 2)
+    total = found.covariance + clock + bias + coherent[:, None, None] ** 2 * np.eye(4)
     return _inverse(total)

@@ -15,7 +15,16 @@ from springcheck.identify.fit import ROUNDING, Map, fit
 from springcheck.identify.match import Terms
 from springcheck.identify.record import Record, read
 from springcheck.identify.result import NONE, Identification
-from springcheck.identify.search import Joint, aliases, difference, disagreements, find, numbers, search
+from springcheck.identify.search import (
+    Joint,
+    aliases,
+    difference,
+    disagreements,
+    find,
+    numbers,
+    search,
+    visible,
+)
 from springcheck.model import Floats
 
 VELOCITY_OFFSET = {
@@ -154,8 +163,8 @@ def _known(
     defects: list[arithmetic.Defect] = []
     for joint in dict.fromkeys([chosen, *accepted]):
         defects = [
-            arithmetic.defect(record, j, x, part)
-            for j, x, part in zip(moving, maps, joint.parts, strict=True)
+            arithmetic.defect(record, j, x, part, visible=visible(x, what, joint, accepted))
+            for j, x, part, what in zip(moving, maps, joint.parts, terms, strict=True)
         ]
         if all(d.precision for d in defects):
             chosen = joint
