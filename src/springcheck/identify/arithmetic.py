@@ -13,7 +13,7 @@ from springcheck.identify.record import Record
 from springcheck.model import Extended, Floats
 from springcheck.schemes import SCHEMES, roundings
 
-REBUILT = 1 / 8, 2.0
+REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
 

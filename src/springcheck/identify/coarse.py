@@ -26,7 +26,7 @@ EXCESS = 2.0**-32
 COARSEST = 1e-5
 """Relative error of a force up to which it can be rounding; beyond, the force is another one."""
 
-LEAST = 1 / 50
+LEAST = 1 / 100
 """Share of its bound that an error must reach in the mean square for the bound to be what explains it."""
 
 STOERMER = {
@@ -60,7 +60,8 @@ def sized(record: Record, j: int, found: Map, match: Match, missing: Floats) -> 
         float(found.centre[0] / found.size[0])
     )
     path = roundings(SCHEMES[match.scheme]) * match.stride
-    relative = 4 * 2.0**-24 * abs(match.a) * orbit
+    # a position and a product are rounded; a stiffness too, but that is the same in every kick
+    relative = 2 * 2.0**-24 * abs(match.a) * orbit
     quantum = np.zeros(len(orbit))
     if record.mass is not None:
         h = float(record.interval) / match.stride
