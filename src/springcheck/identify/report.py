@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.causes import causes
+from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.fit import ROUNDING, Map, fit
 from springcheck.identify.match import Terms
 from springcheck.identify.record import Record, read
@@ -182,7 +183,11 @@ def _known(
     if stated is not None:
         against = disagreements(record, moving, chosen, stated)
         single = stated.astype(np.float32).astype(np.float64)
-        if against and worst.precision in COARSE and not disagreements(record, moving, chosen, single):
+        if (
+            against
+            and worst.precision in COARSE
+            and not disagreements(record, moving, chosen, single, QUANTUM)
+        ):
             against = []
             notes.append("the stiffness is the stated one in single precision, as GPU-type platforms keep it")
         stated_fits = stated_fits and not against

@@ -172,13 +172,20 @@ def numbers(
     return omega, stiffness, friction
 
 
-def disagreements(record: Record, moving: list[int], joint: Joint, stated: Floats) -> list[str]:
-    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding."""
+def disagreements(
+    record: Record, moving: list[int], joint: Joint, stated: Floats, quantum: float = 0.0
+) -> list[str]:
+    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
+
+    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.
+    """
     _, stiffness, _ = numbers(record, moving, joint)
     path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
+        error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
         off = k / float(stated[j]) - 1 if stated[j] else math.inf
         if not abs(off) <= error:
             out.append(
