@@ -38,6 +38,9 @@ VELOCITY_OFFSET = {
 COARSE = ("fixed-point force", "mixed", "single")
 """Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
 
+SHOWN = 3
+"""Schemes that a note names of those that are not told apart; all are in the candidates."""
+
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
     "semi-implicit-euler-drift-kick": "leapfrog with velocities half a step late",
@@ -229,7 +232,9 @@ def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) 
         out.append("the spring is inverted: its stiffness is negative")
     others = [f"{x}{_apart(x, chosen)}" for x in accepted if x is not chosen]
     if others:
-        shown = "; ".join(others[:6]) + (f"; and {len(others) - 6} more" if len(others) > 6 else "")
+        shown = "; ".join(others[:SHOWN]) + (
+            f"; and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+        )
         lead = "no error of a step is visible, so " if chosen.scheme == "exact" else ""
         out.append(f"{lead}not told apart at this precision: {shown}; named is the plainest")
     return out
@@ -238,7 +243,7 @@ def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) 
 def _apart(other: Joint, chosen: Joint) -> str:
     """How much stiffer the spring is if it is the other scheme, where that shows."""
     off = other.parts[0].a * other.stride**2 / (chosen.parts[0].a * chosen.stride**2) - 1
-    return f" (with {off:+.1e} of the stiffness more)" if abs(off) > 1e-12 else ""
+    return f" (stiffness {off:+.1e})" if abs(off) > 1e-12 else ""
 
 
 def _unknown(
