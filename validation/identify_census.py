@@ -90,7 +90,12 @@ def main() -> None:
             elif any(f"{x}{steps}" in found.candidates for x in same):
                 seen[f"called {found.scheme}, right one not excluded; {found.precision}"] += 1
             else:
-                seen[f"WRONG: {found.scheme}, stride {found.stride} for {stride}"] += 1
+                seen["WRONG"] += 1
+                hw = float(np.sqrt(k[0] / m[0]) * t[1] / stride)
+                print(
+                    f"  WRONG: {found.scheme}, {found.stride} for {name}, {stride}; h w = {hw:.4g}",
+                    flush=True,
+                )
         print(f"{name:32s}", "; ".join(f"{n} {what}" for what, n in seen.most_common()), flush=True)
 
 

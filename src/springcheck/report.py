@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -207,18 +208,10 @@ def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
 def identification(label: str, found: Identification) -> Lines:
     """What a trajectory says of the scheme that made it."""
     style = "bold" if found.fits else "bold red"
-    out: Lines = [plain(f"{label}: {found.scheme}", style)]
-    if not found.fits:
-        out.append(
-            plain(f"  nearest: {found.nearest}; off by {', '.join(f'{x:.1e}' for x in found.difference)}")
-        )
-    also = [*found.aliases, *(c for c in found.candidates if c != found.scheme)]
+    recorded = "" if found.stride <= 1 else f", {found.stride} steps from frame to frame"
     rows = [
-        ("the same map on a spring", ", ".join(dict.fromkeys(also))),
-        (
-            "step",
-            f"{found.step:.9g}, every {found.stride} recorded" if found.stride > 1 else f"{found.step:.9g}",
-        ),
+        ("same map on a spring", ", ".join(found.aliases)),
+        ("step", f"{found.step:.9g}{recorded}"),
         ("angular frequency", _numbers(found.omega)),
         ("stiffness", _numbers(found.stiffness)),
         ("velocities", _offset(found.velocity_offset)),
@@ -226,9 +219,20 @@ def identification(label: str, found: Identification) -> Lines:
         ("symplectic defect", f"{found.symplectic_defect:.1e}"),
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
-    out += [plain(f"  {name + ':':26}{text}") for name, text in rows if text and "nan" not in text]
-    out += [plain(f"  note: {note}") for note in found.notes]
+    misfit = ", but what is stated does not fit" if found.stride and not found.fits else ""
+    out: Lines = [plain(f"{label}: {found.scheme}{misfit}", style)]
+    for name, text in rows:
+        if text and "nan" not in text:
+            out += _hanging(f"  {name + ':':24}", text)
+    for note in found.notes:
+        out += _hanging("  note: ", note)
     return out
+
+
+def _hanging(head: str, text: str) -> Lines:
+    """Text of 80 columns, its further lines indented as far as its head is long."""
+    broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
+    return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]
 
 
 def _numbers(values: tuple[float, ...] | None) -> str:
