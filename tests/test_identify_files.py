@@ -14,10 +14,22 @@ from springcheck.model import Floats
 from springcheck.schemes import SCHEMES, step
 
 M, K, H = 3.7, 2.9, 0.31
-FIELDS = (
-    "scheme aliases step stride omega stiffness velocity_offset determinant symplectic_defect defect_ulp "
-    "precision fits nearest notes"
-).split()
+FIELDS = [
+    "scheme",
+    "aliases",
+    "step",
+    "stride",
+    "omega",
+    "stiffness",
+    "velocity_offset",
+    "determinant",
+    "symplectic_defect",
+    "defect_ulp",
+    "precision",
+    "fits",
+    "nearest",
+    "notes",
+]
 
 
 def motion(name: str = "velocity-verlet", stride: int = 2) -> tuple[Floats, Floats, Floats]:
@@ -132,7 +144,7 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
 
 
 def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
-    t, q, v = motion("rk4", 1)
+    t, _q, _v = motion("rk4", 1)
     # a thousandth of the step's length: what RK4 leaves out is far below single precision
     slow = np.cos(0.01 * t)[:, None], -0.01 * np.sin(0.01 * t)[:, None]
     assert main(["identify", written(t, *slow, kind="f4")]) == 0
