@@ -80,13 +80,20 @@ def runs_table(runs: Sequence[Run]) -> Table:
             good = run.outcome == "complete"
             table.add_row(
                 plain(f"  {run.method}"),
-                "-" if np.isnan(run.max_error) else f"{run.max_error:.2e}",
+                _error(run.max_error),
                 f"{run.energy_drift:+.1e}",
                 seconds(run.timing.start),
                 seconds(run.timing.run),
                 plain("complete" if good else f"{run.outcome}, step {run.step}", "" if good else "red"),
             )
     return table
+
+
+def _error(x: float) -> str:
+    """Three digits in eight columns, two where the exponent takes three places."""
+    if np.isnan(x):
+        return "-"
+    return f"{x:.2e}" if x < 1e100 else f"{x:.1e}"
 
 
 def same_motions(report: Report) -> Lines:
