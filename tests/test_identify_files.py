@@ -138,7 +138,7 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
 ) -> None:
     t, q, v = motion()
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
-    text = capsys.readouterr().out
+    text = " ".join(capsys.readouterr().out.split())
     assert "none (adaptive or unknown)" in text
     assert "1.7 times as large" in text or "0.588 times as large" in text
 
