@@ -67,7 +67,7 @@ def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.Captu
     path = written(*motion(), kind="f4")
     assert main(["identify", path, "--json"]) == 0
     found = document(capsys)
-    assert FIELDS <= set(found)
+    assert set(found) >= FIELDS
     told = found["scheme"], found["stride"], found["precision"], found["fits"], found["stiffness"]
     assert told == ("velocity-verlet", 2, "double, stored in single", True, None)
     assert found["omega"] == pytest.approx(np.sqrt(K / M), rel=1e-7)
@@ -128,7 +128,8 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "none (adaptive or unknown)" in text
-    assert "velocity-verlet, 2 steps a frame would fit if velocities were about 0.588 times" in text
+    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588
+    assert "would fit if velocities were about 0.59" in text
 
 
 def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
