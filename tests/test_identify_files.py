@@ -14,22 +14,10 @@ from springcheck.model import Floats
 from springcheck.schemes import SCHEMES, step
 
 M, K, H = 3.7, 2.9, 0.31
-FIELDS = [
-    "scheme",
-    "aliases",
-    "step",
-    "stride",
-    "omega",
-    "stiffness",
-    "velocity_offset",
-    "determinant",
-    "symplectic_defect",
-    "defect_ulp",
-    "precision",
-    "fits",
-    "nearest",
-    "notes",
-]
+FIELDS = {
+    *("scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"),
+    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"),
+}
 
 
 def motion(name: str = "velocity-verlet", stride: int = 2) -> tuple[Floats, Floats, Floats]:
@@ -79,7 +67,7 @@ def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.Captu
     path = written(*motion(), kind="f4")
     assert main(["identify", path, "--json"]) == 0
     found = document(capsys)
-    assert set(FIELDS) <= set(found)
+    assert set(found) >= FIELDS
     told = found["scheme"], found["stride"], found["precision"], found["fits"], found["stiffness"]
     assert told == ("velocity-verlet", 2, "double, stored in single", True, None)
     assert found["omega"] == pytest.approx(np.sqrt(K / M), rel=1e-7)
@@ -140,11 +128,12 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "none (adaptive or unknown)" in text
-    assert "1.7 times as large" in text or "0.588 times as large" in text
+    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588
+    assert "would fit if velocities were about 0.59" in text
 
 
 def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
-    t, _q, _v = motion("rk4", 1)
+    t, _, _ = motion("rk4", 1)
     # a thousandth of the step's length: what RK4 leaves out is far below single precision
     slow = np.cos(0.01 * t)[:, None], -0.01 * np.sin(0.01 * t)[:, None]
     assert main(["identify", written(t, *slow, kind="f4")]) == 0
@@ -152,9 +141,7 @@ def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.Captur
     assert all(len(line) <= 80 for line in lines)
     first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
     assert lines[first + 1].startswith("        ")
-    assert any(
-        "more; named is the plainest" in " ".join(lines[i:]).replace("         ", " ") for i in (first,)
-    )
+    assert "more; named is the plainest" in " ".join(" ".join(lines).split())
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,10 @@ def match(scheme: Scheme, found: Map, terms: Terms, strides: range) -> list[Matc
         if not np.any(damped):
             return []
         s, turns, unknowns, zero = s[damped], turns[damped], [x[damped] for x in unknowns], zero[damped]
-        a = a[damped]
+        if turning:
+            # friction slows the phase down, to nothing where it is critical: w**2 = phase**2 + (gamma/2)**2
+            unknowns[0] = unknowns[0] + np.square(unknowns[1] / 2)
+        a = unknowns[0]
     if terms.mass_unknown and terms.log_stiffness is None:
         guess = frame(scheme, a, unknowns[1], zero, s, found.size)
         up = np.abs(guess[:, 0, 1] / found.entries[0, 1])
