@@ -158,3 +158,14 @@ def test_a_large_step_of_an_inverted_spring_can_turn_backwards() -> None:
         found += bool(one[0, 0, 1] < 0)
         assert alarms(checks.judge(scene, plain(scene, "forest-ruth"))) == []
     assert found
+
+
+def test_frames_far_apart_are_judged_by_a_power_of_the_map() -> None:
+    scene = replace(scenes.load_scene("chain"), steps=6000, every=3000)
+    run = springcheck.run(scene, "own:semi-implicit-euler")
+    (defect,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
+    assert defect.passed
+    (wrong,) = (
+        v for v in checks.judge(scene, replace(run, q=run.q * (1 + 1e-9))) if v.check == "step-defect"
+    )
+    assert wrong.passed is False

@@ -33,10 +33,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SpringcheckError as error:
         print(f"springcheck: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print(
-            "springcheck: interrupted; what was finished is kept, the same command goes on", file=sys.stderr
-        )
+    except KeyboardInterrupt as interrupt:
+        missing = f"; {interrupt}" if str(interrupt) else ""
+        kept = "what was finished is kept, the same command goes on"
+        print(f"springcheck: interrupted{missing}; {kept}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # whoever read our output has closed it; nothing is left to say

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
-from springcheck.checks.case import Case
+from springcheck.checks.case import REPEATED, Case
 from springcheck.model import Arithmetic, Extended, Floats, Verdict
 
 CONTRACTED = 1e-3
@@ -54,6 +54,10 @@ def step_defect(case: Case) -> Verdict:
     if why_not:
         return case.not_applicable("step-defect", why_not)
     run = case.trajectory
+    if run.every > REPEATED and _closed(case):
+        return case.not_applicable(
+            "step-defect", f"{run.every} steps lie between frames, and {_closed(case)}"
+        )
     q, p = case.next_states
     dq, dp = np.abs(q - run.q[1:]), np.abs(p - run.p[1:])
     of_q, of_p = case.allowance
@@ -67,6 +71,8 @@ def step_defect(case: Case) -> Verdict:
             f"roundings along one step of {case.scheme.title}; does not grow with the run",
         )
     bound = case.roundings * _amplified(case, run.every)
+    if not bound * run.arithmetic.state < 1:
+        return case.not_applicable("step-defect", "between two frames a rounding may grow to the whole motion")
     sizes = case.norm(dq, dp), case.norm(of_q, of_p)
     value = float(np.max(sizes[0] / np.max(sizes[1])))
     return case.verdict(
