@@ -90,7 +90,8 @@ def _amplified(case: Case, steps: int) -> float:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
         return float(total[0] * grown[0])
     growth = 1 + abs(case.trajectory.step) * fastest(case)
-    return float((growth**steps - 1) / (growth - 1)) if growth > 1 else float(steps)
+    with np.errstate(over="ignore"):
+        return float((np.float64(growth) ** steps - 1) / (growth - 1)) if growth > 1 else float(steps)
 
 
 def fastest(case: Case) -> float:
