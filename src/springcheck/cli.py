@@ -403,16 +403,25 @@ def _identify(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from springcheck import inspection
-    from springcheck.figures import precision, trajectories
+    from springcheck import inspection, store
+    from springcheck.figures import extremes, precision, stability, trajectories
 
     path, folder = Path(options.file), Path(options.output)
-    study = inspection.studied(path)
-    written = [] if study is None else precision.draw(study, folder)
+    summary = store.summary(path)
+    studies = inspection.studied(path, summary)
+    written: list[Path] = []
+    if studies.precision is not None:
+        written += precision.draw(studies.precision, folder)
+    if studies.stability is not None:
+        written += stability.draw(studies.stability, folder)
+    if studies.extremes is not None:
+        written += extremes.draw(studies.extremes, folder)
     notes: list[str] = []
-    if study is None or inspection.has_trajectories(path):
-        scene, runs, notes = inspection.drawable(path)
+    if summary.runs or not studies.any:
+        scene, runs, notes = inspection.drawable(path, summary)
         written += trajectories.draw(scene, runs, folder)
+    if not written:
+        raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
     if not options.quiet:
         for line in notes:
             print(line)
