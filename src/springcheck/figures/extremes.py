@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,8 @@ def picture(atlas: Atlas) -> Figure:
         handles.append(Patch(facecolor="white", edgecolor="#bbbbbb", label="not tried"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(6, 2 * columns), frameon=False)
     total = ", ".join(f"{count} {name}" for name, count in atlas.counts().most_common())
-    figure.suptitle(f"{len(atlas.cells)} extreme cases: {total}", fontsize=10)
+    title = textwrap.fill(f"{len(atlas.cells)} extreme cases: {total}", 46 * columns)
+    figure.suptitle(title, fontsize=10)
     return figure
 
 
