@@ -34,12 +34,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"springcheck: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(
-            "springcheck: interrupted; what was finished is kept, the same command goes on", file=sys.stderr
-        )
+        keeps = command is _run and options.source is None
+        kept = "what was finished is kept, the same command goes on" if keeps else "nothing is kept"
+        print(f"springcheck: interrupted; {kept}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # whoever read our output has closed it; nothing is left to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 2
+    except OSError as error:
+        # the library names its files; what is left is our own output, on a full disk for one
+        print(f"springcheck: {error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 2
 
@@ -435,7 +440,7 @@ def _check(options: argparse.Namespace) -> int:
 
     findings = store.check(Path(options.file))
     for finding in findings:
-        print(finding)
+        print(f"{options.file}: {finding.place}: {finding.what}")
     if not findings:
         print(f"{options.file}: whole; every digest matches")
     return 1 if findings else 0

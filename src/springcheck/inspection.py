@@ -58,8 +58,9 @@ def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
     frames, stride = store.strided(path, trajectory, rows) if trajectory else (None, 1)
     return Found(
         summary=summary,
-        verdicts=store.verdicts(path),
-        comparison=store.comparison(path),
+        # an unfinished run has trajectories beside the file that it will write
+        verdicts=store.verdicts(path) if path.is_file() else (),
+        comparison=store.comparison(path) if path.is_file() else None,
         frames=frames,
         stride=stride,
         studies=studied(path, summary),
