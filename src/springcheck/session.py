@@ -271,6 +271,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None =
     """
     stored = {run.label: run for run in store.summary(path).runs}
     chosen = [label for label in stored if not methods or any(fnmatchcase(label, m) for m in methods)]
+    if not stored:
+        raise StoreError(f"{path}: holds no trajectory to run again")
     if not chosen:
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(stored)}")
     scene = stored_scene(path)

@@ -72,7 +72,9 @@ def step_defect(case: Case) -> Verdict:
         )
     bound = case.roundings * _amplified(case, run.every)
     if not bound * run.arithmetic.state < 1:
-        return case.not_applicable("step-defect", "between two frames a rounding may grow to the whole motion")
+        return case.not_applicable(
+            "step-defect", "between two frames a rounding may grow to the whole motion"
+        )
     sizes = case.norm(dq, dp), case.norm(of_q, of_p)
     value = float(np.max(sizes[0] / np.max(sizes[1])))
     return case.verdict(
