@@ -16,7 +16,7 @@ from springcheck.studies import extremes
 from springcheck.studies.extremes import grid, judging, refusals, running
 
 Need = Callable[[str], None]
-METHODS = [str(label) for label in engines.match(("*",)) if "wall-spring" in engines.method(label).terms]
+METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
 GPU = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
 
 

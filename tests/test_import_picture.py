@@ -25,7 +25,7 @@ HOMES = {
     "matplotlib": ("figures",),
     "openmm": ("engines/openmm/simulation.py",),
     "ase": ("engines/ase/simulation.py",),
-    "sksundae": ("engines/sundials/simulation.py",),
+    "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
     "rich": ("report.py", "inspection.py", "cli.py"),
     "msgspec": ("scenes",),

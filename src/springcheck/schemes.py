@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -282,6 +283,14 @@ _ALL = (
         symplectic=False,
         source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
     ),
+    Scheme(
+        name="ida",
+        title="IDA BDF, orders 1-5, of a circuit's equations",
+        order=0,
+        limit=np.inf,
+        symplectic=False,
+        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
+    ),
 )
 
 SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
@@ -363,6 +372,12 @@ def _acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force
     return parts[kind == "fast"]
 
 
+@lru_cache(maxsize=2)
+def _inverse(matrix: bytes, n: int) -> Floats:
+    """The inverse of a matrix (n, n), found once for all steps of a run."""
+    return np.asarray(np.linalg.inv(np.frombuffer(matrix).reshape(n, n)))
+
+
 def _implicit_stage(
     q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals, rate: Reals | None
 ) -> tuple[Reals, Reals]:
@@ -378,8 +393,8 @@ def _implicit_stage(
         matrix = 1 + np.asarray(stiffness, q.dtype) * factor
     else:
         matrix = np.eye(len(m)) + np.asarray(stiffness, np.float64) * factor.astype(np.float64)[:, None]
-        # inverted once, it steers every round and all states; what counts is the residual
-        inverse = np.linalg.inv(matrix).T
+        # it only steers: what counts is the residual
+        inverse = _inverse(np.ascontiguousarray(matrix).tobytes(), len(m)).T
     guess, last = q, np.inf
     for _ in range(50):
         residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m

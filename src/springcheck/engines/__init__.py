@@ -149,11 +149,17 @@ def match(patterns: tuple[str, ...]) -> tuple[Label, ...]:
     return tuple(chosen.values())
 
 
+PLURAL = {"particles": "particles", "circuit": "circuits", "rotor": "rotors"}
+
+
 def refusal(scene: Scene, label: Label) -> str | None:
     """Why a method cannot serve a scene, or None where it can; imports nothing."""
     what = method(label)
     if scene.kind not in what.kinds:
-        return f"{engine(label.engine).title} moves {', '.join(sorted(what.kinds))}, not a {scene.kind}"
+        moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))
+        others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}
+        who = "it" if scene.kind in others else engine(label.engine).title
+        return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     missing = sorted({term.key for term in scene.terms} - what.terms)
     if missing:
         return f"it has no {' and no '.join(missing)} term"

@@ -9,6 +9,7 @@ each mode by itself too, which is why limits and shadow energies are read off he
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,17 +31,24 @@ class Modes:
     rate: Extended
     root_m: Extended
     vectors: Extended | None
+    waves: bool = False
+    """Whether the vectors are sines, so that a fast Fourier transform takes the place of their product."""
 
     def into(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
         """Mode coordinates y [M1/2 L] and velocities [M1/2 L/T] of states (..., n)."""
         y, v = np.asarray(q, np.longdouble) * self.root_m, np.asarray(p, np.longdouble) / self.root_m
-        return (y, v) if self.vectors is None else (y @ self.vectors, v @ self.vectors)
+        return self._turned(y, False), self._turned(v, False)
 
     def out_of(self, y: Extended, v: Extended) -> tuple[Extended, Extended]:
         """Positions and momenta of states in mode coordinates (..., n)."""
-        if self.vectors is not None:
-            y, v = y @ self.vectors.T, v @ self.vectors.T
-        return y / self.root_m, v * self.root_m
+        return self._turned(y, True) / self.root_m, self._turned(v, True) * self.root_m
+
+    def _turned(self, y: Extended, back: bool) -> Extended:
+        if self.vectors is None:
+            return y
+        if self.waves:
+            return _sines(y)
+        return y @ (self.vectors.T if back else self.vectors)
 
     def centre(self) -> Extended:
         """Rest position of each mode, 0 for a mode that nothing holds (w2 = 0)."""
@@ -71,8 +79,9 @@ def modes(scene: Scene) -> Modes:
         k = mechanics.own_stiffness(scene, zero)
         return Modes(w2=k / scene.m, pull=pull, rate=rate, root_m=root_m, vectors=None)
     if scene.n > SMALL and mechanics.is_uniform_chain(scene):
-        w2, vectors = _standing_waves(scene)
-        return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
+        w2 = _wave_frequencies(scene)
+        vectors = _wave_shapes(scene.n)
+        return Modes(w2=w2, pull=_sines(pull), rate=rate, root_m=root_m, vectors=vectors, waves=True)
     rows = _spring_rows(scene, root_m) if scene.n <= SMALL else None
     if rows is not None:
         w2, vectors = _graded(rows)
@@ -83,19 +92,48 @@ def modes(scene: Scene) -> Modes:
         w2, vectors = _eigen(np.asarray(scaled, np.longdouble))
         # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
         w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
-    return Modes(w2=w2, pull=pull @ vectors, rate=rate, root_m=root_m, vectors=vectors)
+    pulls = np.where(w2 == 0, _drag(scene, pull * root_m) @ vectors, pull @ vectors)
+    return Modes(w2=w2, pull=pulls, rate=rate, root_m=root_m, vectors=vectors)
 
 
-def _standing_waves(scene: Scene) -> tuple[Extended, Extended]:
-    """Squared frequencies and shapes of a uniform chain between walls: sines (Lagrange 1788)."""
-    n = scene.n
-    r = np.arange(1, n + 1)
+def _drag(scene: Scene, force: Extended) -> Extended:
+    """The part of a force (n,) that moves free groups as a whole, per root of mass.
+
+    Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
+    """
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for group in mechanics.free_groups(scene):
+        m, total = scene.m[group].astype(np.longdouble), np.sum(force[group])
+        if abs(total) > len(group) * EPS * np.sum(np.abs(force[group])):
+            out[group] = np.sqrt(m) * total / np.sum(m)
+    return out
+
+
+PI = 4 * np.arctan(np.longdouble(1))
+
+
+def _wave_frequencies(scene: Scene) -> Extended:
+    """Squared frequencies of a uniform chain between walls, slowest first (Lagrange 1788)."""
     k = next(term.k[0] for term in scene.terms if isinstance(term, mechanics.Spring))
-    pi = 4 * np.arctan(np.longdouble(1))
-    half = np.sin(pi * r / (2 * (n + 1)))
+    half = np.sin(PI * np.arange(1, scene.n + 1) / (2 * (scene.n + 1)))
+    return np.asarray(4 * k / scene.m[0].astype(np.longdouble) * half * half)
+
+
+@lru_cache(maxsize=4)
+def _wave_shapes(n: int) -> Extended:
+    """sqrt(2/(n+1)) sin(pi r j/(n+1)) (n, n), symmetric."""
+    r = np.arange(1, n + 1)
     # the phase is a whole number of 1/(n + 1) half turns, and taken modulo whole turns exactly
-    shape = np.sin(pi * (np.outer(r, r) % (2 * (n + 1))) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1))
-    return np.asarray(4 * k / scene.m[0].astype(np.longdouble) * half * half), np.asarray(shape)
+    sines = np.sin(PI * np.arange(2 * (n + 1)) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1))
+    return np.asarray(sines[np.outer(r, r) % (2 * (n + 1))])
+
+
+def _sines(y: Extended) -> Extended:
+    """y (..., n) @ `_wave_shapes`, by the Fourier transform of its odd continuation."""
+    n = y.shape[-1]
+    none = np.zeros((*y.shape[:-1], 1), dtype=np.longdouble)
+    odd = np.concatenate([none, y, none, -y[..., ::-1]], axis=-1)
+    return np.asarray(-np.fft.rfft(odd, axis=-1).imag[..., 1 : n + 1] / np.sqrt(2 * np.longdouble(n + 1)))
 
 
 def _spring_rows(scene: Scene, root_m: Extended) -> Extended | None:

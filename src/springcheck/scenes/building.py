@@ -99,7 +99,9 @@ def _standing(chain: tables.ChainTable) -> _Bodies:
     for j, wave in enumerate(chain.wave):
         if wave.mode > n:
             raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: a chain of {n} masses has {n} modes")
-        q += wave.amplitude * np.sin(np.pi * wave.mode * np.arange(1, n + 1) / (n + 1))
+        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
+        phase = wave.mode * np.arange(1, n + 1) % (2 * (n + 1))
+        q += wave.amplitude * np.sin(np.pi * phase / (n + 1))
     return _Bodies(m=np.full(n, chain.mass), q=q, p=np.zeros(n), kind="particles", name="chain")
 
 

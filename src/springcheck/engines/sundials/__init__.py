@@ -1,4 +1,4 @@
-"""SUNDIALS through scikit-sundae: CVODE's Adams and BDF, judged by tolerance."""
+"""SUNDIALS through scikit-sundae: CVODE's Adams and BDF, and IDA for circuits, judged by tolerance."""
 
 from __future__ import annotations
 
@@ -28,6 +28,15 @@ ENGINE = Engine(
         for method in (
             _method("adams", "CVODE, Adams-Moulton of orders 1 to 12"),
             _method("bdf", "CVODE, backward differentiation of orders 1 to 5"),
+            Method(
+                engine="sundials",
+                name="ida",
+                scheme="ida",
+                about="IDA: Kirchhoff's laws as they stand, unsolved for the currents",
+                adaptive=True,
+                terms=frozenset({"wall-spring", "spring", "damping"}),
+                kinds=frozenset({"circuit"}),
+            ),
         )
     },
 )

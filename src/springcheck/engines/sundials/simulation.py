@@ -1,4 +1,4 @@
-"""One scene by CVODE, SUNDIALS' adaptive multistep solver, through scikit-sundae.
+"""One scene by CVODE or IDA, SUNDIALS' adaptive multistep solvers, through scikit-sundae.
 
 The tolerance is relative and per step.  The absolute tolerance is the same fraction of the amplitude
 that the energy of the start allows each component, because q and p may differ in size by many orders
@@ -7,6 +7,7 @@ that the energy of the start allows each component, because q and p may differ i
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,10 @@ from sksundae.cvode import CVODE
 
 from springcheck import mechanics
 from springcheck.engines import quiet
+from springcheck.engines.sundials import circuit, sparse
 from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+
+KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
 
 MOST_STEPS = 10_000_000
 """Internal steps allowed between two outputs; the library's own default of 500 is far too few."""
@@ -38,7 +42,7 @@ def convention(method: Method) -> str:
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
     """A solver standing at the start."""
-    return _Solver(scene, "Adams" if method.name == "adams" else "BDF", step)
+    return _Solver(scene, KINDS[method.name], step)
 
 
 def absolute_tolerance(scene: Scene) -> Floats:
@@ -93,7 +97,7 @@ def internal_steps(scene: Scene, method: Method, *, most: int = MOST_STEPS) -> I
     # SUNDIALS' logger prints on standard output, where results go
     with quiet.caught(1) as said:
         try:
-            solver = _Solver(scene, "Adams" if method.name == "adams" else "BDF", scene.step)
+            solver = _Solver(scene, KINDS[method.name], scene.step)
             return solver.count(scene.step * scene.steps, most)
         except (RuntimeError, Stopped) as error:
             stopped = error
@@ -113,20 +117,16 @@ class _Solver:
         as_matrix = _suits_matrix(scene)
         slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
         pulled = bool(np.any(pull))
-        friction = np.diag(mechanics.rates(scene).astype(np.float64))
+        rates = mechanics.rates(scene).astype(np.float64)
 
         def by_terms(t: float, y: Floats, yp: Floats) -> None:
-            self.force_calls += 1
-            if self.asked is not None:
-                self.asked.add(t)
+            self._called(t)
             q, p = y[:n], y[n:]
             yp[:n] = p / m
             yp[n:] = force(q, p)
 
         def by_matrix(t: float, y: Floats, yp: Floats) -> None:
-            self.force_calls += 1
-            if self.asked is not None:
-                self.asked.add(t)
+            self._called(t)
             np.dot(slope, y, out=yp)
             if pulled:
                 np.add(yp, pull, out=yp)
@@ -137,18 +137,30 @@ class _Solver:
             else:
                 jacobian[:n, n:] = np.diag(1 / m)
                 jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
-                jacobian[n:, n:] = -friction
+                jacobian[n:, n:] = -np.diag(rates)
 
-        self._solver = CVODE(
-            by_matrix if as_matrix else by_terms,
-            method=method,
-            rtol=scene.tolerance,
-            atol=absolute_tolerance(scene),
-            jacfn=jacobian,
-            max_num_steps=MOST_STEPS,
-        )
-        self._solver.init_step(0.0, np.concatenate([scene.q, scene.p]))
         self._n, self._step, self._done = n, step, 0
+        atol = absolute_tolerance(scene)
+        if method == "IDA":
+            self._solver = circuit.solver(scene, atol, MOST_STEPS, self._called)
+            return
+        with warnings.catch_warnings():
+            # it says that our Jacobian takes the place of its own, which is what we want
+            warnings.filterwarnings("ignore", message="Custom sparse Jacobian", category=UserWarning)
+            self._solver = CVODE(
+                by_matrix if as_matrix else by_terms,
+                method=method,
+                rtol=scene.tolerance,
+                atol=atol,
+                max_num_steps=MOST_STEPS,
+                **({"jacfn": jacobian} if n <= sparse.LARGE else sparse.options(scene)),
+            )
+        self._solver.init_step(0.0, np.concatenate([scene.q, scene.p]))
+
+    def _called(self, t: float) -> None:
+        self.force_calls += 1
+        if self.asked is not None:
+            self.asked.add(t)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         n, take = self._n, self._solver.step
@@ -167,7 +179,7 @@ class _Solver:
                     break
                 y = result.y
                 q[row] = y[:n]
-                p[row] = y[n:]
+                p[row] = y[n : 2 * n]
         if failure:
             raise Stopped(row, " ".join([failure, *said]).strip())
 

@@ -81,7 +81,8 @@ def measure(
     cells: list[Cell] = []
     left_out = []
     for label in chosen:
-        if "wall-spring" not in engines.method(label).terms:
+        method = engines.method(label)
+        if "wall-spring" not in method.terms or "particles" not in method.kinds:
             left_out.append((str(label), "it moves no particles on springs"))
             continue
         absent = engines.absence(label.engine) or (

@@ -1,0 +1,45 @@
+"""The Jacobian of large scenes by its elements that are not 0: cost grows with the springs, not the cube."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from springcheck import mechanics
+from springcheck.model import Floats, Reals, Scene
+
+LARGE = 32
+"""Particles above which the sparse solver is taken; below, the dense one is faster."""
+
+
+def options(scene: Scene) -> dict[str, Any]:
+    """What CVODE needs for the linear systems of (q, p) of this scene."""
+    n = scene.n
+    rows, columns = [np.arange(n), n + np.arange(n)], [n + np.arange(n)] * 2
+    for term in scene.terms:
+        ends = mechanics.particles(term)
+        for i in ends:
+            for j in ends:
+                rows.append(n + i)
+                columns.append(j)
+    where = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
+    constant: list[Reals] = [1 / scene.m, -mechanics.rates(scene).astype(np.float64)]
+
+    def matrix(values: Reals) -> Any:
+        # elements of the same place are added up, in the order of columns that SuperLU takes
+        return coo_array((values, where), shape=(2 * n, 2 * n)).tocsc()
+
+    def jacobian(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+        values: list[Reals] = list(constant)
+        for term in scene.terms:
+            k = np.broadcast_to(term.curvature(y[:n]), term.rigidity.shape)
+            values += [-k] if term.bodies == 1 else [-k, k, k, -k]
+        out[:] = matrix(np.concatenate(values)).data
+
+    pattern = matrix(np.ones(len(where[0])))
+    pattern.data[:] = 1
+    fill: Callable[..., None] = jacobian
+    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": fill}
