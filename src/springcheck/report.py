@@ -33,7 +33,11 @@ def run_report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [headline(report), plain(), runs_table(report.runs)]
     out.append(plain("error: farthest from the true motion; energy: (H - H0)/H0 where largest", "dim"))
-    out += [plain(f"  {run.method}: {run.message}") for run in report.runs if run.message]
+    out += [
+        plain(f"  {run.method}: {run.outcome} after step {run.step}: {run.message}")
+        for run in report.runs
+        if run.outcome != "complete"
+    ]
     out += same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
     out += matrices(report.verdicts)
@@ -85,7 +89,7 @@ def runs_table(runs: Sequence[Run]) -> Table:
                 f"{run.energy_drift:+.1e}",
                 seconds(run.timing.start),
                 seconds(run.timing.run),
-                plain("complete" if good else f"{run.outcome}, step {run.step}", "" if good else "red"),
+                plain(run.outcome, "" if good else "red"),
             )
     return table
 
