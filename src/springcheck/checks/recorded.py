@@ -239,12 +239,12 @@ def frequency(case: Case) -> Verdict:
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
     off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
     bound, unit = growth_bound(case)
-    amplitude = case.norm(case.trajectory.q - _rest(case), case.trajectory.p)[-1]
-    mode = abs(float(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j])))
-    whole = float(case.norm.unit) * np.sqrt(2) * amplitude
+    # extended: a motion that spirals out is squared here, up to the end of double's range
+    mode = np.abs(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j]))
+    wide = np.longdouble(unit[-1]) * case.norm.unit * np.sqrt(np.longdouble(2))
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
-    shape = float(schemes.condition(case.matrices, case.w)[j])
-    limit = float(bound[-1] * unit[-1] / amplitude * (whole / mode) * shape / abs(expected))
+    shape = schemes.condition(case.matrices, case.w)[j]
+    limit = float(bound[-1] * (wide / mode) * shape / abs(expected))
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
         "frequency",
