@@ -78,7 +78,7 @@ class System:
         """Taylor coefficients of the motion from (q, p), up to ORDER."""
         n = len(self.m)
         u: Series = [[q[i], p[i] / self.m[i]] for i in range(n)]
-        laws = [_Quartic(row) for row in self.table.get("quartic", ())]
+        laws: list[Any] = [_Quartic(row) for row in self.table.get("quartic", ())]
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
         springs, friction = self.springs(), self.friction()

@@ -188,7 +188,7 @@ def _document(data: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from springcheck import report, scenes, session
+    from springcheck import scenes, session
 
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
@@ -209,11 +209,13 @@ def _run(options: argparse.Namespace) -> int:
         )
     if options.json:
         _document(session.document(found))
-    else:
+    elif not options.quiet:
+        from springcheck import report
+
         lines: list[RenderableType] = list(report.run_report(found))
         if options.verdicts:
             lines.append(report.verdicts_table(found.verdicts))
-        _show(lines, quiet=options.quiet)
+        _show(lines)
     return found.status
 
 

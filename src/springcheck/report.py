@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from springcheck.faults import FaultReport
-from springcheck.identify import Identification
 from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
-from springcheck.studies import stability
-from springcheck.studies.extremes import Atlas
-from springcheck.studies.outcome import MethodSummary, PrecisionStudy
-from springcheck.studies.points import Point
-from springcheck.studies.stability import Stability
+
+if TYPE_CHECKING:
+    from springcheck.faults import FaultReport
+    from springcheck.identify import Identification
+    from springcheck.studies.extremes import Atlas
+    from springcheck.studies.outcome import MethodSummary, PrecisionStudy
+    from springcheck.studies.points import Point
+    from springcheck.studies.stability import Stability
 
 Lines = list[Table | Text]
 
@@ -477,6 +478,8 @@ def fault_report(found: FaultReport) -> Lines:
 
 def stability_report(study: Stability) -> Lines:
     """The whole report of `springcheck stability`."""
+    from springcheck.studies import stability
+
     out: Lines = [plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"), plain()]
     if study.limits:
         table = grid()

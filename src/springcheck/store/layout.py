@@ -22,7 +22,7 @@ import os
 import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -229,6 +229,7 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
     write_attributes(group["mass"], {"unit": unit["mass"], "units": unit["mass"]})
 
 
+@cache
 def _ours() -> str:
     try:
         return version("springcheck")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -83,12 +84,12 @@ class Own:
 
 
 def version() -> dict[str, str]:
-    """Of this package, the interpreter and NumPy, and of numba where it is installed."""
+    """Of this package, the interpreter and NumPy, and of numba where it has compiled something."""
     found = {
         "springcheck": _installed("springcheck"),
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "numba": _installed("numba"),
+        "numba": _installed("numba") if "numba" in sys.modules else "",
     }
     return {name: text for name, text in found.items() if text}
 
@@ -332,6 +333,7 @@ def _with_names(function: Callable[..., Any], names: dict[str, Any]) -> Function
     return FunctionType(code, {**vars(kernels), **names}, function.__name__)
 
 
+@cache
 def _installed(distribution: str) -> str:
     try:
         return importlib.metadata.version(distribution)
