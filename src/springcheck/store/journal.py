@@ -125,7 +125,8 @@ class Journal:
 
     def draft(self, label: str, scene: Scene) -> Draft:
         """A writer of one trajectory (see `Draft`)."""
-        self._sequence = max(self._sequence, len(self.sources())) + 1
+        # the one writer need look at what is there only once
+        self._sequence = (self._sequence or len(self.sources())) + 1
         return Draft(self._part("run", label), label, scene, sequence=self._sequence)
 
     def save(self, trajectory: Trajectory, scene: Scene) -> str:
