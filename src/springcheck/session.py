@@ -121,20 +121,25 @@ def run(
     with store.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
         store.room(path, store.size(scene) * (len(labels) - len(resumed)))
-        records: dict[str, simulate.Record] = {}
-        for label in labels:
+        for label in tuple(labels):
             if str(label) in resumed:
                 continue
             progress = started(label, scene.steps) if started else None
-            with journal.draft(str(label), scene) as draft:
-                record = simulate.play(scene, label, draft.append, progress=progress)
-                if record.outcome.status == "interrupted":
-                    missing = [str(one) for one in labels if str(one) not in journal.finished()]
-                    raise KeyboardInterrupt(f"not finished: {', '.join(missing)}")
-                empty = np.empty(0)
-                whole = simulate.trajectory(record, empty, empty, empty, None)
-                draft.finish(store.attributes(whole))
-                records[str(label)] = record
+            try:
+                with journal.draft(str(label), scene) as draft:
+                    record = simulate.play(scene, label, draft.append, progress=progress)
+                    if record.outcome.status == "interrupted":
+                        missing = [str(one) for one in labels if str(one) not in journal.finished()]
+                        raise KeyboardInterrupt(f"not finished: {', '.join(missing)}")
+                    empty = np.empty(0)
+                    whole = simulate.trajectory(record, empty, empty, empty, None)
+                    draft.finish(store.attributes(whole))
+            except MethodError as error:
+                # what only shows as an engine starts; a method that was asked for by name must not go missing
+                if str(label) in methods or len(labels) == 1:
+                    raise
+                labels.remove(label)
+                left.append(LeftOut(method=str(label), reason=str(error)))
         names = tuple(str(label) for label in labels)
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)

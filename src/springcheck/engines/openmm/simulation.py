@@ -266,7 +266,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         if np.ptp(rate) > 2.0**-52 * np.max(rate):
             raise MethodError(
                 "openmm:langevin-middle has one friction rate for all particles, and damping/mass of scene "
-                f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}; leave the method out"
+                f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}"
             )
         return mm.LangevinMiddleIntegrator(0.0, float(rate[0]), step)
     integrator = mm.CustomIntegrator(step)

@@ -164,11 +164,11 @@ class _Solver:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         n, take, step, done = self._n, self._solver.step, self._step, self._done
-        row, failure = 0, ""
+        failure = ""
         states: list[Floats] = []
         # SUNDIALS' logger prints on standard output, where results go
         with quiet.caught(1) as said:
-            for row in range(len(q)):
+            for _ in range(len(q)):
                 done += every
                 try:
                     result = take(done * step)
@@ -185,7 +185,7 @@ class _Solver:
             rows = np.array(states)
             q[: len(rows)], p[: len(rows)] = rows[:, :n], rows[:, n : 2 * n]
         if failure:
-            raise Stopped(row, " ".join([failure, *said]).strip())
+            raise Stopped(len(states), " ".join([failure, *said]).strip())
 
     def count(self, end: float, most: int) -> InternalSteps:
         """Go to `end` one internal step at a time."""

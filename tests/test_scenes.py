@@ -1,0 +1,492 @@
+"""Every scene is run by every method that can serve it, judged, and true to an independent route.
+
+The references in data/reference/motion are power series of the equations of motion in 40 digits, made
+without springcheck (validation/references.py).
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springcheck import catalogue, checks, engines, exact, mechanics, scenes, session, simulate
+from springcheck.cli import main
+from springcheck.engines.own import simulation as own
+from springcheck.errors import MethodError, SceneError
+from springcheck.exact import linear
+from springcheck.model import Floats, Scene, Trajectory
+
+Need = Callable[[str], None]
+
+REFERENCES = Path(__file__).parents[1] / "data" / "reference" / "motion"
+SHORT = 48
+
+
+def shortened(name: str) -> Scene:
+    """A shipped scene; the long chain with fewer masses and steps, because implicit Euler takes seconds."""
+    text = (scenes.folder() / f"{name}.toml").read_text(encoding="utf-8")
+    if "[chain]" in text:
+        table = tomllib.loads(text)
+        for field, value in (("masses", table["chain"]["masses"]), ("steps", table["time"]["steps"])):
+            text = text.replace(f"{field} = {value}", f"{field} = {SHORT if field == 'masses' else 200}")
+        text = text.replace("mode = 400", "mode = 40")
+    return scenes.parse(text, name=name)
+
+
+CASES = [
+    (name, str(label))
+    for name in scenes.names()
+    for label in engines.match(scenes.load_scene(name).include)
+    if engines.refusal(scenes.load_scene(name), label) is None
+]
+
+
+LEFT_OUT_AT_START = {("detest-b1", "openmm:langevin-middle")}
+"""What an engine cannot serve, and only finds out as it starts."""
+
+
+@pytest.mark.parametrize(("name", "label"), CASES, ids=[f"{name}-{label}" for name, label in CASES])
+def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: str, need: Need) -> None:
+    need(label)
+    scene = shortened(name)
+    if (name, label) in LEFT_OUT_AT_START:
+        with pytest.raises(MethodError, match="one friction rate"):
+            simulate.run(scene, label)
+        return
+    run = simulate.run(scene, label)
+    verdicts = checks.judge(scene, run)
+    assert [(v.check, v.value, v.bound) for v in verdicts if v.passed is False] == []
+    assert sum(v.passed is True for v in verdicts) >= 4
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_every_scene_is_served_by_own_methods_and_has_a_known_motion(name: str) -> None:
+    scene = scenes.load_scene(name)
+    assert any(label.startswith("own:") for scene_name, label in CASES if scene_name == name)
+    assert exact.has_true_motion(scene)
+    assert scene.source
+    header = scene.text.partition("\ntitle")[0]
+    for word in ("Source:", "Closed form:", "Teaches:"):
+        assert word in header or name in HEADED_OTHERWISE, word
+
+
+HEADED_OTHERWISE = frozenset(
+    {
+        "spring",
+        "spring-uneven",
+        "chain",
+        "detest-b1",
+        "stiff-spring",
+        "two-scales",
+        "multiple-time-steps",
+        "overdamped",
+    }
+)
+"""Scenes of before, whose title and source say it all."""
+
+
+@pytest.mark.parametrize("path", sorted(REFERENCES.glob("*.json")), ids=lambda path: path.stem)
+def test_the_true_motion_solves_the_equations_of_motion(path: Path) -> None:
+    scene = scenes.load_scene(path.stem)
+    found = json.loads(path.read_text(encoding="utf-8"))
+    steps = np.array([row["steps"] for row in found["motion"]])
+    assert steps[-1] == scene.steps, "the reference was to reach the end of the scene"
+    for states, key in zip(exact.true_motion(scene, steps, scene.step), "qp", strict=True):
+        wanted = np.array([[np.longdouble(x) for x in row[key]] for row in found["motion"]])
+        size = np.max(np.abs(wanted), axis=0)
+        off = np.max(np.abs(states[:, :: found["every"]] - wanted), axis=0)
+        assert np.max(off / np.where(size > 0, size, 1)) <= 1e-13
+
+
+def test_a_method_that_cannot_start_is_left_out_unless_it_was_asked_for(tmp_path: Path, need: Need) -> None:
+    need("openmm:langevin-middle")
+    scene = replace(scenes.load_scene("detest-b1"), steps=20)
+    found = session.run(scene, tmp_path / "x.h5", methods=["own:*", "openmm:langevin*"])
+    assert [run.method for run in found.runs] == [
+        "own:euler",
+        "own:semi-implicit-euler",
+        "own:implicit-euler",
+    ]
+    assert any("one friction rate" in left.reason for left in found.left_out)
+    with pytest.raises(MethodError, match="one friction rate"):
+        session.run(scene, tmp_path / "y.h5", methods=["own:euler", "openmm:langevin-middle"])
+
+
+def test_every_scene_has_a_reference() -> None:
+    stiff = {path.stem for path in (REFERENCES.parent / "stiff").glob("*.json")}
+    missing = set(scenes.names()) - {path.stem for path in REFERENCES.glob("*.json")} - stiff
+    assert not missing, "python validation/references.py --write NAME"
+
+
+def well(q: float, p: float, *, k: float, b: float, m: float = 3.7) -> Scene:
+    return Scene(
+        name="well", title="", source="", m=np.array([m]), q=np.array([q]), p=np.array([p]),
+        terms=(
+            mechanics.WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([0.4])),
+            mechanics.Quartic(i=np.array([0]), b=np.array([b]), at=np.array([0.4])),
+        ),
+        step=0.1, steps=400,
+    )  # fmt: skip
+
+
+def pendulum(q: float, p: float, *, depth: float = 2.3, m: float = 1.3) -> Scene:
+    term = mechanics.Cosine(
+        i=np.array([0]), depth=np.array([depth]), wave=np.array([0.6]), at=np.array([0.1])
+    )
+    return Scene(
+        name="pendulum", title="", source="", m=np.array([m]), q=np.array([q]), p=np.array([p]),
+        terms=(term,), step=0.1, steps=400,
+    )  # fmt: skip
+
+
+def bond(q: float, p: float, *, steepness: float = 0.7) -> Scene:
+    term = mechanics.Morse(
+        a=np.array([0]), b=np.array([1]), depth=np.array([4.1]), steepness=np.array([steepness]),
+        rest=np.array([1.1]),
+    )  # fmt: skip
+    return Scene(
+        name="bond", title="", source="", m=np.array([1.3, 2.9]), q=np.array([-0.2, q]), p=np.array([0.4, p]),
+        terms=(term,), step=0.1, steps=400,
+    )  # fmt: skip
+
+
+MOTIONS = {
+    "stiffening": well(0.7, 0.7, k=2.9, b=1.3),
+    "quartic alone": well(0.9, 0.9, k=0.0, b=2.1),
+    "across a double well": well(0.7, 2.9, k=-2.9, b=1.3),
+    "caught on the right": well(1.9, 0.7, k=-2.9, b=1.3),
+    "caught on the left": well(-1.2, -0.7, k=-2.9, b=1.3),
+    "at the bottom of one of two wells": well(0.4 + np.sqrt(2.9 / 1.3), 0.0, k=-2.9, b=1.3),
+    "on the barrier between two wells": well(0.4, 0.0, k=-2.9, b=1.3),
+    "softening, below its barriers": well(0.1, -0.7, k=2.9, b=-1.3),
+    "small swing": pendulum(0.2, 0.03),
+    "wide swing": pendulum(-4.4, -0.3),
+    "many turns from 0": pendulum(31.0, 0.9),
+    "over the top": pendulum(0.2, 5.3),
+    "over the top, backwards": pendulum(0.2, -5.3),
+    "upside down": pendulum(0.2, 1.3, depth=-2.3),
+    "bond": bond(1.3, -0.9),
+    "bond near dissociation": bond(3.3, -0.9),
+    "bond of negative steepness": bond(0.93, -0.9, steepness=-0.7),
+    "dissociating": bond(1.3, 4.9),
+    "collision": bond(9.3, -5.9),
+}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_a_closed_form_starts_at_the_start_and_obeys_newton(name: str) -> None:
+    """Energy stays, and dq/dt and dp/dt, by differences of eighth order, are p/m and the force.
+
+    A step e of a difference costs EPS/e in rounding and (e w)**8 in truncation; e = 2**-8 leaves 1e-15.
+    """
+    scene = MOTIONS[name]
+    assert exact.has_true_motion(scene)
+    e = 2.0**-8
+    weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280], np.longdouble)
+    norm = mechanics.norm(scene)
+    start = exact.true_motion(scene, np.array([0]), e)
+    assert norm(start[0] - scene.q, start[1] - scene.p)[0] < 64 * exact.EPS
+    for centre in (4, 100, 1000, 9000):
+        q, p = exact.true_motion(scene, centre + np.arange(-4, 5), e)
+        dq, dp = weights @ q / e, weights @ p / e
+        force = mechanics.force(scene.terms)(q[4:5], p[4:5])[0]
+        scale = np.max(np.abs(q)) + np.max(np.abs(p)) + np.max(np.abs(force))
+        assert np.max(np.abs(dq - p[4] / scene.m)) < 1e-14 * scale
+        assert np.max(np.abs(dp - force)) < 1e-13 * scale
+        energy = mechanics.energy(scene, q[4:5], p[4:5])[0] - mechanics.energy(scene, *start)[0]
+        assert abs(energy) <= 1e-14 * float(norm.unit) ** 2
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        well(2.9, 0.0, k=2.9, b=-1.3),
+        well(0.1, 9.0, k=2.9, b=-1.3),
+        replace(
+            well(0.1, 0.3, k=2.9, b=1.3),
+            terms=(
+                mechanics.WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.0])),
+                mechanics.Quartic(i=np.array([0]), b=np.array([1.3]), at=np.array([0.5])),
+            ),
+        ),
+    ],
+    ids=["beyond the barrier", "over the barrier", "two centres"],
+)
+def test_a_motion_without_a_closed_form_is_not_claimed(scene: Scene) -> None:
+    assert not exact.has_true_motion(scene)
+    with pytest.raises(ValueError, match="no closed form"):
+        exact.true_motion(scene, np.array([1]), 0.1)
+
+
+def test_groups_of_different_laws_move_as_each_does_alone() -> None:
+    parts = [
+        MOTIONS["stiffening"],
+        MOTIONS["wide swing"],
+        MOTIONS["bond"],
+        scenes.load_scene("spring-uneven"),
+    ]
+    offset, terms = 0, []
+    for part in parts:
+        for term in part.terms:
+            moved = {name: getattr(term, name) + offset for name in ("i", "a", "b") if _indexes(term, name)}
+            terms.append(replace(term, **moved))  # type: ignore[type-var]
+        offset += part.n
+    whole = replace(
+        parts[0],
+        terms=tuple(terms),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in ("m", "q", "p")},
+    )
+    steps = np.array([0, 17, 400])
+    q, p = exact.true_motion(whole, steps, 0.1)
+    alone = [exact.true_motion(part, steps, 0.1) for part in parts]
+    assert np.array_equal(q, np.concatenate([x for x, _ in alone], axis=1))
+    assert np.array_equal(p, np.concatenate([x for _, x in alone], axis=1))
+
+
+def _indexes(term: Any, name: str) -> bool:
+    return hasattr(term, name) and getattr(term, name).dtype.kind == "i"
+
+
+def test_the_modes_of_a_uniform_chain_are_sines() -> None:
+    scene = shortened("long-chain")
+    waves = exact.modes(scene)
+    assert waves.waves
+    w2, vectors = linear._eigen(np.asarray(mechanics.stiffness(scene, scene.q) / scene.m[0], np.longdouble))
+    assert np.max(np.abs(w2 - waves.w2)) < 16 * scene.n * exact.EPS * np.max(w2)
+    turned = np.abs(vectors.T @ waves.vectors)
+    # the slow modes lie close together, and what rounding mixes of them grows with the inverse distance
+    assert np.max(np.abs(turned - np.eye(scene.n))) < 1e-14
+    y = np.random.default_rng(3).normal(size=(4, scene.n)).astype(np.longdouble)
+    there = waves.into(y, y)
+    back = waves.out_of(*there)
+    assert max(np.max(np.abs(x - y)) for x in back) < 16 * exact.EPS * np.sqrt(scene.n)
+    assert np.max(np.abs(there[0] - (y * waves.root_m) @ waves.vectors)) < 64 * scene.n * exact.EPS
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -> None:
+    pytest.importorskip("numba")
+    scene = shortened(name)
+    for method in engines.engine("own").methods.values():
+        if engines.refusal(scene, engines.parse(f"own:{method.name}")):
+            continue
+        states = []
+        for compiled in (False, True):
+            q, p = np.empty((2, 20, scene.n))
+            with np.errstate(all="ignore"):
+                own.prepare(scene, method.name, scene.step, compiled=compiled).advance(3, q, p)
+            states.append((q, p))
+        assert np.array_equal(states[0][0], states[1][0], equal_nan=True)
+        assert np.array_equal(states[0][1], states[1][1], equal_nan=True)
+
+
+WAVE_NUMBERS = {"carbon-monoxide": (2169.81358, 1e-7), "ch-bond": (2936.43, 2e-6)}
+"""1/cm and how precisely it is known: the scene's stiffness has ten digits; CH by sqrt(k/mass)/2 pi c."""
+
+LIGHT = 299792458.0 * 100 * 1e-12
+"""Speed of light in cm/ps, exact since 1983."""
+
+
+def length(run: Trajectory) -> Floats:
+    return np.asarray(run.q[:, 1] - run.q[:, 0])
+
+
+@pytest.mark.parametrize("name", WAVE_NUMBERS)
+@pytest.mark.parametrize(
+    "label", ["openmm:verlet", "openmm:leapfrog", "ase:velocity-verlet", "own:semi-implicit-euler"]
+)
+def test_engines_give_a_molecule_its_wave_number(name: str, label: str, need: Need) -> None:
+    """From u(n+1) + u(n-1) = 2 cos(W h) u(n), as for every Verlet; sin(W h/2) = w h/2 undoes it."""
+    need(label)
+    scene = scenes.load_scene(name)
+    term = scene.terms[0]
+    assert isinstance(term, mechanics.Spring)
+    u = length(simulate.run(scene, label)) - term.rest[0]
+    twice = float(u[1:-1] @ (u[2:] + u[:-2]) / (u[1:-1] @ u[1:-1]))
+    w = 2 * np.sqrt((2 - twice) / 4) / scene.step
+    wanted, digits = WAVE_NUMBERS[name]
+    assert w / (2 * np.pi * LIGHT) == pytest.approx(wanted, rel=digits)
+
+
+@pytest.mark.parametrize("name", ["carbon-monoxide", "ch-bond", "morse-bond"])
+def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: Need) -> None:
+    """Each conversion rounds once; errors of each step are carried on for the rest of the run."""
+    need("openmm:verlet")
+    need("ase:velocity-verlet")
+    scene = scenes.load_scene(name)
+    one, other = simulate.run(scene, "openmm:verlet"), simulate.run(scene, "ase:velocity-verlet")
+    case = checks.Case(trajectory=other, scene=scene)
+    hw = scene.step * checks.fastest(case)
+    allowed = 2 * case.roundings * case.rounding * scene.steps * (1 + scene.steps * hw)
+    assert np.max(mechanics.norm(scene)(one.q - other.q, one.p - other.p)) <= allowed
+    assert allowed < 1e-6
+
+
+@pytest.mark.parametrize("label", ["openmm:verlet", "ase:velocity-verlet"])
+def test_the_centre_of_mass_goes_straight_on(label: str, need: Need) -> None:
+    need(label)
+    scene = scenes.load_scene("carbon-monoxide")
+    run = simulate.run(scene, label)
+    centre = run.q @ scene.m / np.sum(scene.m)
+    wanted = centre[0] + run.t * np.sum(scene.p) / np.sum(scene.m)
+    assert np.max(np.abs(centre - wanted)) < scene.steps * 2.0**-52 * np.max(np.abs(run.q))
+
+
+def test_units_convert_as_codata_says_in_both_directions(need: Need) -> None:
+    """ASE counts in A, eV and u by the constants of CODATA 2014, whose elementary charge and atomic mass
+    constant have 6e-9 and 1.2e-8 of uncertainty; from 2019 on the charge is exact."""
+    need("ase:velocity-verlet")
+    from springcheck.engines.ase import simulation as ase
+
+    e_2014, u_2014 = 1.6021766208e-19, 1.660539040e-27
+    unit = np.sqrt(u_2014 / e_2014) * 1e-10
+    assert pytest.approx(1e-12 / unit, rel=1e-15) == ase.PICOSECOND
+    assert pytest.approx(unit, rel=1e-15) == 1e-12 / ase.PICOSECOND
+    assert ase.NANOMETRE == 10.0
+    # one kJ/mol is u nm**2/ps**2 to 3e-10 (molar mass constant, CODATA 2018); in eV by the exact constants
+    energy = (ase.NANOMETRE / ase.PICOSECOND) ** 2
+    avogadro, e = 6.02214076e23, 1.602176634e-19
+    assert energy == pytest.approx(1000 / avogadro / e, rel=3e-8)
+    assert 1 / energy == pytest.approx(e * avogadro / 1000, rel=3e-8)
+    u_2022 = 1.66053906892e-27
+    k = 1145328.357 * u_2022 * 1e24
+    assert k == pytest.approx(1901.8625, rel=1e-7)
+    assert k / (u_2022 * 1e24) == pytest.approx(1145328.357, rel=1e-15)
+
+
+def test_the_stiffness_of_carbon_monoxide_is_that_of_its_wave_number() -> None:
+    scene = scenes.load_scene("carbon-monoxide")
+    term = scene.terms[0]
+    assert isinstance(term, mechanics.Spring)
+    mass = scene.m[0] * scene.m[1] / np.sum(scene.m)
+    assert term.k[0] == pytest.approx(mass * (2 * np.pi * LIGHT * 2169.81358) ** 2, rel=1e-9)
+
+
+def test_the_bond_of_hydrogen_chloride_has_its_spectroscopic_constants() -> None:
+    term = scenes.load_scene("morse-bond").terms[0]
+    m = scenes.load_scene("morse-bond").m
+    assert isinstance(term, mechanics.Morse)
+    mass = m[0] * m[1] / np.sum(m)
+    w = term.steepness[0] * np.sqrt(2 * term.depth[0] / mass)
+    assert w / (2 * np.pi * LIGHT) == pytest.approx(2990.9463, rel=1e-7)
+    planck, u = 6.62607015e-34, 1.66053906892e-27
+    per_cm = planck * LIGHT * 1e12 / (u * 1e6)
+    assert (w / (2 * np.pi * LIGHT)) ** 2 / (4 * term.depth[0] / per_cm) == pytest.approx(52.8186, rel=1e-6)
+
+
+def test_a_circuit_is_an_oscillator_of_charge_and_flux() -> None:
+    scene = scenes.load_scene("rlc-circuit")
+    assert scene.kind == "circuit"
+    assert scene.units == "si"
+    assert scene.m.tolist() == [3.3e-3]
+    modes = exact.modes(scene)
+    assert float(modes.w2[0]) == pytest.approx(1 / (3.3e-3 * 47e-9), rel=1e-15)
+    assert float(modes.rate[0]) == pytest.approx(22.0 / 3.3e-3, rel=1e-15)
+    left = {one.method: one.reason for one in session.choose(scene, ())[1]}
+    assert left["openmm:verlet"] == "OpenMM moves particles, not circuits"
+    assert left["ase:velocity-verlet"] == "ASE moves particles, not circuits"
+
+
+def test_two_loops_share_a_capacitor() -> None:
+    """Equal loops: in phase the shared capacitor carries nothing, against each other twice the charge."""
+    text = (scenes.folder() / "lc-circuit.toml").read_text(encoding="utf-8")
+    second = "[[inductor]]\ninductance = 3.3e-3\n\n[[capacitor]]\nloops = [1]\ncapacitance = 47e-9\n\n"
+    shared = "[[capacitor]]\nloops = [0, 1]\ncapacitance = 10e-9\n\n"
+    scene = scenes.parse(text.replace("[time]", second + shared + "[time]"), name="two")
+    w2 = np.sort(exact.modes(scene).w2)
+    expected = np.array([1 / 47e-9, 1 / 47e-9 + 2 / 10e-9]) / 3.3e-3
+    assert np.max(np.abs(w2 / expected - 1)) < 1e-15
+
+
+FREE = 'title = "x"\n[[particle]]\nmass = 1.3\n[time]\nstep = 0.1\nsteps = 10\n'
+BOND = "[[morse]]\nends = [0, 0]\ndepth = 1.0\nsteepness = 1.0\nrest = 1.0\n"
+PENDULUM = "[[cosine]]\nparticle = 0\ndepth = 1.0\nlength = 0.0\n"
+MISTAKES = {
+    "an unknown field of a term": (
+        "[[quartic]]\nparticle = 0\nstrength = 1.0\n",
+        ("quartic[0]", "strength", "coefficient, at"),
+    ),
+    "a missing field of a term": ("[[cosine]]\nparticle = 0\n", ("cosine[0]", "depth")),
+    "a particle that is not there": (
+        "[[quartic]]\nparticle = 3\ncoefficient = 1.0\n",
+        ("quartic[0].particle = 3", "0 to 0"),
+    ),
+    "a length of zero": (PENDULUM, ("cosine[0].length", "0.0", "> 0")),
+    "a bond to itself": (BOND, ("morse[0].ends", "same particle")),
+    "a bond that pushes": (BOND.replace("depth = 1", "depth = -1"), ("morse[0].depth", "-1.0", "> 0")),
+    "a capacitor in a mechanical scene": (
+        "[[capacitor]]\nloops = [0]\ncapacitance = 1.0\n",
+        ("circuit", "[[inductor]]"),
+    ),
+    "two kinds of things that move": ("[[rotor]]\ninertia = 1.0\n", ("[[particle]]", "[[rotor]]")),
+    "a kind that the tables deny": ('kind = "rotor"\n', ("kind = 'rotor'", "[[particle]]")),
+    "a term that is not there": ("[[magnet]]\nparticle = 0\n", ("magnet", "quartic", "spring")),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_a_term_is_answered_with_its_field_and_what_is_accepted(name: str) -> None:
+    table, words = MISTAKES[name]
+    text = table + FREE if table.startswith("kind") else FREE + table
+    with pytest.raises(SceneError) as caught:
+        scenes.parse(text, name="bad", where="bad.toml")
+    for word in ("bad.toml", *words):
+        assert word in str(caught.value), str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("masses = 1000", "masses = 0", ("chain.masses", "0", ">= 1")),
+        ("mode = 400", "mode = 4000", ("chain.wave[2].mode = 4000", "1000 modes")),
+        ("mode = 400", "mode = 0", ("chain.wave[2].mode", ">= 1")),
+    ],
+)
+def test_a_mistake_in_a_chain_is_answered(old: str, new: str, words: tuple[str, ...]) -> None:
+    text = (scenes.folder() / "long-chain.toml").read_text(encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        scenes.parse(text.replace(old, new), name="bad", where="bad.toml")
+    for word in ("bad.toml", *words):
+        assert word in str(caught.value), str(caught.value)
+
+
+def test_a_circuit_keeps_its_units() -> None:
+    text = (scenes.folder() / "lc-circuit.toml").read_text(encoding="utf-8")
+    with pytest.raises(SceneError, match="units = 'md'"):
+        scenes.parse(text.replace("[[inductor]]", 'units = "md"\n[[inductor]]', 1), name="x")
+
+
+def test_a_chain_of_any_length_stands_between_walls() -> None:
+    text = (scenes.folder() / "long-chain.toml").read_text(encoding="utf-8").split("[[chain.wave]]")
+    for masses in (1, 2, 5):
+        wave = "[[chain.wave]]\nmode = 1\namplitude = 0.7\n\n[time]\nstep = 0.1\nsteps = 10\n"
+        scene = scenes.parse(text[0].replace("1000", str(masses)) + wave, name="x")
+        w2 = np.sort(exact.modes(scene).w2)
+        wanted = 4 * 2.9 / 1.3 * np.sin(np.pi * np.arange(1, masses + 1) / (2 * (masses + 1))) ** 2
+        assert np.max(np.abs(w2 - wanted)) < 1e-14
+
+
+def test_a_new_file_in_the_folder_is_a_scene_with_no_other_edit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(scenes.folder(), tmp_path / "scenes")
+    text = (scenes.folder() / "anharmonic.toml").read_text(encoding="utf-8")
+    (tmp_path / "scenes" / "harder.toml").write_text(
+        text.replace("coefficient = 1.7", "coefficient = 5.9"), encoding="utf-8"
+    )
+    monkeypatch.setattr(scenes, "folder", lambda: tmp_path / "scenes")
+    monkeypatch.chdir(tmp_path)
+    assert "harder" in [scene["name"] for scene in catalogue.catalogue()["scenes"]]
+    assert main(["run", "harder", "--method", "own:*", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["scene"] == "harder"
+    assert all(v["passed"] is not False for v in found["verdicts"])
+    assert (tmp_path / "harder.h5").is_file()
