@@ -158,3 +158,29 @@ def test_a_large_step_of_an_inverted_spring_can_turn_backwards() -> None:
         found += bool(one[0, 0, 1] < 0)
         assert alarms(checks.judge(scene, plain(scene, "forest-ruth"))) == []
     assert found
+
+
+def test_frames_far_apart_are_judged_by_a_power_of_the_map() -> None:
+    scene = replace(scenes.load_scene("chain"), steps=6000, every=3000)
+    run = springcheck.run(scene, "own:semi-implicit-euler")
+    (defect,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
+    assert defect.passed
+    (wrong,) = (
+        v for v in checks.judge(scene, replace(run, q=run.q * (1 + 1e-9))) if v.check == "step-defect"
+    )
+    assert wrong.passed is False
+
+
+@pytest.mark.parametrize("label", ["own:euler", "own:semi-implicit-euler"])
+@pytest.mark.parametrize("step", [0.2, 1.9])
+def test_a_right_engine_passes_to_the_very_end_of_the_range_of_numbers(label: str, step: float) -> None:
+    scene = replace(scenes.load_scene("spring-uneven"), step=step, steps=60_000, every=10)
+    # from a start this small the end, in units of the start, is beyond double's range
+    scene = replace(scene, q=scene.q * 1e-9, p=scene.p * 1e-9)
+    run = springcheck.run(scene, label)
+    if label == "own:euler":
+        assert run.outcome.status == "diverged"
+        assert np.max(np.abs(run.q)) > 1e300
+    verdicts = checks.judge(scene, run)
+    assert all(v.passed is not False for v in verdicts), [v for v in verdicts if v.passed is False]
+    assert any(v.check == "frequency" and v.passed for v in verdicts)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import scenes
+from springcheck import scenes, store
 from springcheck.cli import main
 
 OWN = ["--method", "own:*"]
@@ -187,3 +187,48 @@ def test_a_stored_run_is_repeated_bit_for_bit(
     assert repeat["equal"] is False
     assert 1e-16 < repeat["difference"] < 1e-11
     assert {path.name for path in Path().iterdir()} == {"spring-uneven.h5"}
+
+
+def test_force_never_overwrites_a_scene(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (scenes.folder() / "spring.toml").read_text()
+    Path("mine.toml").write_text(text)
+    assert main(["run", "mine.toml", *OWN, "--force", "-o", "mine.toml"]) == 2
+    assert "is a scene's" in capsys.readouterr().err
+    assert Path("mine.toml").read_text() == text
+
+
+def test_a_scene_file_may_begin_with_a_byte_order_mark_and_end_its_lines_as_on_windows() -> None:
+    text = (scenes.folder() / "spring.toml").read_text()
+    Path("marked.toml").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    assert main(["run", "marked.toml", *OWN, "--quiet"]) == 0
+    assert main(["run", "--from", "marked.h5"]) == 0
+
+
+def test_an_unfinished_store_can_be_looked_at(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = springcheck.load_scene("spring-uneven")
+    run = springcheck.run(scene, "own:euler")
+    with store.open_new("some.h5", "some command") as journal, journal.draft("own:euler", scene) as draft:
+        draft.append(run.t, run.q, run.p, run.energy)
+        draft.finish(store.attributes(run))
+    assert main(["inspect", "some.h5"]) == 0
+    text = capsys.readouterr().out
+    assert "unfinished" in text
+    assert "own:euler" in text
+
+
+def test_a_store_of_a_study_has_nothing_to_run_again(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["stability", "spring", "--method", "own:euler", "--quiet", "-o", "study.h5"]) == 0
+    assert main(["run", "--from", "study.h5"]) == 2
+    assert "no trajectory to run again" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "springcheck", "list"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("springcheck: ")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, engines, exact, mechanics, scenes
+from springcheck import checks, engines, exact, mechanics, scenes, simulate
 from springcheck.errors import MethodError
 from springcheck.model import Scene, Trajectory
 
@@ -197,3 +197,29 @@ def test_every_engine_has_methods_of_known_schemes() -> None:
             assert method.scheme in SCHEMES
             assert method.engine == name
             assert method.adaptive != SCHEMES[method.scheme].one_step
+
+
+@pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:verlet", "sundials:bdf"])
+def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
+    label: str, need: Need, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need(label)
+    scene = replace(scenes.load_scene("spring-uneven"), steps=300, every=100)
+    whole = springcheck.run(scene, label)
+    monkeypatch.setattr(simulate, "PIECE", 7)
+    told: list[int] = []
+    pieces = springcheck.run(scene, label, progress=told.append)
+    assert np.array_equal(whole.q, pieces.q)
+    assert np.array_equal(whole.p, pieces.p)
+    assert sum(told) == 300
+    assert whole.force_calls == pieces.force_calls
+
+
+def test_chunks_of_any_length_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(scenes.load_scene("chain"), steps=1000)
+    whole = springcheck.run(scene, "own:euler")
+    monkeypatch.setattr(simulate, "FIRST", 3)
+    monkeypatch.setattr(simulate, "CHUNK", 40)
+    pieces = springcheck.run(scene, "own:euler")
+    assert np.array_equal(whole.q, pieces.q)
+    assert np.array_equal(whole.energy, pieces.energy)

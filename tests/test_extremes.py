@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from springcheck import engines
+from springcheck import engines, store
+from springcheck.figures import extremes as figures
 from springcheck.studies import extremes
 from springcheck.studies.extremes import grid, judging, refusals, running
 
@@ -95,3 +97,9 @@ def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() ->
     spec = grid.Spec(block="step", m=3.7, k=0.0, q=0.8, p=0.0, h=3e300)
     (cell,) = running.cells(engines.parse("own:implicit-euler"), [spec])
     assert cell.outcome == "right"
+
+
+def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
+    atlas = extremes.record(tmp_path / "extremes.h5", ["own:euler"], quick=True)
+    assert store.check(tmp_path / "extremes.h5") == []
+    assert {path.suffix for path in figures.draw(atlas, tmp_path)} == {".png", ".svg"}

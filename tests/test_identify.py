@@ -187,6 +187,39 @@ def test_an_adaptive_solver_is_not_forced_into_a_scheme(method: str) -> None:
     assert any("adaptive" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("w", [0.0217, 0.03499, 0.035], ids=["over", "nearly", "critically"])
+def test_friction_up_to_the_critical_and_beyond_is_found_at_any_stride(w: float) -> None:
+    # gamma h = 0.07, so that w h = 0.035 is critical; two real rates or hardly any phase show a stride badly
+    m, h = np.array([3.7]), 0.31
+    k = m * (w / h) ** 2
+    q, p = np.array([1.3]), np.array([0.9])
+    states = [(q, p)]
+    for _ in range(100):
+        for _ in range(7):
+            q, p = step(
+                SCHEMES["langevin-middle"],
+                q,
+                p,
+                h=h,
+                m=m,
+                force=lambda q, p: -k * q,
+                rate=np.full(1, 0.07 / h),
+            )
+        states.append((q, p))
+    qs, ps = (np.array([x[i] for x in states], dtype=np.float64) for i in (0, 1))
+    found = identify(np.arange(101) * (7 * h), qs, ps, mass=m)
+    assert (found.scheme, found.stride, found.precision) == ("langevin-middle", 7, "double")
+    assert found.friction[0] * h == pytest.approx(0.07, rel=1e-10)
+    assert found.stiffness == pytest.approx(k, rel=1e-9)
+
+
+def test_motion_that_has_died_down_to_zero_in_single_precision_does_no_harm() -> None:
+    made = case("implicit-euler", np.random.default_rng(22), stride=7, lowest=0.9)
+    found = identify(made.t, single(made.q), single(made.p), **made.names)
+    assert np.all(single(made.q)[-30:] == 0)
+    assert (found.scheme, found.stride, found.fits) == ("implicit-euler", 7, True)
+
+
 def test_leapfrog_velocities_half_a_step_early_or_late_are_said_to_be_so() -> None:
     rng = np.random.default_rng(9)
     early = case("semi-implicit-euler", rng)

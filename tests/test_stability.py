@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from springcheck import engines, scenes, schemes
+from springcheck.figures import stability as figures
 from springcheck.model import Extended
 from springcheck.studies import stability
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
@@ -124,3 +125,13 @@ def test_a_wrong_growth_fails_the_study(need: Need) -> None:
     wrong = replace(study, limits=(replace(limit, growth_above=limit.growth_above * (1 + 1e-4)),))
     assert not wrong.passed
     assert "growth" in stability.failures(wrong)[0]
+
+
+def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
+    need("openmm:mts")
+    study = stability.measure(scenes.load_scene("multiple-time-steps"), ["own:*", "openmm:mts"])
+    damped = stability.measure(scenes.load_scene("overdamped"), ["own:implicit-euler"])
+    written = [path.name for one in (study, damped) for path in figures.draw(one, tmp_path)]
+    for name in ("limits", "resonances", "regions", "costs-overdamped"):
+        assert f"stability-{name}.png" in written
+        assert (tmp_path / f"stability-{name}.png").stat().st_size > 10_000

@@ -1,10 +1,18 @@
 """Claim: `identify` names scheme, stride and precision of every known scheme, from states alone.
 
-For each scheme 200 random springs (m over four decades, h over four, h w log-uniform from 0.02 to 1.5 or
+For each scheme random springs (m over four decades, h over four, h w log-uniform from 0.02 to 1.5 or
 0.95 of the limit of stability, any start, 1 to 8 steps to a frame, 101 frames), with mass and stiffness
-stated.  In double precision every one is named alone.  With numbers rounded to single precision or to
-6 digits of text the right one is always among those that are not excluded, and where several are left,
-because the error of a step is below the rounding, that is said.
+stated.  Measured:
+
+* double precision, 200 springs for each of 17 schemes: every one right in scheme, stride and precision, and
+  alone, but 63 of 200 exact flows, where others were not excluded;
+* numbers rounded to single precision, 200 springs for each of the 14 schemes up to Yoshida's (frictional
+  schemes and the exact flow were not measured): all right for the ten schemes up to second order, and none
+  wrong without saying so at higher orders: where the error of a step is below the rounding, the exact
+  flow or RK4 is named, and the right one is said not to be excluded: RK4 43 of 200, Ruth 3, Forest-Ruth 31,
+  Yoshida 22.  There 13, 3, 8 and 16 of the springs are called "single" and not "double, stored in single";
+* text of 6 digits, 50 springs for each of 17 schemes: all right up to second order and with friction, and
+  likewise the right one not excluded for RK4 20 of 50, Ruth 12, Forest-Ruth 13, Yoshida 11.
 
 Command: python validation/identify_census.py [double|single|text] [springs]
 """
@@ -90,7 +98,12 @@ def main() -> None:
             elif any(f"{x}{steps}" in found.candidates for x in same):
                 seen[f"called {found.scheme}, right one not excluded; {found.precision}"] += 1
             else:
-                seen[f"WRONG: {found.scheme}, stride {found.stride} for {stride}"] += 1
+                seen["WRONG"] += 1
+                hw = float(np.sqrt(k[0] / m[0]) * t[1] / stride)
+                print(
+                    f"  WRONG: {found.scheme}, {found.stride} for {name}, {stride}; h w = {hw:.4g}",
+                    flush=True,
+                )
         print(f"{name:32s}", "; ".join(f"{n} {what}" for what, n in seen.most_common()), flush=True)
 
 

@@ -33,13 +33,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SpringcheckError as error:
         print(f"springcheck: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print(
-            "springcheck: interrupted; what was finished is kept, the same command goes on", file=sys.stderr
-        )
+    except KeyboardInterrupt as interrupt:
+        missing = f"; {interrupt}" if str(interrupt) else ""
+        keeps = command is _run and options.source is None
+        kept = "what was finished is kept, the same command goes on" if keeps else "nothing is kept"
+        print(f"springcheck: interrupted{missing}; {kept}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # whoever read our output has closed it; nothing is left to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 2
+    except OSError as error:
+        # the library names its files; what is left is our own output, on a full disk for one
+        print(f"springcheck: {error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 2
 
@@ -405,16 +411,25 @@ def _identify(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from springcheck import inspection
-    from springcheck.figures import precision, trajectories
+    from springcheck import inspection, store
+    from springcheck.figures import extremes, precision, stability, trajectories
 
     path, folder = Path(options.file), Path(options.output)
-    study = inspection.studied(path)
-    written = [] if study is None else precision.draw(study, folder)
+    summary = store.summary(path)
+    studies = inspection.studied(path, summary)
+    written: list[Path] = []
+    if studies.precision is not None:
+        written += precision.draw(studies.precision, folder)
+    if studies.stability is not None:
+        written += stability.draw(studies.stability, folder)
+    if studies.extremes is not None:
+        written += extremes.draw(studies.extremes, folder)
     notes: list[str] = []
-    if study is None or inspection.has_trajectories(path):
-        scene, runs, notes = inspection.drawable(path)
+    if summary.runs or not studies.any:
+        scene, runs, notes = inspection.drawable(path, summary)
         written += trajectories.draw(scene, runs, folder)
+    if not written:
+        raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
     if not options.quiet:
         for line in notes:
             print(line)
@@ -428,7 +443,7 @@ def _check(options: argparse.Namespace) -> int:
 
     findings = store.check(Path(options.file))
     for finding in findings:
-        print(finding)
+        print(f"{options.file}: {finding.place}: {finding.what}")
     if not findings:
         print(f"{options.file}: whole; every digest matches")
     return 1 if findings else 0

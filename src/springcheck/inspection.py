@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rich.table import Table
@@ -13,7 +14,11 @@ from rich.table import Table
 from springcheck import report, session, store
 from springcheck.errors import SpringcheckError, StoreError
 from springcheck.model import Comparison, Scene, Trajectory, Verdict
-from springcheck.studies import precision
+from springcheck.studies import extremes, precision, stability
+from springcheck.studies.extremes import Atlas
+from springcheck.studies.stability import Stability
+
+T = TypeVar("T")
 
 MOST_FRAMES = 20_000
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
@@ -29,6 +34,22 @@ class Found:
     frames: Trajectory | None
     """Some frames of the trajectory asked for, all over its length."""
     stride: int = 1
+    studies: Studies
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Studies:
+    """The studies in a store; None for what it has not."""
+
+    precision: dict[str, Any] | None
+    """The document of a study of precision."""
+    stability: Stability | None
+    extremes: Atlas | None
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return any(found is not None for found in (self.precision, self.stability, self.extremes))
 
 
 def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
@@ -37,41 +58,47 @@ def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
     frames, stride = store.strided(path, trajectory, rows) if trajectory else (None, 1)
     return Found(
         summary=summary,
-        verdicts=store.verdicts(path),
-        comparison=store.comparison(path),
+        # an unfinished run has trajectories beside the file that it will write
+        verdicts=store.verdicts(path) if path.is_file() else (),
+        comparison=store.comparison(path) if path.is_file() else None,
         frames=frames,
         stride=stride,
+        studies=studied(path, summary),
     )
 
 
-def drawable(path: Path) -> tuple[Scene, dict[str, Trajectory], list[str]]:
+def drawable(path: Path, summary: store.Summary) -> tuple[Scene, dict[str, Trajectory], list[str]]:
     """Scene and trajectories of a store to draw, and what was left out of them."""
+    if not summary.runs:
+        raise SpringcheckError(f"{path}: holds no trajectory and no study to draw")
     scene = session.stored_scene(path)
     runs: dict[str, Trajectory] = {}
     notes = []
-    for run in store.summary(path).runs:
+    for run in summary.runs:
         runs[run.label], stride = store.strided(path, run.label, MOST_FRAMES)
         if stride > 1:
             notes.append(f"{run.label}: every {stride}th of {run.frames} frames is drawn")
-    if not runs:
-        raise SpringcheckError(f"{path}: holds no trajectory to draw")
     return scene, runs, notes
 
 
-def has_trajectories(path: Path) -> bool:
-    """Whether a store holds trajectories; one of a study alone holds none."""
-    return bool(store.summary(path).runs)
+def studied(path: Path, summary: store.Summary) -> Studies:
+    """The studies of a store, from what it keeps.  StoreError where one of them cannot be read."""
 
+    def kept(name: str) -> bool:
+        return name in summary.documents
 
-def studied(path: Path) -> dict[str, Any] | None:
-    """The document of a study of precision in a store, or None."""
-    if not path.is_file():
-        return None
     try:
-        found: dict[str, Any] = json.loads(store.document(path, precision.DOCUMENT))
-    except StoreError:
-        return None
-    return found
+        return Studies(
+            precision=json.loads(store.document(path, precision.DOCUMENT))
+            if kept(precision.DOCUMENT)
+            else None,
+            stability=stability.stored(path, session.stored_scene(path))
+            if kept(stability.DOCUMENT)
+            else None,
+            extremes=extremes.stored(path) if kept(extremes.DOCUMENT) else None,
+        )
+    except json.JSONDecodeError as error:
+        raise StoreError(f"{path}: the document of its study is no JSON: {error}") from error
 
 
 def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
@@ -95,7 +122,8 @@ def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
                 f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
             )
         )
-    out.append(_runs(summary))
+    if summary.runs:
+        out.append(_runs(summary))
     for name in summary.tables:
         out.append(report.plain(f"table {name}"))
     if found.verdicts:
@@ -110,6 +138,12 @@ def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
             report.plain("Largest differences, in units of the start:"),
         ]
         out.append(_comparison(found.comparison))
+    if found.studies.precision is not None:
+        out += [report.plain(), *report.precision_document(found.studies.precision)]
+    if found.studies.stability is not None:
+        out += [report.plain(), *report.stability_report(found.studies.stability)]
+    if found.studies.extremes is not None:
+        out += [report.plain(), *report.extremes_report(found.studies.extremes)]
     if found.frames is not None:
         out += [report.plain(), _frames(found.frames, found.stride)]
     return out
@@ -193,6 +227,15 @@ def document(found: Found) -> dict[str, Any]:
             for run in found.summary.runs
         ],
         "tables": list(found.summary.tables),
+        "studies": {
+            name: one
+            for name, one in (
+                (precision.DOCUMENT, found.studies.precision),
+                (stability.DOCUMENT, _of(stability.document, found.studies.stability)),
+                (extremes.DOCUMENT, _of(extremes.document, found.studies.extremes)),
+            )
+            if one is not None
+        },
         "verdicts": [session.verdict_document(verdict) for verdict in found.verdicts],
         "trajectory": None
         if frames is None
@@ -204,6 +247,10 @@ def document(found: Found) -> dict[str, Any]:
             "p": frames.p.tolist(),
         },
     }
+
+
+def _of(form: Callable[[T], dict[str, Any]], study: T | None) -> dict[str, Any] | None:
+    return None if study is None else form(study)
 
 
 def _json(value: Any) -> Any:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
@@ -33,7 +34,11 @@ def run_report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [headline(report), plain(), runs_table(report.runs)]
     out.append(plain("error: farthest from the true motion; energy: (H - H0)/H0 where largest", "dim"))
-    out += [plain(f"  {run.method}: {run.message}") for run in report.runs if run.message]
+    out += [
+        plain(f"  {run.method}: {run.outcome} after step {run.step}: {run.message}")
+        for run in report.runs
+        if run.outcome != "complete"
+    ]
     out += same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
     out += matrices(report.verdicts)
@@ -81,13 +86,20 @@ def runs_table(runs: Sequence[Run]) -> Table:
             good = run.outcome == "complete"
             table.add_row(
                 plain(f"  {run.method}"),
-                "-" if np.isnan(run.max_error) else f"{run.max_error:.2e}",
+                _error(run.max_error),
                 f"{run.energy_drift:+.1e}",
                 seconds(run.timing.start),
                 seconds(run.timing.run),
-                plain("complete" if good else f"{run.outcome}, step {run.step}", "" if good else "red"),
+                plain(run.outcome, "" if good else "red"),
             )
     return table
+
+
+def _error(x: float) -> str:
+    """Three digits in eight columns, two where the exponent takes three places."""
+    if np.isnan(x):
+        return "-"
+    return f"{x:.2e}" if x < 1e100 else f"{x:.1e}"
 
 
 def same_motions(report: Report) -> Lines:
@@ -209,18 +221,10 @@ def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
 def identification(label: str, found: Identification) -> Lines:
     """What a trajectory says of the scheme that made it."""
     style = "bold" if found.fits else "bold red"
-    out: Lines = [plain(f"{label}: {found.scheme}", style)]
-    if not found.fits:
-        out.append(
-            plain(f"  nearest: {found.nearest}; off by {', '.join(f'{x:.1e}' for x in found.difference)}")
-        )
-    also = [*found.aliases, *(c for c in found.candidates if c != found.scheme)]
+    recorded = "" if found.stride <= 1 else f", {found.stride} steps from frame to frame"
     rows = [
-        ("the same map on a spring", ", ".join(dict.fromkeys(also))),
-        (
-            "step",
-            f"{found.step:.9g}, every {found.stride} recorded" if found.stride > 1 else f"{found.step:.9g}",
-        ),
+        ("same map on a spring", ", ".join(found.aliases)),
+        ("step", f"{found.step:.9g}{recorded}"),
         ("angular frequency", _numbers(found.omega)),
         ("stiffness", _numbers(found.stiffness)),
         ("velocities", _offset(found.velocity_offset)),
@@ -228,9 +232,20 @@ def identification(label: str, found: Identification) -> Lines:
         ("symplectic defect", f"{found.symplectic_defect:.1e}"),
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
-    out += [plain(f"  {name + ':':26}{text}") for name, text in rows if text and "nan" not in text]
-    out += [plain(f"  note: {note}") for note in found.notes]
+    misfit = ", but what is stated does not fit" if found.stride and not found.fits else ""
+    out: Lines = [plain(f"{label}: {found.scheme}{misfit}", style)]
+    for name, text in rows:
+        if text and "nan" not in text:
+            out += _hanging(f"  {name + ':':24}", text)
+    for note in found.notes:
+        out += _hanging("  note: ", note)
     return out
+
+
+def _hanging(head: str, text: str) -> Lines:
+    """Text of 80 columns, its further lines indented as far as its head is long."""
+    broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
+    return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]
 
 
 def _numbers(values: tuple[float, ...] | None) -> str:
@@ -311,6 +326,43 @@ def precision_report(study: PrecisionStudy, *, points: bool = False) -> Lines:
     if study.interrupted:
         out.append(plain("Interrupted: every point that was finished is here.", "bold red"))
     return out
+
+
+def precision_document(study: Mapping[str, Any]) -> Lines:
+    """What a stored study of precision says (`PrecisionStudy.document`)."""
+    table, cheapest = grid(), grid()
+    for name in ("method", "points", "order", "floor", "step", "start"):
+        table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for m in study["methods"]:
+        complete = [p for p in study["points"] if p["method"] == m["method"] and p["max_error"] is not None]
+        table.add_row(
+            plain(m["method"]),
+            str(len(complete)),
+            "-" if m["order"] is None else f"{m['order']:.4f}({m['order_standard_error']:.0e})",
+            "-" if m["floor"] is None else f"{m['floor']:.1e}",
+            *("-" if m[x] is None else seconds(m[x]) for x in ("seconds_per_step", "start_seconds")),
+        )
+    for name in ("error", "method", "run", "force calls"):
+        cheapest.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
+    for answer in study["cheapest"]:
+        if answer["method"] is None:
+            cheapest.add_row(f"{answer['error']:.0e}", plain("none reaches it"), "", "")
+        else:
+            cheapest.add_row(
+                f"{answer['error']:.0e}",
+                plain(answer["method"]),
+                seconds(answer["run_seconds"]),
+                str(answer["force_calls"]),
+            )
+    return [
+        plain(f"{study['scene']}: error against run time", "bold"),
+        plain(f"  on {study['machine']['processor']}"),
+        plain(),
+        table,
+        plain(),
+        plain("The cheapest way to an error (largest, of the start):"),
+        cheapest,
+    ]
 
 
 def duration(value: float) -> str:

@@ -121,7 +121,6 @@ def run(
     with store.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
         store.room(path, store.size(scene) * (len(labels) - len(resumed)))
-        records: dict[str, simulate.Record] = {}
         for label in tuple(labels):
             if str(label) in resumed:
                 continue
@@ -130,11 +129,11 @@ def run(
                 with journal.draft(str(label), scene) as draft:
                     record = simulate.play(scene, label, draft.append, progress=progress)
                     if record.outcome.status == "interrupted":
-                        raise KeyboardInterrupt
+                        missing = [str(one) for one in labels if str(one) not in journal.finished()]
+                        raise KeyboardInterrupt(f"not finished: {', '.join(missing)}")
                     empty = np.empty(0)
                     whole = simulate.trajectory(record, empty, empty, empty, None)
                     draft.finish(store.attributes(whole))
-                    records[str(label)] = record
             except MethodError as error:
                 # what only shows as an engine starts; a method that was asked for by name must not go missing
                 if str(label) in methods or len(labels) == 1:
@@ -277,6 +276,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None =
     """
     stored = {run.label: run for run in store.summary(path).runs}
     chosen = [label for label in stored if not methods or any(fnmatchcase(label, m) for m in methods)]
+    if not stored:
+        raise StoreError(f"{path}: holds no trajectory to run again")
     if not chosen:
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(stored)}")
     scene = stored_scene(path)

@@ -30,6 +30,14 @@ from springcheck.model import (
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
 
+FIRST, QUICK = 256, 0.1
+"""Rows of the first chunk, and the seconds below which the next one is four times as long: a slow engine
+reports its progress, and hears Ctrl-C, several times a second."""
+
+PIECE = 1 << 16
+"""Steps that an engine of fixed step takes between two looks at the keyboard, where frames lie further
+apart.  A number, not a time: the numbers of a run must not depend on the speed of the machine."""
+
 
 class Sink(Protocol):
     """Takes recorded frames: t (f,), q and p (f, n), energy (f,) or None.  The arrays are reused."""
@@ -83,6 +91,8 @@ def play(
 
     with_energy = "energy" in scene.quantities
     rows = max(1, min(CHUNK // scene.n, scene.frames))
+    ready = min(rows, FIRST)
+    piece = scene.every if method.adaptive else min(scene.every, PIECE)
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
     q[0], p[0] = scene.q, scene.p
     _hand_over(scene, sink, 0, q[:1], p[:1], with_energy)
@@ -90,14 +100,16 @@ def play(
     outcome = Outcome(status="complete", step=scene.steps)
     frame = 1
     while frame < scene.frames:
-        f = min(rows, scene.frames - frame)
-        status, good, message, seconds = _advance(simulation, scene.every, q[:f], p[:f])
+        f = min(ready, scene.frames - frame)
+        part = _Part(simulation, scene.every, piece, progress)
+        status, good, message, seconds = part.advance(q[:f], p[:f])
         run_seconds += seconds
+        ready = min(rows, 4 * ready) if seconds < QUICK else ready
         if good:
             _hand_over(scene, sink, frame, q[:good], p[:good], with_energy)
         frame += good
         if progress:
-            progress(good * scene.every)
+            progress(good * scene.every - part.told)
         if status != "complete":
             outcome = Outcome(status=status, step=(frame - 1) * scene.every, message=message)
             break
@@ -125,26 +137,54 @@ def play(
 Ending = Literal["complete", "diverged", "stopped", "interrupted"]
 
 
-def _advance(simulation: Simulation, every: int, q: Floats, p: Floats) -> tuple[Ending, int, str, float]:
-    """Advance one chunk: how it ended, how many rows are good, why, and the seconds it took."""
-    status: Ending = "complete"
-    good, message = len(q), ""
-    began = perf_counter()
-    try:
-        simulation.advance(every, q, p)
-    except Stopped as stop:
-        status, good, message = "stopped", stop.rows, str(stop)
-    except KeyboardInterrupt:
-        # which rows of the chunk were filled is not known: none of them is kept
-        return "interrupted", 0, "interrupted", perf_counter() - began
-    seconds = perf_counter() - began
-    finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
-    if not finite.all():
-        good = int(np.argmin(finite))
-        status, message = "diverged", "not finite from the next frame on"
-    elif status == "stopped" and "nan" in message.lower():
-        status = "diverged"
-    return status, good, message, seconds
+@dataclass(slots=True)
+class _Part:
+    """One chunk of a run on its way."""
+
+    simulation: Simulation
+    every: int
+    piece: int
+    progress: Progress | None
+    told: int = 0
+    """Steps that progress has heard of within frames."""
+
+    def advance(self, q: Floats, p: Floats) -> tuple[Ending, int, str, float]:
+        """Fill q and p (f, n): how it ended, how many rows are good, why, and the seconds it took."""
+        status: Ending = "complete"
+        good, message = len(q), ""
+        began = perf_counter()
+        try:
+            if self.piece == self.every:
+                self.simulation.advance(self.every, q, p)
+            else:
+                self._in_pieces(q, p)
+        except Stopped as stop:
+            status, good, message = "stopped", stop.rows, str(stop)
+        except KeyboardInterrupt:
+            # which rows of the chunk were filled is not known: none of them is kept
+            return "interrupted", 0, "interrupted", perf_counter() - began
+        seconds = perf_counter() - began
+        finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
+        if not finite.all():
+            good = int(np.argmin(finite))
+            status, message = "diverged", "not finite from the next frame on"
+        elif status == "stopped" and "nan" in message.lower():
+            status = "diverged"
+        return status, good, message, seconds
+
+    def _in_pieces(self, q: Floats, p: Floats) -> None:
+        for row in range(len(q)):
+            left = self.every
+            while left:
+                steps = min(left, self.piece)
+                try:
+                    self.simulation.advance(steps, q[row : row + 1], p[row : row + 1])
+                except Stopped as stop:
+                    raise Stopped(row, str(stop)) from stop
+                left -= steps
+                if self.progress and left:
+                    self.progress(steps)
+                    self.told += steps
 
 
 def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, with_energy: bool) -> None:

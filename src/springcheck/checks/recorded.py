@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
-from springcheck.checks.case import Case
+from springcheck.checks.case import REPEATED, Case
 from springcheck.model import Arithmetic, Extended, Floats, Verdict
 
 CONTRACTED = 1e-3
@@ -54,6 +54,10 @@ def step_defect(case: Case) -> Verdict:
     if why_not:
         return case.not_applicable("step-defect", why_not)
     run = case.trajectory
+    if run.every > REPEATED and _closed(case):
+        return case.not_applicable(
+            "step-defect", f"{run.every} steps lie between frames, and {_closed(case)}"
+        )
     q, p = case.next_states
     dq, dp = np.abs(q - run.q[1:]), np.abs(p - run.p[1:])
     of_q, of_p = case.allowance
@@ -67,6 +71,10 @@ def step_defect(case: Case) -> Verdict:
             f"roundings along one step of {case.scheme.title}; does not grow with the run",
         )
     bound = case.roundings * _amplified(case, run.every)
+    if not bound * run.arithmetic.state < 1:
+        return case.not_applicable(
+            "step-defect", "between two frames a rounding may grow to the whole motion"
+        )
     sizes = case.norm(dq, dp), case.norm(of_q, of_p)
     value = float(np.max(sizes[0] / np.max(sizes[1])))
     return case.verdict(
@@ -84,7 +92,8 @@ def _amplified(case: Case, steps: int) -> float:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
         return float(total[0] * grown[0])
     growth = 1 + abs(case.trajectory.step) * fastest(case)
-    return float((growth**steps - 1) / (growth - 1)) if growth > 1 else float(steps)
+    with np.errstate(over="ignore"):
+        return float((np.float64(growth) ** steps - 1) / (growth - 1)) if growth > 1 else float(steps)
 
 
 def fastest(case: Case) -> float:
@@ -230,12 +239,12 @@ def frequency(case: Case) -> Verdict:
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
     off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
     bound, unit = growth_bound(case)
-    amplitude = case.norm(case.trajectory.q - _rest(case), case.trajectory.p)[-1]
-    mode = abs(float(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j])))
-    whole = float(case.norm.unit) * np.sqrt(2) * amplitude
+    # extended: a motion that spirals out is squared here, up to the end of double's range
+    mode = np.abs(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j]))
+    wide = np.longdouble(unit[-1]) * case.norm.unit * np.sqrt(np.longdouble(2))
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
-    shape = float(schemes.condition(case.matrices, case.w)[j])
-    limit = float(bound[-1] * unit[-1] / amplitude * (whole / mode) * shape / abs(expected))
+    shape = schemes.condition(case.matrices, case.w)[j]
+    limit = float(bound[-1] * (wide / mode) * shape / abs(expected))
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
         "frequency",

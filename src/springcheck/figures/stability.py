@@ -52,9 +52,10 @@ def limits(found: Sequence[Limit]) -> Figure:
     axes.set_xscale("log")
     axes.set_yscale("symlog", linthresh=2.0)
     axes.set_ylim(0, 200)
-    axes.set_xlim(0.09, 90)
+    axes.set_xlim(0.09, 1.1 * max(float(limit.turn[-1]) for limit in found))
     axes.set_yticks([0, 0.5, 1, 1.5, 2, 10, 100], ["0", "0.5", "1", "1.5", "2", "10", "100"])
-    axes.set_xticks([0.1, 0.5, 1, 2, 5, 16, 50], ["0.1", "0.5", "1", "2", "5", "16", "50"])
+    ticks = [x for x in (0.1, 0.5, 1, 2, 5, 16, 50) if x < axes.get_xlim()[1]]
+    axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
     axes.minorticks_off()
     axes.set_xlabel("step times frequency, $h\\,\\omega$")
     axes.set_ylabel("spectral radius of one step")
@@ -86,8 +87,11 @@ def regions(found: Sequence[Region]) -> Figure:
         axes.axhline(1.0, color="#777777", linewidth=0.8, linestyle=":")
         axes.set_title(region.method)
         _say(axes, f"{region.points} points, {region.wrong} against theory")
-    for axes in grid[len(found) :]:
-        axes.set_axis_off()
+    for j, axes in enumerate(grid):
+        # the axis is shared, and the panel below may be missing
+        axes.tick_params(labelbottom=j >= len(found) - columns)
+        if j >= len(found):
+            axes.set_axis_off()
     figure.supxlabel("step times frequency, $h\\,\\omega$", fontsize=9)
     figure.supylabel("damping ratio, $c\\,/\\,2\\sqrt{km}$", fontsize=9)
     figure.suptitle(
@@ -152,7 +156,7 @@ def costs(found: Sequence[Cost]) -> Figure:
             y = np.array([float(getattr(cost, field)) for cost in rows])
             y = np.where((y > 0) & (y < 30 if field == "error" else y > 0), y, np.nan)
             axes.plot(
-                x, y, color=COLOURS[i % len(COLOURS)], linestyle=LINES[i % len(LINES)],
+                x, y, color=COLOURS[i % len(COLOURS)], linestyle=LINES[(i + i // 7) % len(LINES)],
                 marker=MARKERS[i % len(MARKERS)], markerfacecolor="white", label=method,
             )  # fmt: skip
         axes.set_xscale("log")
@@ -163,5 +167,5 @@ def costs(found: Sequence[Cost]) -> Figure:
         )
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside right upper", frameon=False)
-    figure.suptitle(f"{found[0].family}: what stiffness costs (steps of runs not worth doing are shown too)")
+    figure.suptitle(f"{found[0].family}: what stiffness costs (steps of unfinished runs are estimates)")
     return figure

@@ -6,25 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from springcheck.identify import coarse
 from springcheck.identify.fit import Map
 from springcheck.identify.match import Match, frame
 from springcheck.identify.record import Record
 from springcheck.model import Extended, Floats
 from springcheck.schemes import SCHEMES, roundings
 
-QUANTUM = 2.0**-32
-"""Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point."""
-
-COARSEST = 1e-5
-"""Relative error of a force up to which it can be rounding; beyond, the force is another one."""
-
-STOERMER = {
-    "semi-implicit-euler": (1, 0),
-    "semi-implicit-euler-drift-kick": (0, 1),
-    "velocity-verlet": (1, 1),
-}
-"""Schemes whose positions obey q'' - 2 q' + q = h**2 F/m, and whether v is the mean of the difference
-before, after, or both: identities without a force, which hold to rounding however coarse the force is."""
+REBUILT = 1 / 32, 1.0
+"""Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,8 +40,12 @@ def predicted(match: Match, found: Map) -> Extended:
     return np.asarray(out[0])
 
 
-def defect(record: Record, j: int, found: Map, match: Match) -> Defect:
-    """Defect of every step of oscillator j against the scheme, in units of double precision (2**-52)."""
+def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -> Defect:
+    """Defect of every step of oscillator j against the scheme, in units of double precision (2**-52).
+
+    `visible` says that the scheme's own error stands far above the defect, and no other scheme has it;
+    only then is more than plain rounding explained, and never to an exact flow.
+    """
     scheme = SCHEMES[match.scheme]
     b = predicted(match, found)
     z, centre = found.z, found.centre / found.size
@@ -70,24 +64,28 @@ def defect(record: Record, j: int, found: Map, match: Match) -> Defect:
     ratio = float(found.size[0] / found.size[1]) * match.stride
     position = np.abs(z[1:, 0] + centre[0]).astype(np.float64)
     difference = np.stack([np.zeros(len(size)), 2 * ratio * position], axis=1)
-    rebuilt = size + difference
     path = (4 if scheme.flow else roundings(scheme)) * match.stride
     ulp = _largest(missing, 2.0**-52 * size)
-    if ulp <= path:
+    # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
+    if ulp <= min(path, 4 + 2 * np.sqrt(match.stride)) or (ulp <= path and visible):
         return Defect(ulp=ulp, precision="double", note=_written(record, ""))
-    # the motion goes on from the rebuilt velocity, so that only the last one's rounding is seen: four of
-    # position, quotient and read-out; with one a step an adaptive solver would pass for many small steps
-    if _largest(missing, 2.0**-52 * (path * size + 4 * difference)) <= 1:
+    if _is_rebuilt(match, missing, size, difference):
         return Defect(
             ulp=ulp,
             precision="double",
             note="velocities carry the rounding of positions over the step: rebuilt as a difference of them",
         )
     if record.q_storage.name == record.v_storage.name == "double":
-        return _coarse_force(record, j, found, match, ulp)
+        if scheme.flow or not visible:
+            return Defect(ulp=ulp, precision="")
+        name, note = coarse.kinematic(record, j, found, match)
+        if not name:
+            name, note = coarse.sized(record, j, found, match, missing)
+        return Defect(ulp=ulp, precision=name, note=note)
     quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
     quanta = quanta / found.size.astype(np.float64)
     half = (quanta[1:] + quanta[:-1] @ np.abs(b).T.astype(np.float64)) / 2
+    rebuilt = size + difference
     single = path * 2.0**-24 * rebuilt
     # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
     slack = 1 + 10 / np.sqrt(len(z))
@@ -97,6 +95,25 @@ def defect(record: Record, j: int, found: Map, match: Match) -> Defect:
         texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
         return Defect(ulp=ulp, precision=texts[0] if texts else "single")
     return Defect(ulp=ulp, precision="")
+
+
+def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats) -> bool:
+    """Whether velocities alone are off, and by eps q / h, as differences of positions over the step are.
+
+    Rounding of a position enters the leapfrog's velocity in every step, and the position itself through it:
+    it walks at random, with the root of the steps and their power of 3/2.
+    """
+    if match.scheme not in coarse.STOERMER:
+        return False
+    steps = np.sqrt(match.stride)
+    if _largest(missing[:, 0], 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]) > 1:
+        return False
+    unit = 2.0**-52 * steps * difference[:, 1]
+    if _largest(missing[:, 1], 2.0**-52 * (4 + 2 * steps) * size[:, 1] + 4 * unit) > 1:
+        return False
+    least, most = REBUILT
+    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
+    return least <= share <= most
 
 
 def _largest(missing: Floats, unit: Floats) -> float:
@@ -166,51 +183,3 @@ def _orbit(found: Map, match: Match, weights: Floats) -> Floats:
         start = start + change[:2]
         values[free] += change[2:]
     return np.asarray(found.z - powers(values) @ start, dtype=np.float64)
-
-
-def _coarse_force(record: Record, j: int, found: Map, match: Match, ulp: float) -> Defect:
-    """States in double precision whose force is not: the step's kinematics hold to rounding."""
-    sides = STOERMER.get(match.scheme)
-    if sides is None or match.stride != 1 or match.friction != 0:
-        return Defect(ulp=ulp, precision="")
-    h = record.interval
-    q = found.z[:, 0] * found.size[0]
-    v = found.z[:, 1] * found.size[1] / h
-    centre = float(np.abs(found.centre[0]))
-    before, after = (q[1:-1] - q[:-2]) / h, (q[2:] - q[1:-1]) / h
-    mean = (sides[0] * before + sides[1] * after) / sum(sides)
-    position = np.abs(q[1:-1]).astype(np.float64) + centre
-    # four roundings each of positions over the step and of the velocity, and the identity's own few
-    unit = 8 * 2.0**-52 * (np.abs(v[1:-1]).astype(np.float64) + 2 * position / abs(float(h)))
-    if _largest(np.abs(v[1:-1] - mean).astype(np.float64), unit) > 1:
-        return Defect(ulp=ulp, precision="")
-    mass = 1.0 if record.mass is None else float(record.mass[j])
-    force = mass * (after - before) / h
-    noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
-    stiffness = match.a * mass / float(h) ** 2
-    relative = float(
-        np.sqrt(np.mean((force + stiffness * q[1:-1]) ** 2) / np.mean((stiffness * q[1:-1]) ** 2))
-    )
-    if relative > COARSEST:
-        return Defect(ulp=ulp, precision="")
-    values = force.astype(np.float64)
-    for name, quantum, note in (
-        (
-            "mixed",
-            np.spacing(np.abs(values).astype(np.float32)).astype(np.float64),
-            "single-precision numbers",
-        ),
-        (
-            "fixed-point force",
-            np.full(len(values), QUANTUM),
-            "whole multiples of 2**-32, a 64-bit fixed-point sum",
-        ),
-    ):
-        # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
-        off = force / quantum
-        if noise < 0.05 * float(np.median(quantum)) and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
-            return Defect(ulp=ulp, precision=name, note=f"states are double, and forces are {note}")
-    name = "mixed" if 2.0**-28 <= relative <= 2.0**-21 else "coarse force"
-    return Defect(
-        ulp=ulp, precision=name, note=f"states are double, but forces are off by {relative:.1e} of their size"
-    )

@@ -79,6 +79,11 @@ def fit(record: Record, j: int) -> Map:
     quanta = quanta / size.astype(np.float64)
     pairs = len(z) - 1
     noise = np.sqrt(np.sum((ROUNDING * z.astype(np.float64)) ** 2 + quanta**2 / 12, axis=1))[:-1]
+    length = np.sqrt(np.sum(z[:-1].astype(np.float64) ** 2, axis=1))
+    # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
+    moving = length > 0
+    lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0
+    noise = np.maximum(noise, lowest / 3 * length)
     weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
     about = z[:-1] - np.mean(z, axis=0) if np.any(np.abs(np.mean(z, axis=0)) > 1) else z[:-1]
     weight = np.asarray(

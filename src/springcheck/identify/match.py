@@ -57,6 +57,9 @@ class Terms:
     mass_unknown: bool = False
     rounding: float = ROUNDING
     jitter: float = 0.0
+    bias: float = 0.0
+    """How far entries may be off in units of the residuals of their rows, whatever the number of pairs:
+    coarse rounding that cuts off, or repeats itself from turn to turn, is no noise that averages away."""
     log_stiffness: float | None = None
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
 
@@ -141,12 +144,23 @@ def _starts(scheme: Scheme, entries: Extended, strides: range) -> tuple[Floats, 
     )
 
 
-def _real_starts(scheme: Scheme, found: Map) -> tuple[Floats, Floats, Floats]:
-    """First guesses of a where nothing turns (an inverted spring, or a step beyond the limit)."""
+def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
+    """Strides and first guesses of a from two real rates of growth or decay, whose product it is."""
+    b = found.entries.astype(np.float64)
+    half = (b[0, 0] + b[1, 1]) / 2
+    product = float(b[0, 0] * b[1, 1] - b[0, 1] * b[1, 0])
+    if not (half > 0 and product > 0):
+        return [], []
+    larger = half + np.sqrt(max(half**2 - product, 0.0))
+    a = float(np.log(larger) * np.log(product / larger))
+    return [float(s) for s in strides], [a / s**2 for s in strides]
+
+
+def _real_starts(scheme: Scheme, found: Map, strides_wanted: range) -> tuple[Floats, Floats, Floats]:
+    """First guesses of a where nothing turns: an inverted spring, friction, or a step beyond the limit."""
     grid = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
     zero = np.zeros(1, dtype=np.longdouble)
-    strides: list[float] = []
-    values: list[float] = []
+    strides, values = _decays(found, range(1, 2) if scheme.flow else strides_wanted)
     for s in (1,) if scheme.flow else (1, 2, 3, 4):
         s_all = np.full(len(grid), float(s))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -166,7 +180,7 @@ def match(scheme: Scheme, found: Map, terms: Terms, strides: range) -> list[Matc
         s, turns, x = _starts(scheme, found.entries, strides)
         a = np.square(x.astype(np.longdouble))
     else:
-        s, turns, values = _real_starts(scheme, found)
+        s, turns, values = _real_starts(scheme, found, strides)
         a = values.astype(np.longdouble)
     if not len(s):
         return []
@@ -185,7 +199,10 @@ def match(scheme: Scheme, found: Map, terms: Terms, strides: range) -> list[Matc
         if not np.any(damped):
             return []
         s, turns, unknowns, zero = s[damped], turns[damped], [x[damped] for x in unknowns], zero[damped]
-        a = a[damped]
+        if turning:
+            # friction slows the phase down, to nothing where it is critical: w**2 = phase**2 + (gamma/2)**2
+            unknowns[0] = unknowns[0] + np.square(unknowns[1] / 2)
+        a = unknowns[0]
     if terms.mass_unknown and terms.log_stiffness is None:
         guess = frame(scheme, a, unknowns[1], zero, s, found.size)
         up = np.abs(guess[:, 0, 1] / found.entries[0, 1])
@@ -295,5 +312,6 @@ def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats) -> Floats:
     path = 1 if scheme.flow else roundings(scheme)
     coherent = terms.rounding * path * s * largest
     clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
-    total = found.covariance + clock + coherent[:, None, None] ** 2 * np.eye(4)
+    bias = np.diag(np.repeat(terms.bias * found.residual, 2) ** 2)
+    total = found.covariance + clock + bias + coherent[:, None, None] ** 2 * np.eye(4)
     return _inverse(total)

@@ -170,10 +170,12 @@ def read(
     unit = np.ones(positions.shape[1], dtype=np.longdouble)
     if v is None and masses is not None:
         unit = masses.astype(np.longdouble)
-    q_storage, v_storage = storage(positions), storage(moving)
+    # the start is what a program was given; only what it computed shows how it computes
+    computed = slice(1 if len(times) > FEWEST else 0, None)
+    q_storage, v_storage = storage(positions[computed]), storage(moving[computed])
     if v is None and masses is not None and v_storage.name == "double":
         # momenta made as m v from single-precision velocities are single only after the division
-        velocities = storage(moving / masses)
+        velocities = storage(moving[computed] / masses)
         v_storage = velocities if velocities.name == "single" else v_storage
         quantum = v_storage.quantum(moving / masses)
     else:

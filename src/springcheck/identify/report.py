@@ -11,11 +11,21 @@ from numpy.typing import ArrayLike
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.causes import causes
+from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.fit import ROUNDING, Map, fit
 from springcheck.identify.match import Terms
 from springcheck.identify.record import Record, read
 from springcheck.identify.result import NONE, Identification
-from springcheck.identify.search import Joint, aliases, difference, disagreements, find, numbers, search
+from springcheck.identify.search import (
+    Joint,
+    aliases,
+    difference,
+    disagreements,
+    find,
+    numbers,
+    search,
+    visible,
+)
 from springcheck.model import Floats
 
 VELOCITY_OFFSET = {
@@ -24,6 +34,12 @@ VELOCITY_OFFSET = {
     "langevin-middle-early": -0.5,
 }
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
+
+COARSE = ("fixed-point force", "mixed", "single")
+"""Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
+
+SHOWN = 3
+"""Schemes that a note names of those that are not told apart; all are in the candidates."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -154,8 +170,8 @@ def _known(
     defects: list[arithmetic.Defect] = []
     for joint in dict.fromkeys([chosen, *accepted]):
         defects = [
-            arithmetic.defect(record, j, x, part)
-            for j, x, part in zip(moving, maps, joint.parts, strict=True)
+            arithmetic.defect(record, j, x, part, visible=visible(x, what, joint, accepted))
+            for j, x, part, what in zip(moving, maps, joint.parts, terms, strict=True)
         ]
         if all(d.precision for d in defects):
             chosen = joint
@@ -169,6 +185,14 @@ def _known(
     h = float(record.interval) / chosen.stride
     if stated is not None:
         against = disagreements(record, moving, chosen, stated)
+        single = stated.astype(np.float32).astype(np.float64)
+        if (
+            against
+            and worst.precision in COARSE
+            and not disagreements(record, moving, chosen, single, QUANTUM)
+        ):
+            against = []
+            notes.append("the stiffness is the stated one in single precision, as GPU-type platforms keep it")
         stated_fits = stated_fits and not against
         notes += against
     notes += _remarks(accepted, chosen, friction)
@@ -208,7 +232,9 @@ def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) 
         out.append("the spring is inverted: its stiffness is negative")
     others = [f"{x}{_apart(x, chosen)}" for x in accepted if x is not chosen]
     if others:
-        shown = "; ".join(others[:6]) + (f"; and {len(others) - 6} more" if len(others) > 6 else "")
+        shown = "; ".join(others[:SHOWN]) + (
+            f"; and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+        )
         lead = "no error of a step is visible, so " if chosen.scheme == "exact" else ""
         out.append(f"{lead}not told apart at this precision: {shown}; named is the plainest")
     return out
@@ -217,7 +243,7 @@ def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) 
 def _apart(other: Joint, chosen: Joint) -> str:
     """How much stiffer the spring is if it is the other scheme, where that shows."""
     off = other.parts[0].a * other.stride**2 / (chosen.parts[0].a * chosen.stride**2) - 1
-    return f" (with {off:+.1e} of the stiffness more)" if abs(off) > 1e-12 else ""
+    return f" (stiffness {off:+.1e})" if abs(off) > 1e-12 else ""
 
 
 def _unknown(

@@ -14,6 +14,16 @@ from springcheck.identify.record import Record
 from springcheck.model import Floats
 from springcheck.schemes import SCHEMES, roundings
 
+BIAS = 3.0
+"""Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
+last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
+
+COARSE = 2.0**-46
+"""Residual above which it is no double-precision rounding: 64 units in the last place."""
+
+PLAIN = 30.0
+"""Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
@@ -103,15 +113,23 @@ def find(
     """All accepted schemes, and the plainest; without friction first, and with it where nothing fits.
 
     Coefficients are taken as rounded in double precision first.  Where the states are coarser than that
-    the arithmetic may have been so too, and a second round allows coefficients of single precision.
+    the arithmetic may have been so too: a second round allows coefficients of single precision to numbers
+    of single precision, and a last one a bias of the size of what single steps leave over.
     """
-    coarse = max(float(np.max(found.residual)) for found in maps) > 2.0**-40
+    residual = max(float(np.max(found.residual)) for found in maps)
+    finely = record.q_storage.name == record.v_storage.name == "double"
+    rounds = [(ROUNDING, 0.0)]
+    if residual > 2.0**-40 and not finely:
+        rounds.append((2.0**-24, 0.0))
+    if residual > COARSE:
+        rounds.append((ROUNDING, BIAS))
     tried: list[Joint] = []
     first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
     few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
     for damped, ranges in ((False, [*first, few]), (True, [*first, few]), (False, [many])):
-        for rounding in (ROUNDING, 2.0**-24) if coarse else (ROUNDING,):
-            terms = [replace(what, damped=damped, rounding=rounding) for what in base]
+        # what is coarse hides many strides at once, so that none of them could be named
+        for rounding, bias in rounds if many not in ranges else [x for x in rounds if not x[1]]:
+            terms = [replace(what, damped=damped, rounding=rounding, bias=bias) for what in base]
             for strides in ranges:
                 joints = search(maps, terms, strides)
                 accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
@@ -122,6 +140,19 @@ def find(
                     return accepted, accepted[0], terms
                 tried += joints if not damped and strides is not many else []
     return tried, None, base
+
+
+def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> bool:
+    """Whether the error of the scheme's step stands far above what the numbers leave over, and alone.
+
+    An adaptive solver misses the exact flow by as much as its steps scatter, and then many schemes with
+    many small steps fit within that; a coarse arithmetic does not bring a map nearer to the exact flow.
+    """
+    if any((x.scheme, x.stride) != (chosen.scheme, chosen.stride) for x in accepted):
+        return False
+    wide = replace(terms, bias=1.0)
+    exact = match(SCHEMES["exact"], found, wide, range(1, 2))
+    return all(m.chi2 > PLAIN**2 for m in exact)
 
 
 def numbers(
@@ -141,13 +172,20 @@ def numbers(
     return omega, stiffness, friction
 
 
-def disagreements(record: Record, moving: list[int], joint: Joint, stated: Floats) -> list[str]:
-    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding."""
+def disagreements(
+    record: Record, moving: list[int], joint: Joint, stated: Floats, quantum: float = 0.0
+) -> list[str]:
+    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
+
+    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.
+    """
     _, stiffness, _ = numbers(record, moving, joint)
     path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
+        error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
         off = k / float(stated[j]) - 1 if stated[j] else math.inf
         if not abs(off) <= error:
             out.append(

@@ -43,9 +43,9 @@ def load_scene(name_or_path: str | Path) -> Scene:
                 "the name of a file of your own ends in .toml"
             )
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors put a mark in front
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text, as a scene in TOML is"
         raise SceneError(f"{path}: cannot be read: {reason}") from error
     return parse(text, name=path.stem, where=str(path))
 

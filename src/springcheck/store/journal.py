@@ -44,6 +44,9 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         raise StoreError(f"cannot write {path}: there is no folder {folder}")
     if path.is_dir():
         raise StoreError(f"cannot write {path}: it is a folder")
+    if path.suffix == ".toml":
+        # a slip of the hand with --force would cost the scene
+        raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")
     parts = parts_folder(path)
     if path.exists() and not force and not parts.is_dir():
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
@@ -122,7 +125,8 @@ class Journal:
 
     def draft(self, label: str, scene: Scene) -> Draft:
         """A writer of one trajectory (see `Draft`)."""
-        self._sequence = max(self._sequence, len(self.sources())) + 1
+        # the one writer need look at what is there only once
+        self._sequence = (self._sequence or len(self.sources())) + 1
         return Draft(self._part("run", label), label, scene, sequence=self._sequence)
 
     def save(self, trajectory: Trajectory, scene: Scene) -> str:

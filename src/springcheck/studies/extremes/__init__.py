@@ -17,13 +17,16 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, store
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.stability import propagators
 
-__all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows"]
+__all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows", "stored"]
+
+DOCUMENT = "extremes"
+"""Name of the atlas in a store."""
 
 PLATFORMS = ("openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
              "openmm:verlet@OpenCL-double")  # fmt: skip
@@ -125,8 +128,33 @@ def record(
                 "bound": [cell.bound for cell in cells],
             }
             journal.add(store.Table(name=f"extremes/{method}", columns=numbers | judged))
-        journal.commit(documents={"extremes": json.dumps(document(atlas), allow_nan=False)})
+        journal.commit(documents={DOCUMENT: json.dumps(document(atlas), allow_nan=False)})
     return atlas
+
+
+def stored(path: str | Path) -> Atlas:
+    """The atlas that `record` has kept.  StoreError where the file holds none."""
+    known = json.loads(store.document(path, DOCUMENT))
+    try:
+        cells = tuple(
+            Cell(
+                method=cell["method"],
+                block=cell["block"],
+                parameters={name: _number(value) for name, value in cell["parameters"].items()},
+                outcome=cell["outcome"],
+                reason=cell["reason"],
+                value=_number(cell["value"]),
+                bound=_number(cell["bound"]),
+            )
+            for cell in known["cells"]
+        )
+        return Atlas(
+            cells=cells,
+            windows=tuple(Window(**window) for window in known["windows"]),
+            left_out=tuple((one["method"], one["reason"]) for one in known["left_out"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path}: its atlas of extremes lacks {error}; measure it anew") from error
 
 
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
@@ -139,9 +167,9 @@ def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
 
     found: list[Cell] = []
     groups = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
-    if quick and label.platform not in ("", "Reference"):
+    if label.platform not in ("", "Reference"):
         # a context costs such a platform a quarter of a second: the groups with the most cells
-        groups = sorted(groups, key=len)[-3:]
+        groups = sorted(groups, key=len)[-3 if quick else -24 :]
     for specs in groups:
         found += running.cells(label, specs)
     return found + solving.last(label, grid.lengths(label, quick=quick))
@@ -216,3 +244,7 @@ def document(atlas: Atlas) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)

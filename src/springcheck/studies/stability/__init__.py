@@ -8,7 +8,7 @@ steps (`resonance`), and the scenes `two-scales` and `overdamped` what stiffness
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,15 +16,29 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, mechanics, store
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label, Scene
-from springcheck.studies.stability import costs, limits, propagators, regions, resonance
+from springcheck.studies.stability import costs, keeping, limits, propagators, regions, resonance
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 
-__all__ = ["Cost", "Limit", "Region", "Resonance", "Stability", "document", "measure", "record", "sentences"]
+__all__ = [
+    "Cost",
+    "Limit",
+    "Region",
+    "Resonance",
+    "Stability",
+    "document",
+    "measure",
+    "record",
+    "sentences",
+    "stored",
+]
+
+DOCUMENT = "stability"
+"""Name of the study's document in a store."""
 
 GROWTH = 1e-6
 """Relative difference allowed between measured and predicted growth in double precision: what is left of
@@ -123,32 +137,36 @@ def record(
     """
     with store.open_new(path, "\n".join(["stability", *methods, scene.text]), force=force) as journal:
         study = measure(scene, methods, progress=progress)
-        for x in study.limits:
-            journal.add(
-                store.Table(
-                    name=f"stability/limits/{x.method}",
-                    columns={"h_w": x.turn, "radius": x.radius, "radius_predicted": x.radius_predicted},
-                    attributes={"limit": x.limit, "theory": x.theory},
-                    signal="radius",
-                    axes=("h_w",),
-                )
-            )
-        for y in study.regions:
-            journal.add(
-                store.Table(
-                    name=f"stability/regions/{y.method}",
-                    columns={
-                        "damping_ratio": y.ratio,
-                        "h_w": y.turn,
-                        "radius": y.radius,
-                        "radius_predicted": y.radius_predicted,
-                    },
-                    signal="radius",
-                    axes=("damping_ratio", "h_w"),
-                )
-            )
-        journal.commit(scene, documents={"stability": json.dumps(document(study), allow_nan=False)})
+        for table in (
+            *map(keeping.of_limit, study.limits),
+            *map(keeping.of_region, study.regions),
+            *map(keeping.of_resonance, study.resonances),
+        ):
+            journal.add(table)
+        journal.commit(scene, documents={DOCUMENT: json.dumps(document(study), allow_nan=False)})
     return study
+
+
+def stored(path: str | Path, scene: Scene) -> Stability:
+    """The study that `record` has kept, of this scene.  StoreError where the file holds none."""
+    known = json.loads(store.document(path, DOCUMENT))
+    tables = store.read_tables(path)
+
+    def under(beginning: str, name: str) -> Iterator[store.Table]:
+        # the document knows the order in which they were measured
+        return (tables[beginning + one["method"]] for one in known[name])
+
+    try:
+        return Stability(
+            scene=scene,
+            limits=tuple(map(keeping.to_limit, under(keeping.LIMITS, "methods"))),
+            regions=tuple(map(keeping.to_region, under(keeping.REGIONS, "regions"))),
+            resonances=tuple(map(keeping.to_resonance, under(keeping.RESONANCES, "resonances"))),
+            costs=tuple(map(keeping.to_cost, known["costs"])),
+            left_out=tuple((one["method"], one["reason"]) for one in known["left_out"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path}: its study of stability lacks {error}; measure it anew") from error
 
 
 def growth_allowed(limit: Limit) -> float:

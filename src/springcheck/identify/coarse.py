@@ -1,0 +1,161 @@
+"""Arithmetic coarser than double precision in states that are not: what its forces leave behind.
+
+GPU-type platforms compute forces in single precision and sum them in 64-bit fixed point, whatever the
+states are kept in.  The error is cut off rather than rounded, so it is a bias as much as a noise; what
+tells it from anything else is where it enters (in kicks, never in drifts) and its size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.identify.fit import Map
+from springcheck.identify.match import Match, power, unit_matrix
+from springcheck.identify.record import Record
+from springcheck.model import Extended, Floats, Reals
+from springcheck.schemes import SCHEMES, magnitude_step, roundings
+
+QUANTUM = 2.0**-32
+"""Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
+
+EXCESS = 2.0**-32
+"""By which OpenMM's CustomIntegrator takes fixed-point forces too large: it divides by 2**32 - 1."""
+
+COARSEST = 1e-5
+"""Relative error of a force up to which it can be rounding; beyond, the force is another one."""
+
+LEAST = 1 / 100
+"""Share of its bound that an error must reach in the mean square for the bound to be what explains it."""
+
+STOERMER = {
+    "semi-implicit-euler": (1, 0),
+    "semi-implicit-euler-drift-kick": (0, 1),
+    "velocity-verlet": (1, 1),
+}
+"""Schemes whose positions obey q'' - 2 q' + q = h**2 F/m, and whether v is the mean of the difference
+before, after, or both: identities without a force, which hold to rounding however coarse the force is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Forces:
+    """Forces read from positions alone, their noise, and how far they are off in the root mean square."""
+
+    values: Floats
+    noise: float
+    relative: float
+
+
+def sized(record: Record, j: int, found: Map, match: Match, missing: Floats) -> tuple[str, str]:
+    """Precision and note where what single frames miss, (f-1, 2), has the size and place of a force's error.
+
+    A force off by e in every kick shifts a frame by at most the sum of its kicks' shifts, carried on by
+    the steps that follow; drifts add only the rounding of the state.
+    """
+    kicks, steps = reach(found, match)
+    z = found.z.astype(np.float64)
+    position = found.size[0].astype(np.float64) + abs(float(found.centre[0]))
+    orbit = np.sqrt(np.sum(z[1:] ** 2, axis=1) + np.sum(z[:-1] ** 2, axis=1)) + abs(
+        float(found.centre[0] / found.size[0])
+    )
+    path = roundings(SCHEMES[match.scheme]) * match.stride
+    # a position and a product are rounded; a stiffness too, but that is the same in every kick
+    relative = 2 * 2.0**-24 * abs(match.a) * orbit
+    quantum = np.zeros(len(orbit))
+    if record.mass is not None:
+        h = float(record.interval) / match.stride
+        quantum += QUANTUM * h**2 / float(record.mass[j]) / position
+    levels = (
+        ("fixed-point force", quantum, 2.0**-52, "of the size of 2**-32, a 64-bit fixed-point sum"),
+        ("mixed", relative + quantum, 2.0**-48, "of the size of single-precision numbers"),
+    )
+    for name, force, state, note in levels:
+        # twice: half a kick of another precision may be added to what is read
+        error = 2 * force[:, None] * kicks
+        bound = error + path * state * orbit[:, None] * steps
+        if not np.all(missing <= bound) or not np.any(force):
+            continue
+        if np.sqrt(np.mean(missing[:, 1] ** 2)) >= LEAST * np.sqrt(np.mean(error[:, 1] ** 2)):
+            return name, f"states are double, and forces are off by errors {note}"
+    return "", ""
+
+
+def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
+    """Bounds (2,), in the frame of `found`, of what an error of 1 does to a frame: of h**2 F/(m q) in every
+    kick, and of both components of the state in every step."""
+    one = np.ones(1, dtype=np.longdouble)
+    a, rate = abs(match.a) * one, match.friction * one
+
+    def size(q: Reals, p: Reals) -> Reals:
+        return np.asarray(1 + a * q)
+
+    q, p = magnitude_step(
+        SCHEMES[match.scheme], 0 * one, 0 * one, h=1.0, m=one, magnitude=size,
+        stiffness=np.diag(a), rate=rate if match.friction else None,
+    )  # fmt: skip
+    numbers = np.arange(match.stride, dtype=np.float64)
+    unit = np.broadcast_to(unit_matrix(SCHEMES[match.scheme], match.a * one, rate), (match.stride, 2, 2))
+    # q in units of its size, v of the interval's: v h grows by the stride and the ratio of the sizes
+    up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
+    carried: Extended = np.sum(np.abs(power(unit, numbers)), axis=0)
+    kicks = (carried @ np.array([q[0], p[0]])).astype(np.float64) * up
+    steps = (carried.astype(np.float64) * up[:, None] / up[None, :]).sum(axis=1)
+    return kicks, steps
+
+
+def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str]:
+    """Precision and note where positions and velocities of every step fit together to rounding, so that
+    only the force can be coarse; its own numbers then show how."""
+    forces = _forces(record, j, found, match)
+    if forces is None or forces.relative > COARSEST:
+        return "", ""
+    single = np.spacing(np.abs(forces.values).astype(np.float32)).astype(np.float64)
+    fixed = np.full(len(forces.values), QUANTUM)
+    for name, quantum, factor, note in (
+        ("mixed", single, 1.0, "single-precision numbers"),
+        ("fixed-point force", fixed, 1.0, "whole multiples of 2**-32, a 64-bit fixed-point sum"),
+        (
+            "fixed-point force",
+            fixed,
+            1 + EXCESS,
+            "whole multiples of 1/(2**32 - 1), as OpenMM's CustomIntegrator has them",
+        ),
+    ):
+        # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
+        off = forces.values / (quantum * factor)
+        clear = forces.noise < 0.05 * float(np.median(quantum))
+        if clear and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
+            return name, f"states are double, and forces are {note}"
+    name = "mixed" if 2.0**-28 <= forces.relative <= 2.0**-21 else "coarse force"
+    return name, f"states are double, but forces are off by {forces.relative:.1e} of their size"
+
+
+def _forces(record: Record, j: int, found: Map, match: Match) -> Forces | None:
+    """Forces on the positions of all frames but the first and the last, None where v does not belong to q."""
+    sides = STOERMER.get(match.scheme)
+    if sides is None or match.stride != 1 or match.friction != 0:
+        return None
+    h = record.interval
+    mass = 1.0 if record.mass is None else float(record.mass[j])
+    q = found.z[:, 0] * found.size[0]
+    v = found.z[:, 1] * found.size[1] / h
+    centre = float(np.abs(found.centre[0]))
+    before, after = (q[1:-1] - q[:-2]) / h, (q[2:] - q[1:-1]) / h
+    middle = q[1:-1]
+    position = np.abs(middle).astype(np.float64) + centre
+    force = mass * (after - before) / h
+    # four roundings each of positions over the step and of the velocity, and the identity's own few
+    unit = 8 * 2.0**-52 * (np.abs(v[1:-1]).astype(np.float64) + 2 * position / abs(float(h)))
+    off = v[1:-1] - (sides[0] * before + sides[1] * after) / sum(sides)
+    if sides == (1, 1) and np.any(np.abs(off) > unit):
+        # half a kick of the exact force was added to a leapfrog's velocity where it was read
+        half = off + force * h / (2 * mass)
+        off = half - middle * (middle @ half) / (middle @ middle)
+    if np.any(np.abs(off) > unit):
+        return None
+    stiffness = match.a * mass / float(h) ** 2
+    pull = stiffness * middle
+    relative = np.sqrt(np.mean((force + pull) ** 2) / np.mean(pull**2))
+    noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
+    return Forces(values=force.astype(np.float64), noise=noise, relative=float(relative))

@@ -1,0 +1,124 @@
+"""What a study of stability keeps in a store, and the same read back: every array and number, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from springcheck.store import Table
+from springcheck.studies.stability.costs import Cost, Family
+from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.regions import Region
+from springcheck.studies.stability.resonance import Resonance
+
+LIMITS, REGIONS, RESONANCES = "stability/limits/", "stability/regions/", "stability/resonances/"
+"""Beginnings of the tables' names; the method follows."""
+
+_OF_LIMIT = (
+    "scheme", "limit", "theory", "bound", "growth_above", "growth_predicted", "growth_below",
+    "growth_below_predicted", "edge", "edge_predicted",
+)  # fmt: skip
+_OF_REGION = ("off", "undecided", "wrong")
+
+
+def of_limit(x: Limit) -> Table:
+    """A limit: radii by h w, and the rest as attributes."""
+    return Table(
+        name=f"{LIMITS}{x.method}",
+        columns={"h_w": x.turn, "radius": x.radius, "radius_predicted": x.radius_predicted},
+        attributes={name: getattr(x, name) for name in _OF_LIMIT},
+        signal="radius",
+        axes=("h_w",),
+    )
+
+
+def of_region(x: Region) -> Table:
+    """A region: radii and stability (j, i) by damping ratio (j,) and h w (i,)."""
+    return Table(
+        name=f"{REGIONS}{x.method}",
+        columns={
+            "damping_ratio": x.ratio,
+            "h_w": x.turn,
+            "radius": x.radius,
+            "radius_predicted": x.radius_predicted,
+            "stable": x.stable,
+            "stable_predicted": x.stable_predicted,
+        },
+        attributes={name: getattr(x, name) for name in _OF_REGION},
+        signal="radius",
+        axes=("damping_ratio", "h_w"),
+    )
+
+
+def of_resonance(x: Resonance) -> Table:
+    """A resonance: radii by h w of the fast spring, and the bands (b, 2), from and to."""
+    return Table(
+        name=f"{RESONANCES}{x.method}",
+        columns={
+            "h_w": x.turn,
+            "radius": x.radius,
+            "radius_predicted": x.radius_predicted,
+            "bands": np.reshape(x.bands, (-1, 2)),
+            "bands_predicted": np.reshape(x.bands_predicted, (-1, 2)),
+        },
+        attributes={"scene": x.scene},
+        signal="radius",
+        axes=("h_w",),
+    )
+
+
+def to_limit(table: Table) -> Limit:
+    """The limit of such a table.  KeyError where it is another's."""
+    return Limit(
+        method=table.name.removeprefix(LIMITS),
+        turn=_column(table, "h_w"),
+        radius=_column(table, "radius"),
+        radius_predicted=_column(table, "radius_predicted"),
+        **{name: cast(Any, table.attributes[name]) for name in _OF_LIMIT},
+    )
+
+
+def to_region(table: Table) -> Region:
+    """The region of such a table.  KeyError where it is another's."""
+    return Region(
+        method=table.name.removeprefix(REGIONS),
+        turn=_column(table, "h_w"),
+        ratio=_column(table, "damping_ratio"),
+        radius=_column(table, "radius"),
+        radius_predicted=_column(table, "radius_predicted"),
+        stable=_column(table, "stable"),
+        stable_predicted=_column(table, "stable_predicted"),
+        **{name: cast(Any, table.attributes[name]) for name in _OF_REGION},
+    )
+
+
+def to_resonance(table: Table) -> Resonance:
+    """The resonance of such a table.  KeyError where it is another's."""
+    bands, predicted = (
+        tuple((float(a), float(b)) for a, b in _column(table, name)) for name in ("bands", "bands_predicted")
+    )
+    return Resonance(
+        method=table.name.removeprefix(RESONANCES),
+        scene=str(table.attributes["scene"]),
+        turn=_column(table, "h_w"),
+        radius=_column(table, "radius"),
+        radius_predicted=_column(table, "radius_predicted"),
+        bands=bands,
+        bands_predicted=predicted,
+    )
+
+
+def to_cost(known: Mapping[str, Any]) -> Cost:
+    """A row of the document's costs; None there is NaN here.  KeyError, ValueError where it is none."""
+    if known["family"] not in get_args(Family):
+        raise ValueError(f"family {known['family']!r}")
+    numbers: dict[str, Any] = {
+        name: float("nan") if known[name] is None else known[name] for name in Cost.__slots__
+    }
+    return Cost(**numbers)
+
+
+def _column(table: Table, name: str) -> np.ndarray:
+    return np.asarray(table.columns[name])

@@ -1,0 +1,189 @@
+"""`springcheck identify` on files that another program wrote with plain h5py, and on a student's module."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from springcheck.cli import main
+from springcheck.model import Floats
+from springcheck.schemes import SCHEMES, step
+
+M, K, H = 3.7, 2.9, 0.31
+FIELDS = {
+    *("scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"),
+    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"),
+}
+
+
+def motion(name: str = "velocity-verlet", stride: int = 2) -> tuple[Floats, Floats, Floats]:
+    """Times, positions and velocities (101, 1) by a scheme in double precision."""
+    q, p = np.array([1.3]), np.array([0.9])
+    qs, ps = [q], [p]
+    for _ in range(100):
+        for _ in range(stride):
+            q, p = (
+                np.asarray(x, dtype=np.float64)
+                for x in step(SCHEMES[name], q, p, h=H, m=np.array([M]), force=lambda q, p: -K * q)
+            )
+        qs.append(q)
+        ps.append(p)
+    return np.asarray(np.arange(101) * (stride * H), dtype=np.float64), np.array(qs), np.array(ps) / M
+
+
+def written(
+    t: Floats, q: Floats, v: Floats, *, kind: str = "f8", units: tuple[str, str, str] = ("", "", "")
+) -> str:
+    """A file as a student writes it: no masses, no more than H5MD asks for."""
+    path = Path("trajectory.h5")
+    with h5py.File(path, "w") as file:
+        file.create_group("h5md").attrs["version"] = [1, 1]
+        for name, x, unit in (("position", q, units[0]), ("velocity", v, units[2])):
+            group = file.create_group(f"particles/bead/{name}")
+            group["step"] = np.arange(len(t))
+            time = group.create_dataset("time", data=t)
+            value = group.create_dataset("value", data=x.astype(kind)[:, :, None])
+            if unit:
+                time.attrs["unit"], value.attrs["unit"] = units[1], unit
+    return str(path)
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def document(capsys: pytest.CaptureFixture[str]) -> dict:
+    found = json.loads(capsys.readouterr().out)
+    assert isinstance(found, dict)
+    return found
+
+
+def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(*motion(), kind="f4")
+    assert main(["identify", path, "--json"]) == 0
+    found = document(capsys)
+    assert set(found) >= FIELDS
+    told = found["scheme"], found["stride"], found["precision"], found["fits"], found["stiffness"]
+    assert told == ("velocity-verlet", 2, "double, stored in single", True, None)
+    assert found["omega"] == pytest.approx(np.sqrt(K / M), rel=1e-7)
+    assert found["step"] == pytest.approx(H)
+
+
+def test_what_is_stated_is_held_against_the_file(capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(*motion(), kind="f4")
+    stated = ["--mass", str(M), "--step", str(H), "--json"]
+    assert main(["identify", path, "--stiffness", str(K), *stated]) == 0
+    assert document(capsys)["stiffness"] == pytest.approx(K, rel=1e-7)
+    assert main(["identify", path, "--stiffness", "2.8", *stated]) == 1
+    found = document(capsys)
+    assert (found["scheme"], found["fits"]) == ("velocity-verlet", False)
+    assert any("stiffness" in note for note in found["notes"])
+
+
+def test_text_of_six_digits_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    t, q, v = motion("semi-implicit-euler", 3)
+    q, v = (np.array([[float(f"{x:.6g}")] for x in y.ravel()]) for y in (q, v))
+    assert main(["identify", written(t, q, v), "--json"]) == 0
+    found = document(capsys)
+    assert (found["scheme"], found["stride"], found["precision"]) == (
+        "semi-implicit-euler",
+        3,
+        "text, 6 digits",
+    )
+    assert found["velocity_offset"] == -0.5
+
+
+@pytest.mark.parametrize(
+    ("units", "length", "time", "velocity"),
+    [
+        (("nm", "ps", "nm ps-1"), 1, 1, 1),
+        (("Angstrom", "fs", "Angstrom fs-1"), 10, 1000, 0.01),
+        (("nm", "ps", "m s-1"), 1, 1, 1000),
+        (("nm", "ps", "Angstrom fs-1"), 1, 1, 0.01),
+    ],
+)
+def test_velocities_in_other_units_are_turned_into_those_of_position_and_time(
+    units: tuple[str, str, str],
+    length: float,
+    time: float,
+    velocity: float,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    t, q, v = motion()
+    assert main(["identify", written(t * time, q * length, v * velocity, units=units), "--json"]) == 0
+    found = document(capsys)
+    assert (found["scheme"], found["stride"], found["precision"]) == ("velocity-verlet", 2, "double")
+    assert found["omega"] * time == pytest.approx(np.sqrt(K / M), rel=1e-11)
+
+
+def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    t, q, v = motion()
+    assert main(["identify", written(t, q, 1.7 * v)]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "none (adaptive or unknown)" in text
+    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588
+    assert "would fit if velocities were about 0.59" in text
+
+
+def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
+    t, _, _ = motion("rk4", 1)
+    # a thousandth of the step's length: what RK4 leaves out is far below single precision
+    slow = np.cos(0.01 * t)[:, None], -0.01 * np.sin(0.01 * t)[:, None]
+    assert main(["identify", written(t, *slow, kind="f4")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
+    assert lines[first + 1].startswith("        ")
+    assert "more; named is the plainest" in " ".join(" ".join(lines).split())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t, q, v: (t, 0 * q, 0 * v), "nothing moves"),
+        (lambda t, q, v: (t[:4], q[:4], v[:4]), "too few"),
+        (lambda t, q, v: (t**1.2, q, v), "constant interval"),
+        (lambda t, q, v: (t, q, np.where(t[:, None] > 9, np.nan, v)), "not finite"),
+    ],
+)
+def test_states_that_show_nothing_are_one_line_and_status_2(
+    change, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(*change(*motion()))
+    assert main(["identify", path]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert words in error
+    assert path in error
+
+
+def test_a_trajectory_that_is_not_in_the_file_is_one_line_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(*motion())
+    assert main(["identify", path, "--trajectory", "bead"]) == 0
+    capsys.readouterr()
+    assert main(["identify", path, "--trajectory", "atom"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "bead" in error
+
+
+def test_a_stepper_of_a_module_is_judged_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("student_4c1.py").write_text(
+        "def kick_drift(q, p, h, force, mass):\n    p = p + h * force(q)\n    return q + h * p / mass, p\n\n"
+        "def massless(q, p, h, force, mass):\n    p = p + h * force(q)\n    return q + h * p, p\n"
+    )
+    assert main(["identify", "--stepper", "student_4c1:kick_drift", "--json"]) == 0
+    assert document(capsys)["scheme"] == "semi-implicit-euler"
+    assert main(["identify", "--stepper", "student_4c1:massless", "--json"]) == 1
+    assert any("mass is left out" in note for note in document(capsys)["notes"])
+    assert main(["identify", "--stepper", "student_4c1:none"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

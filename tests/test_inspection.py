@@ -1,0 +1,176 @@
+"""A stored study is shown and drawn as the fresh one is: from the file alone, to the last bit."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import engines, scenes, store
+from springcheck.cli import main
+from springcheck.errors import StoreError
+from springcheck.studies import extremes, precision, stability
+
+Need = Callable[[str], None]
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equal bit for bit, NaN equal to NaN."""
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    both_nan = isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b)
+    return a == b or both_nan
+
+
+def assert_same_rows(fresh: tuple[Any, ...], kept: tuple[Any, ...]) -> None:
+    assert len(fresh) == len(kept)
+    for one, other in zip(fresh, kept, strict=True):
+        for field in fields(one):
+            assert same(getattr(one, field.name), getattr(other, field.name)), (one.method, field.name)
+
+
+@pytest.mark.parametrize(
+    ("name", "methods", "kind"),
+    [
+        ("spring-uneven", ("own:*",), "limits"),
+        ("overdamped", ("own:euler", "own:implicit-euler"), "regions"),
+        ("overdamped", ("own:implicit-euler", "sundials:bdf"), "costs"),
+        ("multiple-time-steps", ("openmm:mts",), "resonances"),
+    ],
+)
+def test_a_study_of_stability_is_read_back_bit_for_bit(
+    tmp_path: Path, need: Need, name: str, methods: tuple[str, ...], kind: str
+) -> None:
+    for method in methods:
+        if "*" not in method:
+            need(method)
+    scene, path = scenes.load_scene(name), tmp_path / "study.h5"
+    fresh = stability.record(scene, path, methods)
+    kept = stability.stored(path, scene)
+    assert getattr(fresh, kind)
+    for part in ("limits", "regions", "resonances", "costs"):
+        assert_same_rows(getattr(fresh, part), getattr(kept, part))
+    assert kept.left_out == fresh.left_out
+    assert stability.document(kept) == stability.document(fresh)
+    assert store.check(path) == []
+
+
+def test_what_a_stored_study_of_stability_fails_is_still_seen(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    fresh = stability.measure(scene, ["own:semi-implicit-euler"])
+    wrong = replace(fresh, limits=(replace(fresh.limits[0], growth_above=2 * fresh.limits[0].growth_above),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stability, "measure", lambda *_, **__: wrong)
+        stability.record(scene, path, ["own:semi-implicit-euler"])
+    assert stability.failures(stability.stored(path, scene)) == stability.failures(wrong) != []
+
+
+def test_the_atlas_is_read_back_as_it_was(tmp_path: Path) -> None:
+    fresh = extremes.record(tmp_path / "extremes.h5", ["own:euler"], quick=True)
+    kept = extremes.stored(tmp_path / "extremes.h5")
+    assert extremes.document(kept) == extremes.document(fresh)
+    assert kept.counts() == fresh.counts()
+    assert kept.windows == fresh.windows
+
+
+@pytest.fixture
+def stores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a store of every study."""
+    monkeypatch.chdir(tmp_path)
+    main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "stability.h5"])
+    main(["extremes", "--quick", "--method", "own:implicit-euler", "--quiet", "-o", "extremes.h5"])
+    scene = scenes.load_scene("spring-uneven")
+    precision.record(scene, [engines.parse("own:implicit-euler")], "precision.h5", budget=0.5)
+    return tmp_path
+
+
+def test_plot_and_inspect_serve_every_study(stores: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pictures = {
+        "stability": {"stability-limits", "stability-regions", "stability-costs-overdamped"},
+        "extremes": {"extremes"},
+        "precision": {"precision"},
+    }
+    words = {
+        "stability": ("limit h w", "own:implicit-euler", "against theory"),
+        "extremes": ("extreme cases", "right for forces between", "no cell is silently wrong"),
+        "precision": ("error against run time", "own:implicit-euler", "cheapest way"),
+    }
+    for name, expected in pictures.items():
+        capsys.readouterr()
+        assert main(["plot", f"{name}.h5", "-o", "pictures"]) == 0
+        written = {Path(line) for line in capsys.readouterr().out.splitlines()}
+        assert {path.name for path in written} == {
+            f"{one}.{end}" for one in expected for end in ("png", "svg")
+        }
+        assert all((stores / path).stat().st_size > 10_000 for path in written)
+        assert main(["inspect", f"{name}.h5"]) == 0
+        text = " ".join(capsys.readouterr().out.split())
+        assert all(word in text for word in words[name]), text
+        assert "trajectory frames" not in text
+        assert main(["inspect", f"{name}.h5", "--json"]) == 0
+        shown = json.loads(capsys.readouterr().out)
+        assert shown["studies"] == {name: json.loads(store.document(f"{name}.h5", name))}
+
+
+def test_a_stored_study_is_drawn_without_any_engine(stores: Path) -> None:
+    code = (
+        "import sys; from springcheck.cli import main\n"
+        "for path in sys.argv[1:]:\n"
+        "    assert main(['plot', path, '-o', path + '-pictures', '--quiet']) == 0\n"
+        "    assert main(['inspect', path, '--json']) == 0\n"
+        "print(*{'openmm', 'ase', 'sksundae', 'numba'} & set(sys.modules), file=sys.stderr)"
+    )
+    paths = [str(path) for path in stores.glob("*.h5")]
+    assert len(paths) == 3
+    home = str(Path(springcheck.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "-c", code, *paths], capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": home},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.strip() == ""
+
+
+def test_a_store_that_lacks_a_part_of_its_study_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = scenes.load_scene("spring-uneven")
+    for name, text, why in (
+        (
+            "stability",
+            '{"methods": [{"method": "own:euler"}], "costs": []}',
+            "lacks 'stability/limits/own:eul",
+        ),
+        ("extremes", '{"cells": []}', "lacks 'windows'"),
+        ("precision", "{", "is no JSON"),
+    ):
+        path = tmp_path / f"{name}.h5"
+        with store.open_new(path, name) as journal:
+            journal.commit(scene, documents={name: text})
+        for command in (["plot", str(path), "-o", str(tmp_path)], ["inspect", str(path)]):
+            assert main(command) == 2
+            said = capsys.readouterr().err
+            assert why in said, said
+            assert said.count("\n") == 1
+    with pytest.raises(StoreError, match="holds no document 'extremes'"):
+        extremes.stored(tmp_path / "stability.h5")
+
+
+def test_a_study_with_nothing_to_draw_says_so(
+    tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str]
+) -> None:
+    need("sundials:bdf")
+    path = tmp_path / "solver.h5"
+    extremes.record(path, ["sundials:bdf"], quick=True)
+    assert main(["plot", str(path), "-o", str(tmp_path)]) == 2
+    assert "can be drawn" in capsys.readouterr().err
