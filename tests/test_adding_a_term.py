@@ -1,4 +1,4 @@
-"""A term takes one class, and its key where an engine serves it: pasted into a copy of the package, it runs."""
+"""A term takes one class, and its key where an engine serves it; pasted into the package it runs."""
 
 from __future__ import annotations
 
