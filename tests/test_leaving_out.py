@@ -1,0 +1,172 @@
+"""A run imports, computes and stores only what its scene and methods ask for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from springcheck import mechanics, scenes, session, simulate
+from springcheck.engines.own import kernels
+from springcheck.engines.own import simulation as own
+from springcheck.model import Reals, Scene
+
+Need = Callable[[str], None]
+
+ENGINES = {"openmm", "ase", "sksundae"}
+HEAVY = {"numba", "matplotlib", "scipy"}
+
+
+def imported(folder: Path, *arguments: str) -> set[str]:
+    """Top-level modules that a command has imported when it ends, in a fresh interpreter."""
+    code = (
+        "import sys; from springcheck.cli import main; status = main(sys.argv[1:]); "
+        "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr); sys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_own_methods_import_no_engine_and_nothing_heavy(name: str, tmp_path: Path) -> None:
+    scene = scenes.load_scene(name)
+    long = scene.n * scene.steps >= own.WORTH or name in LONG
+    found = imported(tmp_path, "run", name, "--method", "own:*semi*", "--quiet")
+    assert not found & (ENGINES | HEAVY - ({"numba", "scipy"} if long else set()))
+    assert "h5py" in found
+
+
+LONG = {"long-chain"}
+"""Scenes of enough spring-steps for compiling to pay; numba imports scipy."""
+
+
+def test_a_circuit_starts_no_particle_engine(tmp_path: Path, need: Need) -> None:
+    need("sundials:bdf")
+    found = imported(tmp_path, "run", "lc-circuit", "--quiet")
+    assert "sksundae" in found
+    assert not found & {"openmm", "ase", "numba", "matplotlib"}
+
+
+def test_two_hundred_steps_of_a_spring_compile_and_draw_nothing(tmp_path: Path) -> None:
+    assert not imported(tmp_path, "run", "spring", "--quiet") & {"numba", "matplotlib"}
+
+
+def test_a_quiet_run_formats_no_tables(tmp_path: Path) -> None:
+    assert "rich" not in imported(tmp_path, "run", "spring", "--method", "own:*", "--quiet")
+
+
+def stored(name: str, folder: Path, **changes: Any) -> dict[str, tuple[int, ...]]:
+    """The arrays that take bytes in the store of a scene run by an own method: path and shape.
+
+    Virtual arrays show numbers that lie elsewhere, and y and z as 0, and hold none of their own.
+    """
+    scene = replace(scenes.load_scene(name), **changes)
+    session.run(scene, folder / "store.h5", methods=["own:semi-implicit-euler"])
+    found: dict[str, tuple[int, ...]] = {}
+
+    def look(path: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset) and not node.is_virtual:
+            found[path] = node.shape
+
+    with h5py.File(folder / "store.h5") as file:
+        file.visititems(look)
+    return found
+
+
+def test_energies_are_stored_only_where_they_are_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "with").mkdir()
+    (tmp_path / "without").mkdir()
+    assert any("energy" in path for path in stored("spring", tmp_path / "with"))
+    without = stored("spring", tmp_path / "without", quantities=("q", "p"))
+    assert not any("energy" in path for path in without)
+
+
+@pytest.mark.parametrize(("name", "n"), [("carbon-monoxide", 2), ("lc-circuit", 1), ("torsion-pendulum", 1)])
+def test_neither_y_nor_z_is_stored_and_no_velocity_of_what_is_no_particle(
+    name: str, n: int, tmp_path: Path
+) -> None:
+    arrays = stored(name, tmp_path)
+    frames = scenes.load_scene(name).frames
+    wide = {path: shape for path, shape in arrays.items() if "own:" in path and shape[:1] == (frames,)}
+    assert wide
+    assert all(int(np.prod(shape[1:])) in (1, n) for shape in wide.values()), wide
+    assert any("velocity" in path for path in wide) == (name == "carbon-monoxide")
+
+
+def test_a_frame_is_recorded_only_as_often_as_asked(tmp_path: Path) -> None:
+    arrays = stored("spring", tmp_path, every=50)
+    assert {shape[0] for path, shape in arrays.items() if path.startswith("observables")} == {5}
+
+
+def forces_of(scene: Scene) -> list[str]:
+    """Which loops the interpreted kernel of a scene calls in one step, in order."""
+    called: list[str] = []
+
+    def watched(law: Callable[..., None]) -> Callable[..., None]:
+        def loop(*arguments: Any) -> None:
+            called.append(law.__name__)
+            law(*arguments)
+
+        loop.__name__ = law.__name__
+        return loop
+
+    laws = dict(kernels.LAWS)
+    try:
+        kernels.LAWS.update({key: watched(law) for key, law in laws.items()})
+        q, p = np.empty((2, 1, scene.n))
+        own.prepare(scene, "euler", scene.step, compiled=False).advance(1, q, p)
+    finally:
+        kernels.LAWS.update(laws)
+    return called
+
+
+@pytest.mark.parametrize(
+    ("name", "loops"),
+    [
+        ("spring", []),
+        ("free", []),
+        ("anharmonic", ["wall_springs", "quartics"]),
+        ("pendulum", ["cosines"]),
+        ("morse-bond", ["morses"]),
+        ("carbon-monoxide", ["springs"]),
+        ("chain", ["wall_springs", "springs"]),
+        ("rlc-circuit", ["wall_springs", "dampings"]),
+    ],
+)
+def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(name: str, loops: list[str]) -> None:
+    """A single spring has a loop of its own, without any."""
+    assert forces_of(scenes.load_scene(name)) == loops
+
+
+def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: Need) -> None:
+    need("ase:velocity-verlet")
+    counted = {"spring": 0, "damping": 0}
+    for key, term in (("spring", mechanics.Spring), ("damping", mechanics.Damping)):
+        original = term.add_force
+
+        def counting(self: Any, q: Reals, p: Reals, out: Reals, key: str = key, f: Any = original) -> None:
+            counted[key] += 1
+            f(self, q, p, out)
+
+        monkeypatch.setattr(term, "add_force", counting)
+    simulate.run(scenes.load_scene("carbon-monoxide"), "ase:velocity-verlet")
+    assert counted == {"spring": 401, "damping": 0}
+
+
+def test_what_was_left_out_is_said_in_one_line_for_each_reason() -> None:
+    from springcheck import report
+
+    _, left = session.choose(scenes.load_scene("lc-circuit"), ())
+    lines = [str(line) for line in report.left_out(left) if str(line)]
+    assert len(lines) == len({one.reason for one in left}) == 2
+    assert any("OpenMM moves particles, not circuits" in line for line in lines)
