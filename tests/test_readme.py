@@ -1,0 +1,69 @@
+"""What the README shows works when it is pasted, and its links to the project are there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import springcheck
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.S)
+
+
+def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> None:
+    home = tmp_path / "springcheck"
+    shutil.copytree(Path(springcheck.__file__).parent, home, ignore=shutil.ignore_patterns("__pycache__"))
+    (term,) = (block for block in blocks("python") if "class Sextic" in block)
+    mechanics = home / "mechanics.py"
+    text = mechanics.read_text().replace("\nTERMS: ", f"\n{term}\n\nTERMS: ")
+    text = text.replace("Morse, Damping)\n", "Morse, Damping, Sextic)\n")
+    mechanics.write_text(text)
+    for name in ("ase", "sundials"):
+        declaration = home / "engines" / name / "__init__.py"
+        declaration.write_text(declaration.read_text().replace('"morse"', '"morse", "sextic"'))
+    shutil.copytree(ROOT / "data" / "scenes", home / "data" / "scenes", dirs_exist_ok=True)
+    (scene,) = (block for block in blocks("toml") if "sextic" in block)
+    (tmp_path / "well.toml").write_text(scene)
+    done = subprocess.run(
+        [sys.executable, "-m", "springcheck", "run", "well.toml",
+         "--method", "ase:*", "--method", "sundials:*"],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "ase:velocity-verlet" in done.stdout
+    assert "0 failed" in done.stdout
+
+
+def test_the_scene_of_the_readme_is_read(tmp_path: Path) -> None:
+    scene = next(block for block in blocks("toml") if "R. Ghosh" in block)
+    (tmp_path / "shown.toml").write_text(scene)
+    assert springcheck.load_scene(tmp_path / "shown.toml").steps == 200
+
+
+def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from springcheck.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "spring", "--method", "own:*", "--method", "openmm:verlet", "--quiet"]) == 0
+    for block in blocks("python"):
+        if "class Sextic" not in block:
+            exec(compile(block, "README", "exec"), {})
+
+
+@pytest.mark.parametrize(
+    "path", sorted(set(re.findall(r"`((?:validation|data|src|tests)/[\w/.-]+)`", README)))
+)
+def test_what_the_readme_names_is_there(path: str) -> None:
+    assert (ROOT / path).exists()
