@@ -67,9 +67,17 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     )
 
 
+def _telling(scene: Scene, trajectory: Trajectory) -> float:
+    """`allowed`, or NaN where it is no small part of the motion: then nothing can be said of it."""
+    limit = allowed(scene, trajectory)
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.max(mechanics.norm(scene)(trajectory.q - scene.q, trajectory.p - scene.p))
+    return limit if limit <= 1e-3 * max(float(size), 1.0) else np.nan
+
+
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:
     """Groups of trajectories whose differences rounding and tolerances explain, largest group first."""
-    limits = {EXACT: 0.0} | {label: allowed(scene, run) for label, run in trajectories.items()}
+    limits = {EXACT: 0.0} | {label: _telling(scene, run) for label, run in trajectories.items()}
     labels = comparison.labels
     limit = np.array([limits[label] for label in labels])
     bounds = limit[:, None] + limit[None, :]
