@@ -4,7 +4,7 @@ Claim: a step of the own method costs as many nanoseconds a mass for 1e6 masses 
 the caches; at 1,000 masses it takes at most twice as long as a NumPy loop written for this chain alone.
 
 Command: python validation/chain_cost.py                  (prints the table, 20 seconds)
-         python validation/chain_cost.py -o chain.csv     (and writes it: method, masses, nanoseconds)
+         python validation/chain_cost.py -o FOLDER        (and writes chain-cost.csv and its figure there)
 
 Expected: own 2 ns a mass and step at 1,000 masses and 3.5 at 1e6, NumPy's loop 4.4 and 3.1; OpenMM 25; ASE
 360 at 1,000 and 75 at 100,000; SUNDIALS 200 to 600 a force call.  None grows but by the caches.
@@ -17,12 +17,15 @@ from __future__ import annotations
 
 import argparse
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from springcheck import engines, scenes
+from springcheck.figures.style import MARKERS, look, save, style
 from springcheck.model import Scene
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
@@ -73,10 +76,29 @@ def numpy_seconds(scene: Scene) -> float:
     return perf_counter() - began
 
 
+def draw(rows: Sequence[tuple[str, int, float]], folder: Path) -> None:
+    """Cost of a mass and step against the number of masses: a level line is a cost linear in their number."""
+    with style():
+        figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+        axes = figure.add_subplot()
+        for i, name in enumerate(dict.fromkeys(row[0] for row in rows)):
+            mine = [(masses, each) for label, masses, each in rows if label == name]
+            axes.plot(*zip(*mine, strict=True), **look(i), marker=MARKERS[i % len(MARKERS)], label=name)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("masses in the chain")
+        axes.set_ylabel("nanoseconds a mass and step")
+        axes.set_title("A level line is a cost linear in the number of masses")
+        axes.legend(frameon=False)
+        save(figure, folder, "chain-cost")
+
+
 def main() -> int:
     """Print the table; returns 1 where the own method is more than twice as slow as NumPy at 1,000 masses."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("-o", "--output", type=Path, help="a CSV file of the figures")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="for chain-cost.csv, .png and .svg"
+    )
     options = parser.parse_args()
     rows: list[tuple[str, int, float]] = []
     print(f"{'nanoseconds a mass and step':30}" + "".join(f"{masses:>12,}" for masses in SIZES))
@@ -95,7 +117,8 @@ def main() -> int:
         print(f"{name:30}" + "".join(f"{'-' if x is None else format(x, '.3g'):>12}" for x in cells))
         rows += [(name, n, x) for n, x in zip(SIZES, cells, strict=True) if x is not None]
     if options.output:
-        with options.output.open("w", newline="", encoding="utf-8") as file:
+        draw(rows, options.output)
+        with (options.output / "chain-cost.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([("method", "masses", "nanoseconds"), *rows])
     ratio = best["own:semi-implicit-euler", 1000] / best["a NumPy loop", 1000]
     print(f"own beside NumPy at 1,000 masses: {ratio:.2f}")
