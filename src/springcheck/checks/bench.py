@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
+from springcheck.checks import verdicts
 from springcheck.checks.case import Case
 from springcheck.model import Floats, Scene, Term, Trajectory, Verdict
 
@@ -71,21 +72,11 @@ class Bench:
 
     def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
         """Passed only if the value is a number within the bound."""
-        return Verdict(
-            method=self.label,
-            check=check,
-            value=value,
-            bound=bound,
-            unit=unit,
-            passed=bool(value <= bound),
-            why=why,
-        )
+        return verdicts.within(self.label, check, value, bound, unit, why)
 
     def not_applicable(self, check: str, why: str) -> Verdict:
         """Reported as what it is, never as passed."""
-        return Verdict(
-            method=self.label, check=check, value=np.nan, bound=np.nan, unit="", passed=None, why=why
-        )
+        return verdicts.not_applicable(self.label, check, why)
 
 
 def replicated(scene: Scene, copies: int) -> Scene:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import exact, mechanics, schemes
+from springcheck.checks import verdicts
 from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
 
 SMALLEST = np.longdouble(5e-324)
@@ -165,27 +166,11 @@ class Case:
 
     def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
         """Passed only if the value is a number within the bound."""
-        return Verdict(
-            method=self.trajectory.label,
-            check=check,
-            value=value,
-            bound=bound,
-            unit=unit,
-            passed=bool(value <= bound),
-            why=why,
-        )
+        return verdicts.within(self.trajectory.label, check, value, bound, unit, why)
 
     def not_applicable(self, check: str, why: str) -> Verdict:
         """Reported as what it is, never as passed."""
-        return Verdict(
-            method=self.trajectory.label,
-            check=check,
-            value=float("nan"),
-            bound=float("nan"),
-            unit="",
-            passed=None,
-            why=why,
-        )
+        return verdicts.not_applicable(self.trajectory.label, check, why)
 
 
 def _pulls(scene: Scene) -> Integers:
