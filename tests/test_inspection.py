@@ -20,6 +20,7 @@ from springcheck import engines, scenes, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.studies import extremes, precision, stability
+from springcheck.studies.stability import limits
 
 Need = Callable[[str], None]
 
@@ -67,11 +68,10 @@ def test_a_study_of_stability_is_read_back_bit_for_bit(
 
 def test_what_a_stored_study_of_stability_fails_is_still_seen(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
-    fresh = stability.measure(scene, ["own:semi-implicit-euler"])
-    wrong = replace(fresh, limits=(replace(fresh.limits[0], growth_above=2 * fresh.limits[0].growth_above),))
+    right = limits.measure(engines.parse("own:semi-implicit-euler"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stability, "measure", lambda *_, **__: wrong)
-        stability.record(scene, path, ["own:semi-implicit-euler"])
+        patch.setattr(limits, "measure", lambda _: replace(right, growth_above=2 * right.growth_above))
+        wrong = stability.record(scene, path, ["own:semi-implicit-euler"])
     assert stability.failures(stability.stored(path, scene)) == stability.failures(wrong) != []
 
 
@@ -119,7 +119,12 @@ def test_plot_and_inspect_serve_every_study(stores: Path, capsys: pytest.Capture
         assert "trajectory frames" not in text
         assert main(["inspect", f"{name}.h5", "--json"]) == 0
         shown = json.loads(capsys.readouterr().out)
-        assert shown["studies"] == {name: json.loads(store.document(f"{name}.h5", name))}
+        kept = json.loads(store.document(f"{name}.h5", name))
+        if name == "extremes":
+            # the cells are in tables
+            assert kept.pop("tables") == ["extremes/own:implicit-euler"]
+            assert len(shown["studies"][name].pop("cells")) == sum(kept["counts"].values())
+        assert shown["studies"] == {name: kept}
 
 
 def test_a_stored_study_is_drawn_without_any_engine(stores: Path) -> None:
@@ -151,7 +156,7 @@ def test_a_store_that_lacks_a_part_of_its_study_is_refused_in_one_line(
             '{"methods": [{"method": "own:euler"}], "costs": []}',
             "lacks 'stability/limits/own:eul",
         ),
-        ("extremes", '{"cells": []}', "lacks 'windows'"),
+        ("extremes", '{"tables": []}', "lacks 'windows'"),
         ("precision", "{", "is no JSON"),
     ):
         path = tmp_path / f"{name}.h5"

@@ -99,8 +99,8 @@ def test_a_scene_without_fast_springs_has_no_resonances() -> None:
 
 def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None:
     need("sundials:bdf")
-    (bdf,) = costs.measure([engines.parse("sundials:bdf")], "two-scales", [1e10])
-    (adams,) = costs.measure([engines.parse("sundials:adams")], "two-scales", [1e10])
+    (bdf,) = costs.measure(engines.parse("sundials:bdf"), "two-scales", [1e10])
+    (adams,) = costs.measure(engines.parse("sundials:adams"), "two-scales", [1e10])
     assert bdf.outcome == "complete"
     assert bdf.error < 1e-3
     assert adams.steps > 100 * bdf.steps

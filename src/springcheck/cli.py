@@ -34,11 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"springcheck: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
-        missing = f"; {interrupt}" if str(interrupt) else ""
-        keeps = command is _run and options.source is None
-        kept = "what was finished is kept, the same command goes on" if keeps else "nothing is kept"
-        print(f"springcheck: interrupted{missing}; {kept}", file=sys.stderr)
-        return INTERRUPTED
+        return _interrupted(
+            str(interrupt), kept=command in KEEPING and getattr(options, "source", None) is None
+        )
     except BrokenPipeError:
         # whoever read our output has closed it; nothing is left to say
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -48,6 +46,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"springcheck: {error.strerror or error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 2
+
+
+def _interrupted(missing: str = "", *, kept: bool) -> int:
+    """Say what Ctrl-C has left; returns the exit status."""
+    what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
+    print("springcheck: " + "; ".join(filter(None, ("interrupted", missing, what))), file=sys.stderr)
+    return INTERRUPTED
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -280,7 +285,7 @@ def _precision(options: argparse.Namespace) -> int:
         lines = [*report.precision_report(found, points=options.points), *report.left_out(left)]
         _show([*lines, report.plain(f"Stored in {path}")], quiet=options.quiet)
     if found.interrupted:
-        return INTERRUPTED
+        return _interrupted(kept=True)
     return 0 if any(point.complete for point in found.points) else 2
 
 
@@ -467,3 +472,7 @@ def _list(options: argparse.Namespace) -> int:
         for line in catalogue.lines(found):
             print(line)
     return 0
+
+
+KEEPING = (_run, _precision, _stability, _extremes)
+"""Commands that keep each piece of their work as it is finished, and take it up again."""

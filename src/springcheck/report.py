@@ -296,6 +296,11 @@ def summary(report: Report) -> Text:
     )
 
 
+def taken_up(pieces: int, what: str) -> Lines:
+    """A line on what an interrupted call had finished, where there was one."""
+    return [plain(f"  {pieces} {what} were finished by an interrupted call and taken up")] if pieces else []
+
+
 def precision_report(study: PrecisionStudy, *, points: bool = False) -> Lines:
     """The whole report of `springcheck precision`; `points` adds every point."""
     scene = study.scene
@@ -303,6 +308,7 @@ def precision_report(study: PrecisionStudy, *, points: bool = False) -> Lines:
     out: Lines = [
         plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
         plain(f"  {done} points in {study.seconds:.0f} s on {study.machine['processor']}"),
+        *taken_up(study.taken_up, "points"),
         plain(),
         _precision_methods(study.methods),
     ]
@@ -480,7 +486,11 @@ def stability_report(study: Stability) -> Lines:
     """The whole report of `springcheck stability`."""
     from springcheck.studies import stability
 
-    out: Lines = [plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"), plain()]
+    out: Lines = [
+        plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"),
+        *taken_up(study.taken_up, "measurements"),
+        plain(),
+    ]
     if study.limits:
         table = grid()
         for title in ("method", "limit h w", "theory", "off", "growth above", "predicted"):
@@ -520,7 +530,13 @@ def extremes_report(atlas: Atlas) -> Lines:
     for method in dict.fromkeys(cell.method for cell in atlas.cells):
         counts = atlas.counts(method)
         table.add_row(method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in outcomes))
-    out: Lines = [plain(f"{len(atlas.cells)} extreme cases", "bold"), plain(), table, plain()]
+    out: Lines = [
+        plain(f"{len(atlas.cells)} extreme cases", "bold"),
+        *taken_up(atlas.taken_up, "tables of cells"),
+        plain(),
+        table,
+        plain(),
+    ]
     out += [plain(window.sentence) for window in atlas.windows]
     wrong = atlas.wrong
     out += [

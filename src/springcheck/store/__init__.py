@@ -10,7 +10,7 @@ from springcheck.store.exporting import export
 from springcheck.store.files import room
 from springcheck.store.foreign import Foreign, read_foreign
 from springcheck.store.journal import Journal, open_new
-from springcheck.store.layout import size
+from springcheck.store.layout import machine, size
 from springcheck.store.reading import (
     Run,
     Summary,
@@ -42,6 +42,7 @@ __all__ = [
     "comparison",
     "document",
     "export",
+    "machine",
     "open_new",
     "read",
     "read_foreign",

@@ -73,8 +73,8 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
                 left.unlink()
             return known["run"]
         raise StoreError(
-            f"{parts} holds finished work of another command: give that command again to complete it, "
-            "or --force to discard it"
+            f"{parts} holds finished work of another command, or of other versions of what it runs: "
+            "give that command again to complete it, or --force to discard it"
         )
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
@@ -196,7 +196,9 @@ class Journal:
         """Give the lock back; what is finished stays for the next one."""
         if self.folder.is_dir():
             with contextlib.suppress(OSError):
-                if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
+                empty = {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}
+                # after a checkpoint the collection holds what is finished, and the journal is how it is known
+                if empty and Parts.of(self.path, self.run).collection is None:
                     self._end()
         self._lock.release()
 

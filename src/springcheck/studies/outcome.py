@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck import engines
 from springcheck.model import Floats, Scene
 from springcheck.store import Table
+from springcheck.studies.accuracy import Accuracy
 from springcheck.studies.fits import Condition
 from springcheck.studies.points import Point
 
@@ -76,6 +73,8 @@ class PrecisionStudy:
     machine: dict[str, str]
     tick: float
     """The smallest difference that the clock shows [s]."""
+    taken_up: int = 0
+    """Points that an interrupted call had finished."""
 
     def of(self, method: str) -> tuple[Point, ...]:
         """The points of one method, coarse to fine."""
@@ -98,7 +97,8 @@ class PrecisionStudy:
 
     def tables(self) -> list[Table]:
         """The study for the store: /precision/<label>, and a summary of the methods."""
-        return [*(_table(self, summary) for summary in self.methods), _summary_table(self)]
+        named = [summary.method for summary in self.methods]
+        return [*(of_points(self.scene, x, self.of(x), self.seconds) for x in named), _summary_table(self)]
 
 
 def _point(point: Point) -> dict[str, Any]:
@@ -172,16 +172,25 @@ def _repeats(points: Iterable[tuple[float, ...]]) -> Floats:
     return out
 
 
-def _table(study: PrecisionStudy, method: MethodSummary) -> Table:
-    """The points of one method; unknown numbers are NaN and unknown counts -1."""
-    points = study.of(method.method)
+def table_name(method: str) -> str:
+    """Where the points of a method are kept."""
+    return f"precision/{method}"
+
+
+_NUMBERS = ("step", "tolerance", "max_error", "end_error", "phase_error", "energy_error", "rounding_error")
+
+
+def of_points(scene: Scene, method: str, points: Sequence[Point], seconds: float) -> Table:
+    """The points of one method; unknown numbers are NaN and unknown counts -1.
+
+    `seconds`: what the study had taken by then.
+    """
     documents = [_point(point) for point in points]
-    numbers = ("step", "tolerance", "max_error", "end_error", "phase_error", "energy_error", "rounding_error")
-    time = {"reduced": "1", "md": "ps", "si": "s"}[study.scene.units]
+    time = {"reduced": "1", "md": "ps", "si": "s"}[scene.units]
     return Table(
-        name=f"precision/{method.method}",
+        name=table_name(method),
         columns={
-            **{name: np.array([_number(d[name]) for d in documents]) for name in numbers},
+            **{name: np.array([_number(d[name]) for d in documents]) for name in _NUMBERS},
             **{
                 name: np.array([-1 if d[name] is None else d[name] for d in documents], dtype=np.int64)
                 for name in ("steps", "force_calls")
@@ -190,7 +199,9 @@ def _table(study: PrecisionStudy, method: MethodSummary) -> Table:
             "run_seconds_repeats": _repeats(p.run_repeats for p in points),
             "start_seconds_repeats": _repeats(p.start_repeats for p in points),
             "read_seconds_repeats": _repeats(p.read_repeats for p in points),
-            "outcome": [d["outcome"] for d in documents],
+            "spent_seconds": np.array([p.spent for p in points]),
+            "outcome": [p.outcome for p in points],
+            "message": [p.message for p in points],
         },
         units={
             "step": time,
@@ -199,11 +210,62 @@ def _table(study: PrecisionStudy, method: MethodSummary) -> Table:
             "run_seconds_repeats": "s",
             "start_seconds_repeats": "s",
             "read_seconds_repeats": "s",
+            "spent_seconds": "s",
         },
-        attributes={"about": "error against run time; errors in units of the start; -1 and NaN: not known"},
+        attributes={
+            "about": "error against run time; errors in units of the start; -1 and NaN: not known",
+            "study_seconds": seconds,
+        },
         signal="max_error",
         axes=("run_seconds",),
     )
+
+
+def to_points(table: Table) -> tuple[list[Point], float]:
+    """The points of such a table, and the seconds that the study had taken by then."""
+    columns = {name: np.asarray(column) for name, column in table.columns.items()}
+
+    def known(name: str, row: int) -> float | None:
+        x = float(columns[name][row])
+        return None if np.isnan(x) else x
+
+    def count(name: str, row: int) -> int | None:
+        x = int(columns[name][row])
+        return None if x < 0 else x
+
+    def repeats(name: str, row: int) -> tuple[float, ...]:
+        x = columns[f"{name}_seconds_repeats"][row]
+        return tuple(x[~np.isnan(x)].tolist())
+
+    def accuracy(row: int) -> Accuracy | None:
+        if columns["outcome"][row] != "complete":
+            return None
+        return Accuracy(
+            largest=float(columns["max_error"][row]),
+            end=float(columns["end_error"][row]),
+            phase=known("phase_error", row),
+            energy=float(columns["energy_error"][row]),
+            rounding=known("rounding_error", row),
+        )
+
+    points = [
+        Point(
+            method=table.name.removeprefix(table_name("")),
+            step=known("step", row),
+            tolerance=known("tolerance", row),
+            steps=count("steps", row),
+            outcome=str(columns["outcome"][row]),
+            message=str(columns["message"][row]),
+            accuracy=accuracy(row),
+            run_repeats=repeats("run", row),
+            start_repeats=repeats("start", row),
+            read_repeats=repeats("read", row),
+            force_calls=count("force_calls", row),
+            spent=float(columns["spent_seconds"][row]),
+        )
+        for row in range(len(columns["outcome"]))
+    ]
+    return points, float(table.attributes["study_seconds"])
 
 
 def _summary_table(study: PrecisionStudy) -> Table:
@@ -234,27 +296,3 @@ def _summary_table(study: PrecisionStudy) -> Table:
             "clock_seconds": study.tick,
         },
     )
-
-
-def machine(names: Iterable[str]) -> dict[str, str]:
-    """The machine and the versions of the engines on it."""
-    found = {
-        "processor": _processor(),
-        "cores": str(os.cpu_count() or "unknown"),
-        "platform": platform.platform(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
-    for name in sorted(names):
-        if engines.absence(name) is None:
-            found[engines.engine(name).distribution or "springcheck"] = engines.installed_version(name)
-    return found
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or platform.machine()

@@ -29,6 +29,8 @@ class Point:
     read_repeats: tuple[float, ...] = ()
     """Seconds of the same steps with each of them read."""
     force_calls: int | None = None
+    spent: float = 0.0
+    """Seconds that all of its runs took, with their starts and comparisons."""
 
     @property
     def complete(self) -> bool:

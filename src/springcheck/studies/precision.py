@@ -25,7 +25,15 @@ from springcheck.model import Label, Scene, Stopped
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits
 from springcheck.studies.accuracy import Errors, Truth, truth
-from springcheck.studies.outcome import Answer, MethodSummary, PrecisionStudy, machine
+from springcheck.studies.outcome import (
+    Answer,
+    MethodSummary,
+    PrecisionStudy,
+    of_points,
+    table_name,
+    to_points,
+)
+from springcheck.studies.pieces import Pieces, command, origin
 from springcheck.studies.points import Point
 from springcheck.studies.sweeps import (
     PLANNED,
@@ -33,9 +41,8 @@ from springcheck.studies.sweeps import (
     affordable,
     begin,
     blank,
-    is_finished,
     repeats,
-    runs,
+    take,
     to_time,
     warm_ups,
 )
@@ -58,6 +65,9 @@ READS = 3
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
 
+CUT_OFF = "cut off"
+"""Outcome of the first point that a study did not come to."""
+
 DOCUMENT = "precision"
 """Name of the study's document in a store."""
 
@@ -71,19 +81,25 @@ def study(
     *,
     budget: float = BUDGET,
     progress: Progress | None = None,
+    pieces: Pieces | None = None,
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
     A method that cannot run, a run that diverges and a sweep that is cut off are points with their
-    reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.
+    reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.  Points
+    that an earlier call has finished (`pieces`) are taken up, and what they took counts for the budget.
 
     Raises:
         SceneError: the true motion of the scene is not known, or nothing moves in it.
     """
     known = truth(scene)
     sweeps = [begin(scene, label, known) for label in labels]
+    pieces = pieces or Pieces()
+    able = _open(sweeps)
+    before = [_take_up(sweep, pieces) for sweep in able]
+    taken_up = sum(len(sweep.points) for sweep in able)
     # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
-    began = perf_counter()
+    began = perf_counter() - max(before, default=0.0)
     interrupted = False
 
     def tell(what: str) -> None:
@@ -93,12 +109,29 @@ def study(
     try:
         while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
             _level(ready, known, tell)
+            for sweep in ready:
+                name = str(sweep.label)
+                pieces.keep(of_points(scene, name, sweep.points, perf_counter() - began))
     except KeyboardInterrupt:
         interrupted = True
     why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
     for sweep in _open(sweeps):
-        sweep.points.append(blank(sweep, "cut off", why))
-    return _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
+        sweep.points.append(blank(sweep, CUT_OFF, why))
+    found = _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
+    return replace(found, taken_up=taken_up)
+
+
+def _take_up(sweep: Sweep, pieces: Pieces) -> float:
+    """Go on where an earlier call ended -> the seconds that it had taken."""
+    table = pieces.finished(table_name(str(sweep.label)))
+    if table is None:
+        return 0.0
+    points, seconds = to_points(table)
+    for point in points:
+        # what the end of that call cut off is this one's to measure
+        if point.outcome != CUT_OFF:
+            take(sweep, point)
+    return seconds
 
 
 def record(
@@ -112,14 +145,17 @@ def record(
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
+    Points are kept as they are finished, and an unfinished study of the same command is taken up.  After
+    Ctrl-C the store holds what there is, and the same command goes on from it.
+
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
-    command = "\n".join(["precision", *map(str, labels), scene.text])
-    with store.open_new(path, command, force=force) as journal:
-        found = study(scene, labels, budget=budget, progress=progress)
+    with store.open_new(path, command("precision", labels, scene.text), force=force) as journal:
+        found = study(scene, labels, budget=budget, progress=progress, pieces=Pieces(journal))
         for table in found.tables():
             journal.add(table)
-        journal.commit(scene, documents={DOCUMENT: json.dumps(found.document(), allow_nan=False)})
+        text = json.dumps(found.document(), allow_nan=False)
+        journal.commit(scene, documents={DOCUMENT: text}, final=not found.interrupted)
     return found
 
 
@@ -146,16 +182,8 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> No
     timed = {id(clock.sweep): clock for clock in clocks}
     for sweep, point, seconds in zip(sweeps, points, spent, strict=True):
         clock = timed.get(id(sweep))
-        sweep.points.append(point if clock is None else clock.onto(point))
-        if clock and not clock.gave_up:
-            before, sweep.cost = sweep.cost, min(run.timing.run for run in clock.runs)
-            sweep.read = min(clock.reads, default=np.inf)
-            sweep.start = min(run.timing.start for run in clock.runs)
-            used = runs(sweep.cost + sweep.start) * sweep.cost
-            sweep.overhead = max(0.0, seconds + clock.spent - used)
-            if sweep.method.adaptive and before:
-                sweep.growth = max(1.2, sweep.cost / before)
-        sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
+        whole = point if clock is None else clock.onto(point)
+        take(sweep, replace(whole, spent=seconds + (clock.spent if clock else 0.0)))
 
 
 def _errors(sweep: Sweep, known: Truth) -> Point:
@@ -276,7 +304,7 @@ def _put_together(
         methods=tuple(_summary(sweep, known) for sweep in sweeps),
         front=tuple(fits.front(timed)),
         cheapest=tuple(Answer(target=target, point=fits.cheapest(timed, target)) for target in TARGETS),
-        machine=machine({sweep.label.engine for sweep in sweeps}),
+        machine=origin([sweep.label for sweep in sweeps]),
         tick=tick(),
     )
 

@@ -97,6 +97,20 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     return sweep
 
 
+def take(sweep: Sweep, point: Point) -> None:
+    """The next point of a sweep: what it cost foretells the one after it."""
+    sweep.points.append(point)
+    if point.run_repeats:
+        before, sweep.cost = sweep.cost, min(point.run_repeats)
+        sweep.read = min(point.read_repeats, default=np.inf)
+        sweep.start = min(point.start_repeats)
+        used = runs(sweep.cost + sweep.start) * sweep.cost
+        sweep.overhead = max(0.0, point.spent - used)
+        if sweep.method.adaptive and before:
+            sweep.growth = max(1.2, sweep.cost / before)
+    sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
+
+
 def coarsest(known: Truth, limit: float) -> int:
     """The fewest steps worth taking: the first below the limit of stability, or h w = 1 without one."""
     if 0 < limit < np.inf:

@@ -10,6 +10,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ import numpy as np
 from springcheck import engines, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label
-from springcheck.studies.extremes import grid, refusals, running, solving
+from springcheck.studies.extremes import grid, keeping, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
+from springcheck.studies.pieces import Pieces, command
 from springcheck.studies.stability import propagators
 
 __all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows", "stored"]
@@ -28,9 +30,9 @@ __all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows"
 DOCUMENT = "extremes"
 """Name of the atlas in a store."""
 
-PLATFORMS = ("openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
-             "openmm:verlet@OpenCL-double")  # fmt: skip
-"""Beside every method on its first platform."""
+ALL = ("*", "openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
+       "openmm:verlet@OpenCL-double")  # fmt: skip
+"""Every method on its first platform, and the platforms."""
 
 CALM = (0.01, 1.9)
 """h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
@@ -53,6 +55,8 @@ class Atlas:
     cells: tuple[Cell, ...]
     windows: tuple[Window, ...]
     left_out: tuple[tuple[str, str], ...]
+    taken_up: int = 0
+    """Methods that an interrupted call had finished."""
 
     @property
     def wrong(self) -> tuple[Cell, ...]:
@@ -70,17 +74,23 @@ class Atlas:
 
 
 def measure(
-    methods: Sequence[str] = (), *, quick: bool = False, progress: Callable[[str], None] | None = None
+    methods: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    progress: Callable[[str], None] | None = None,
+    pieces: Pieces | None = None,
 ) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
+
+    What an earlier call has finished (`pieces`) is taken up.
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
     """
-    chosen = engines.match(tuple(methods) or ("*", *PLATFORMS))
+    pieces = pieces or Pieces()
     cells: list[Cell] = []
     left_out = []
-    for label in chosen:
+    for label in engines.match(tuple(methods) or ALL):
         method = engines.method(label)
         if "wall-spring" not in method.terms or "particles" not in method.kinds:
             left_out.append((str(label), "it moves no particles on springs"))
@@ -91,14 +101,23 @@ def measure(
         if absent:
             left_out.append((str(label), absent))
             continue
-        if progress:
+        name = f"{keeping.CELLS}{label}"
+        if progress and pieces.finished(name) is None:
             progress(str(label))
-        cells += of_method(label, quick=quick)
+        cells += pieces.piece(
+            name, partial(of_method, label, quick=quick), partial(keeping.of_cells, name), keeping.to_cells
+        )
     if not cells:
         raise MethodError("none of these methods is here: " + "; ".join(map(": ".join, left_out)))
     if not methods:
-        cells += refusals.cells()
-    return Atlas(cells=tuple(cells), windows=tuple(windows(cells)), left_out=tuple(left_out))
+        name = f"{keeping.CELLS}refusals"
+        cells += pieces.piece(name, refusals.cells, partial(keeping.of_cells, name), keeping.to_cells)
+    return Atlas(
+        cells=tuple(cells),
+        windows=tuple(windows(cells)),
+        left_out=tuple(left_out),
+        taken_up=len(pieces.taken_up),
+    )
 
 
 def record(
@@ -109,47 +128,30 @@ def record(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Atlas:
-    """Like `measure`, kept in a store: one table of cells for each method, and the document.
+    """Like `measure`, kept in a store: one table of cells for each method as it is finished, the document.
 
-    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    An unfinished atlas of the same command is taken up.  Raises StoreError, before anything is measured,
+    when the file exists or cannot be written.
     """
-    with store.open_new(path, "\n".join(["extremes", *methods]), force=force) as journal:
-        atlas = measure(methods, quick=quick, progress=progress)
-        for method in dict.fromkeys(cell.method for cell in atlas.cells):
-            cells = [cell for cell in atlas.cells if cell.method == method]
-            numbers: dict[str, list[float] | list[str]] = {
-                name: [cell.parameters.get(name, np.nan) for cell in cells]
-                for name in ("m", "k", "q", "p", "h", "steps", "tolerance")
-            }
-            judged: dict[str, list[float] | list[str]] = {
-                "outcome": [str(cell.outcome) for cell in cells],
-                "reason": [cell.reason for cell in cells],
-                "value": [cell.value for cell in cells],
-                "bound": [cell.bound for cell in cells],
-            }
-            journal.add(store.Table(name=f"extremes/{method}", columns=numbers | judged))
-        journal.commit(documents={DOCUMENT: json.dumps(document(atlas), allow_nan=False)})
+    labels = engines.match(tuple(methods) or ALL)
+    size = "quick" if quick else "whole"
+    with store.open_new(path, command("extremes", labels, size), force=force) as journal:
+        pieces = Pieces(journal)
+        atlas = measure(methods, quick=quick, progress=progress, pieces=pieces)
+        known = {"tables": pieces.names, **document(atlas)}
+        # the tables hold the cells, and hold them exactly
+        del known["cells"]
+        journal.commit(documents={DOCUMENT: json.dumps(known, allow_nan=False)})
     return atlas
 
 
 def stored(path: str | Path) -> Atlas:
     """The atlas that `record` has kept.  StoreError where the file holds none."""
     known = json.loads(store.document(path, DOCUMENT))
+    tables = store.read_tables(path)
     try:
-        cells = tuple(
-            Cell(
-                method=cell["method"],
-                block=cell["block"],
-                parameters={name: _number(value) for name, value in cell["parameters"].items()},
-                outcome=cell["outcome"],
-                reason=cell["reason"],
-                value=_number(cell["value"]),
-                bound=_number(cell["bound"]),
-            )
-            for cell in known["cells"]
-        )
         return Atlas(
-            cells=cells,
+            cells=tuple(cell for name in known["tables"] for cell in keeping.to_cells(tables[name])),
             windows=tuple(Window(**window) for window in known["windows"]),
             left_out=tuple((one["method"], one["reason"]) for one in known["left_out"]),
         )
@@ -244,7 +246,3 @@ def document(atlas: Atlas) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)

@@ -10,14 +10,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from springcheck import engines, mechanics, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label, Scene
+from springcheck.studies.pieces import Pieces, command
 from springcheck.studies.stability import costs, keeping, limits, propagators, regions, resonance
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
@@ -37,6 +39,8 @@ __all__ = [
     "stored",
 ]
 
+T = TypeVar("T")
+
 DOCUMENT = "stability"
 """Name of the study's document in a store."""
 
@@ -55,6 +59,8 @@ class Stability:
     resonances: tuple[Resonance, ...]
     costs: tuple[Cost, ...]
     left_out: tuple[tuple[str, str], ...]
+    taken_up: int = 0
+    """Limits, regions, resonances and costs that an interrupted call had finished."""
 
     @property
     def passed(self) -> bool:
@@ -67,8 +73,11 @@ def measure(
     methods: Sequence[str] = (),
     *,
     progress: Callable[[str], None] | None = None,
+    pieces: Pieces | None = None,
 ) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
+
+    What an earlier call has finished (`pieces`) is taken up.
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
@@ -87,28 +96,56 @@ def measure(
             left_out.append((str(label), absent))
         else:
             usable.append(label)
-    found_limits, found_regions, found_resonances = [], [], []
-    say = progress or (lambda _: None)
-    for label in usable:
-        say(f"limit of {label}")
-        found_limits.append(limits.measure(label))
-    if mechanics.is_damped(scene):
-        for label in regions.labels(tuple(usable)):
-            say(f"region of {label}")
-            found_regions.append(regions.measure(label))
-    if mechanics.split(scene.terms)[1]:
-        for label in usable:
-            if engines.method(label).requires == {"springs marked fast"} and not engines.refusal(
-                scene, label
-            ):
-                say(f"resonances of {label}")
-                found_resonances.append(resonance.measure(scene, label))
-    rows: list[Cost] = []
-    if scene.name in costs.RATIOS:
-        for label in chosen:
-            if not engines.absence(label.engine):
-                say(f"cost of stiffness for {label}")
-                rows += costs.measure([label], scene.name)
+    pieces = pieces or Pieces()
+
+    def told(what: str, measured: Callable[[], T]) -> Callable[[], T]:
+        def measure() -> T:
+            if progress:
+                progress(what)
+            return measured()
+
+        return measure
+
+    found_limits = [
+        pieces.piece(
+            f"{keeping.LIMITS}{label}",
+            told(f"limit of {label}", partial(limits.measure, label)),
+            keeping.of_limit,
+            keeping.to_limit,
+        )
+        for label in usable
+    ]
+    found_regions = [
+        pieces.piece(
+            f"{keeping.REGIONS}{label}",
+            told(f"region of {label}", partial(regions.measure, label)),
+            keeping.of_region,
+            keeping.to_region,
+        )
+        for label in (regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ())
+    ]
+    found_resonances = [
+        pieces.piece(
+            f"{keeping.RESONANCES}{label}",
+            told(f"resonances of {label}", partial(resonance.measure, scene, label)),
+            keeping.of_resonance,
+            keeping.to_resonance,
+        )
+        for label in usable
+        if mechanics.split(scene.terms)[1]
+        and engines.method(label).requires == {"springs marked fast"}
+        and not engines.refusal(scene, label)
+    ]
+    rows = [
+        pieces.piece(
+            f"{keeping.COSTS}{label}",
+            told(f"cost of stiffness for {label}", partial(costs.measure, label, scene.name)),
+            partial(keeping.of_costs, str(label)),
+            keeping.to_costs,
+        )
+        for label in chosen
+        if scene.name in costs.RATIOS and costs.serves(label, scene.name)
+    ]
     if not usable and not rows:
         raise MethodError(
             "none of these methods has a limit to measure: " + "; ".join(map(": ".join, left_out))
@@ -118,8 +155,9 @@ def measure(
         limits=tuple(found_limits),
         regions=tuple(found_regions),
         resonances=tuple(found_resonances),
-        costs=tuple(rows),
+        costs=tuple(row for of_method in rows for row in of_method),
         left_out=tuple(left_out),
+        taken_up=len(pieces.taken_up),
     )
 
 
@@ -131,18 +169,14 @@ def record(
     force: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Stability:
-    """Like `measure`, kept in a store: tables under /stability, and the document.
+    """Like `measure`, kept in a store: tables under /stability as they are finished, and the document.
 
-    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    An unfinished study of the same command is taken up.  Raises StoreError, before anything is measured,
+    when the file exists or cannot be written.
     """
-    with store.open_new(path, "\n".join(["stability", *methods, scene.text]), force=force) as journal:
-        study = measure(scene, methods, progress=progress)
-        for table in (
-            *map(keeping.of_limit, study.limits),
-            *map(keeping.of_region, study.regions),
-            *map(keeping.of_resonance, study.resonances),
-        ):
-            journal.add(table)
+    labels = engines.match(tuple(methods) or ("*",))
+    with store.open_new(path, command("stability", labels, scene.text), force=force) as journal:
+        study = measure(scene, methods, progress=progress, pieces=Pieces(journal))
         journal.commit(scene, documents={DOCUMENT: json.dumps(document(study), allow_nan=False)})
     return study
 
@@ -162,7 +196,11 @@ def stored(path: str | Path, scene: Scene) -> Stability:
             limits=tuple(map(keeping.to_limit, under(keeping.LIMITS, "methods"))),
             regions=tuple(map(keeping.to_region, under(keeping.REGIONS, "regions"))),
             resonances=tuple(map(keeping.to_resonance, under(keeping.RESONANCES, "resonances"))),
-            costs=tuple(map(keeping.to_cost, known["costs"])),
+            costs=tuple(
+                row
+                for method in dict.fromkeys(one["method"] for one in known["costs"])
+                for row in keeping.to_costs(tables[keeping.COSTS + method])
+            ),
             left_out=tuple((one["method"], one["reason"]) for one in known["left_out"]),
         )
     except (KeyError, TypeError, ValueError) as error:

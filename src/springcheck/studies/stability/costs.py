@@ -7,7 +7,7 @@ goes as far as the slow motion needs to show; the error is that of the slow moti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -84,31 +84,16 @@ def step_for(found: Scene, label: Label) -> float:
     return held
 
 
-def measure(
-    labels: Sequence[Label],
-    family: Family,
-    ratios: Sequence[float] = (),
-    *,
-    progress: Callable[[int], None] | None = None,
-) -> list[Cost]:
-    """One row for every method that serves the family, at every ratio."""
-    rows = []
-    for label in labels:
-        for ratio in ratios or RATIOS[family]:
-            found = scene(family, ratio)
-            if engines.refusal(found, label) is None and not _is_other(label):
-                solver = engines.method(label).adaptive
-                rows.append(
-                    _solver(found, label, family, ratio) if solver else _fixed(found, label, family, ratio)
-                )
-            if progress:
-                progress(1)
-    return rows
+def serves(label: Label, family: Family) -> bool:
+    """Whether a method has a row in a family; a platform in another precision answers another question."""
+    known = engines.refusal(scene(family, RATIOS[family][0]), label) or engines.absence(label.engine)
+    return known is None and not label.platform
 
 
-def _is_other(label: Label) -> bool:
-    """A platform in another precision answers another question."""
-    return bool(label.platform)
+def measure(label: Label, family: Family, ratios: Sequence[float] = ()) -> tuple[Cost, ...]:
+    """The runs of a method that serves the family, one at every ratio."""
+    run = _solver if engines.method(label).adaptive else _fixed
+    return tuple(run(scene(family, ratio), label, family, ratio) for ratio in ratios or RATIOS[family])
 
 
 def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:

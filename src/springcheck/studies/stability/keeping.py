@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast, get_args
+from collections.abc import Sequence
+from typing import Any, cast
 
 import numpy as np
 
 from springcheck.store import Table
-from springcheck.studies.stability.costs import Cost, Family
+from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 
-LIMITS, REGIONS, RESONANCES = "stability/limits/", "stability/regions/", "stability/resonances/"
+LIMITS, REGIONS = "stability/limits/", "stability/regions/"
+RESONANCES, COSTS = "stability/resonances/", "stability/costs/"
 """Beginnings of the tables' names; the method follows."""
 
 _OF_LIMIT = (
@@ -21,6 +22,10 @@ _OF_LIMIT = (
     "growth_below_predicted", "edge", "edge_predicted",
 )  # fmt: skip
 _OF_REGION = ("off", "undecided", "wrong")
+_OF_COST: tuple[tuple[str, Any], ...] = (
+    ("family", object), ("method", object), ("ratio", float), ("step", float), ("steps", np.int64),
+    ("rejected", np.int64), ("force_calls", np.int64), ("error", float), ("outcome", object),
+)  # fmt: skip
 
 
 def of_limit(x: Limit) -> Table:
@@ -110,14 +115,18 @@ def to_resonance(table: Table) -> Resonance:
     )
 
 
-def to_cost(known: Mapping[str, Any]) -> Cost:
-    """A row of the document's costs; None there is NaN here.  KeyError, ValueError where it is none."""
-    if known["family"] not in get_args(Family):
-        raise ValueError(f"family {known['family']!r}")
-    numbers: dict[str, Any] = {
-        name: float("nan") if known[name] is None else known[name] for name in Cost.__slots__
-    }
-    return Cost(**numbers)
+def of_costs(method: str, rows: Sequence[Cost]) -> Table:
+    """The runs of one method over the ratios of a family; none where it does not serve the family."""
+    return Table(
+        name=f"{COSTS}{method}",
+        columns={name: np.array([getattr(x, name) for x in rows], dtype=kind) for name, kind in _OF_COST},
+    )
+
+
+def to_costs(table: Table) -> tuple[Cost, ...]:
+    """The runs of such a table.  KeyError where it is another's."""
+    columns = {name: _column(table, name).tolist() for name, _ in _OF_COST}
+    return tuple(Cost(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
 
 
 def _column(table: Table, name: str) -> np.ndarray:

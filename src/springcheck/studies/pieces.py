@@ -1,0 +1,72 @@
+"""The pieces of a long study: kept as they are finished, taken up by the next call of the same command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+from springcheck import engines, store
+from springcheck.model import Label
+
+T = TypeVar("T")
+
+
+class Pieces:
+    """What an earlier call has finished, and where this one keeps what it finishes.
+
+    Without a journal nothing was finished and nothing is kept.
+    """
+
+    def __init__(self, journal: store.Journal | None = None) -> None:
+        self._journal = journal
+        self._finished = journal.tables() if journal else {}
+        self.names: list[str] = []
+        """Names of the pieces, in the order in which they were asked for."""
+        self.taken_up: list[str] = []
+        """Those that were not measured again."""
+
+    def finished(self, name: str) -> store.Table | None:
+        """The table of this name that an earlier call has kept."""
+        return self._finished.get(name)
+
+    def keep(self, table: store.Table) -> None:
+        """Keep a table, in the place of an earlier one of its name: from here on it outlives crashes."""
+        if self._journal is not None:
+            self._journal.add(table)
+
+    def piece(
+        self,
+        name: str,
+        measure: Callable[[], T],
+        to_table: Callable[[T], store.Table],
+        from_table: Callable[[store.Table], T],
+    ) -> T:
+        """The piece of this name: taken up where it is finished, else measured and kept."""
+        self.names.append(name)
+        table = self.finished(name)
+        if table is not None:
+            self.taken_up.append(name)
+            return from_table(table)
+        found = measure()
+        self.keep(to_table(found))
+        return found
+
+
+def origin(labels: Iterable[Label]) -> dict[str, str]:
+    """The machine, and the versions of everything that these methods run on."""
+    found = {name: str(value) for name, value in store.machine().items()}
+    for name in sorted({label.engine for label in labels}):
+        distribution = engines.engine(name).distribution
+        if distribution and engines.absence(name) is None:
+            found[distribution] = engines.installed_version(name)
+    return found
+
+
+def command(study: str, labels: Sequence[Label], *options: str) -> str:
+    """All that decides a study's numbers, by which its journal is recognised.
+
+    The machine and the versions are part of it: times of two machines, limits of two releases of an
+    engine, do not belong into one study.
+    """
+    versions = [f"{name} {version}" for name, version in origin(labels).items()]
+    return "\n".join([study, *map(str, labels), *versions, *options])

@@ -1,0 +1,218 @@
+"""A study that was killed or interrupted is taken up by the same command: what was finished is not lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import cli, engines, scenes, store
+from springcheck.errors import StoreError
+from springcheck.model import Label
+from springcheck.studies import extremes, pieces, precision, stability
+from springcheck.studies.outcome import of_points, to_points
+from springcheck.studies.stability import limits
+
+OWN = ["own:euler", "own:implicit-euler", "own:semi-implicit-euler"]
+
+
+def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store.Table]:
+    """Start a command, kill it (SIGKILL) once so many tables are there; what it had finished."""
+    environment = os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])}
+    parts = path.with_name(path.name + ".parts")
+    with subprocess.Popen(
+        [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"], env=environment
+    ) as process:
+        while process.poll() is None and len(list(parts.glob("table-*.h5"))) < tables:
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
+    return store.read_tables(path)
+
+
+def equal(one: store.Table, other: store.Table) -> bool:
+    """Bit for bit."""
+    return one.columns.keys() == other.columns.keys() and all(
+        np.array_equal(
+            a := np.asarray(one.columns[name]), np.asarray(other.columns[name]), a.dtype.kind == "f"
+        )
+        for name in one.columns
+    )
+
+
+def raising(after: int) -> Callable[..., None]:
+    """A progress callback that is Ctrl-C at its `after`-th call."""
+    calls: list[object] = []
+
+    def told(*what: object) -> None:
+        calls.append(what)
+        if len(calls) == after:
+            raise KeyboardInterrupt
+
+    return told
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["stability", "overdamped", *(x for name in OWN for x in ("--method", name))],
+        ["extremes", "--quick", *(x for name in OWN for x in ("--method", name))],
+    ],
+    ids=lambda arguments: str(arguments[0]),
+)
+def test_a_killed_study_is_taken_up_and_nothing_of_it_measured_again(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "study.h5"
+    kept = killed(arguments, path, 1)
+    assert cli.main([*arguments, "-o", str(path)]) == 0
+    assert f"  {len(kept)} " in capsys.readouterr().out
+    whole = store.read_tables(path)
+    assert 0 < len(kept) < len(whole)
+    for name, table in kept.items():
+        assert equal(table, whole[name]), name
+    assert store.check(path) == []
+    assert store.summary(path).complete
+    assert cli.main([*arguments, "-o", str(path)]) == 2
+    assert "--force" in capsys.readouterr().err
+
+
+def test_a_killed_study_of_precision_keeps_its_points(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "study.h5"
+    arguments = [
+        "precision",
+        "spring-uneven",
+        "--budget",
+        "1.5",
+        *(x for name in OWN for x in ("--method", name)),
+    ]
+    kept = {name: to_points(table)[0] for name, table in killed(arguments, path, 3).items()}
+    assert cli.main([*arguments, "-o", str(path), "--json"]) == 0
+    whole = {name: to_points(table)[0] for name, table in store.read_tables(path).items() if ":" in name}
+    assert sum(map(len, kept.values())) >= 3
+    for name, points in kept.items():
+        assert whole[name][: len(points)] == points
+        assert len(whole[name]) > len(points)
+    assert json.loads(capsys.readouterr().out)["interrupted"] is False
+    assert store.summary(path).complete
+
+
+def test_points_are_read_back_as_they_were() -> None:
+    scene = scenes.load_scene("anharmonic")
+    found = precision.study(scene, [engines.parse(name) for name in OWN[::2]], budget=0.5)
+    for method in found.methods:
+        points = found.of(method.method)
+        assert len(points) > 3
+        assert to_points(of_points(scene, method.method, points, 1.5)) == (list(points), 1.5)
+
+
+def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    labels = list(map(engines.parse, OWN))
+    first = precision.record(scene, labels, path, budget=2.0, progress=raising(12))
+    assert first.interrupted
+    assert not store.summary(path).complete
+    assert json.loads(store.document(path, precision.DOCUMENT)) == first.document()
+    done = [point for point in first.points if point.complete]
+    with pytest.raises(StoreError, match=r"another command, or of other versions"):
+        precision.record(scene, labels[:2], path, budget=2.0)
+    second = precision.record(scene, labels, path, budget=2.0)
+    assert not second.interrupted
+    assert second.taken_up == len(done) == 6
+    assert set(done) < set(second.points)
+    assert second.seconds > first.seconds
+    assert store.summary(path).complete
+    assert store.check(path) == []
+
+
+def test_a_study_whose_budget_was_spent_when_it_was_killed_measures_nothing_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    labels = [engines.parse("own:euler")]
+
+    def full(*_: object, **__: object) -> None:
+        raise StoreError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store.Journal, "commit", full)
+        with pytest.raises(StoreError, match="full"):
+            precision.record(scene, labels, path, budget=0.5)
+    (table,) = [t for name, t in store.read_tables(path).items() if name == "precision/own:euler"]
+    before, seconds = to_points(table)
+    found = precision.record(scene, labels, path, budget=0.5)
+    assert [p for p in found.points if p.complete] == [p for p in before if p.complete]
+    assert found.seconds >= seconds
+
+
+def test_an_interrupted_study_says_that_the_same_command_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured: list[Label] = []
+    measure = limits.measure
+
+    def interrupted(label: Label) -> limits.Limit:
+        if len(measured) == 2:
+            raise KeyboardInterrupt
+        measured.append(label)
+        return measure(label)
+
+    arguments = ["stability", "spring-uneven", "--method", "own:*", "-o", str(tmp_path / "study.h5")]
+    with monkeypatch.context() as patch:
+        patch.setattr(limits, "measure", interrupted)
+        assert cli.main(arguments) == cli.INTERRUPTED
+    assert capsys.readouterr().err == (
+        "springcheck: interrupted; what was finished is kept, the same command goes on\n"
+    )
+    again: list[Label] = []
+    monkeypatch.setattr(limits, "measure", lambda label: (again.append(label), measure(label))[1])
+    assert cli.main(arguments) == 0
+    assert len(measured) == 2
+    assert again
+    assert not set(map(str, measured)) & set(map(str, again))
+
+
+@pytest.mark.parametrize("what", ["springcheck", "processor", "numpy"])
+def test_work_of_another_version_or_machine_is_not_taken_up(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "study.h5"
+    with pytest.raises(KeyboardInterrupt):
+        extremes.record(path, OWN, quick=True, progress=raising(2))
+    machine = store.machine()
+    monkeypatch.setattr(store, "machine", lambda: machine | {what: "another"})
+    with pytest.raises(StoreError, match="other versions"):
+        extremes.record(path, OWN, quick=True)
+    monkeypatch.undo()
+    with pytest.raises(StoreError, match="another command"):
+        extremes.record(path, OWN)
+    assert extremes.record(path, OWN, quick=True).taken_up == 1
+
+
+def test_every_version_that_a_study_runs_on_is_in_its_command() -> None:
+    labels = [engines.parse(name) for name in ("own:euler", "sundials:bdf")]
+    text = pieces.command("stability", labels, "a scene")
+    assert text.splitlines()[0] == "stability"
+    for line in ("own:euler", "sundials:bdf", f"numpy {np.__version__}", "a scene"):
+        assert line in text.splitlines()
+    if engines.absence("sundials") is None:
+        assert f"scikit-sundae {engines.installed_version('sundials')}" in text.splitlines()
+    assert "openmm" not in text
+
+
+def test_a_study_of_stability_can_be_forced_to_start_over(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    with pytest.raises(KeyboardInterrupt):
+        stability.record(scene, path, ["own:*"], progress=raising(3))
+    assert stability.record(scene, path, ["own:*"], force=True).taken_up == 0
