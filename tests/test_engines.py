@@ -13,6 +13,7 @@ import springcheck
 from springcheck import checks, engines, exact, mechanics, scenes, simulate
 from springcheck.errors import MethodError
 from springcheck.model import Scene, Trajectory
+from springcheck.terms import Spring, WallSpring
 
 Need = Callable[[str], None]
 
@@ -134,7 +135,7 @@ def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
     scene = replace(
         scenes.load_scene("chain"),
         terms=(
-            mechanics.Spring(
+            Spring(
                 a=np.array([0, 1, 0]),
                 b=np.array([1, 2, 2]),
                 k=np.full(3, 1.7),
@@ -175,7 +176,7 @@ def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Ne
         q=np.array([1e6]),
         p=np.zeros(1),
         steps=3,
-        terms=(mechanics.WallSpring(i=np.array([0]), k=np.array([2.875]), at=np.zeros(1)),),
+        terms=(WallSpring(i=np.array([0]), k=np.array([2.875]), at=np.zeros(1)),),
     )
     for method, factor in (("semi-implicit-euler", 1.0), ("leapfrog", 0.0)):
         label = f"openmm:{method}@OpenCL-double"

@@ -8,12 +8,13 @@ import pytest
 
 from springcheck import exact, mechanics, scenes
 from springcheck.model import Scene
+from springcheck.terms import Spring, WallSpring
 
 
 def spring(m: float, k: float, q: float, p: float, h: float) -> Scene:
     return Scene(
         name="spring", title="", source="", m=np.array([m]), q=np.array([q]), p=np.array([p]),
-        terms=(mechanics.WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([0.0])),),
+        terms=(WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([0.0])),),
         step=h, steps=10,
     )  # fmt: skip
 
@@ -90,7 +91,7 @@ def test_particles_of_equal_frequency_that_are_joined_keep_their_modes_apart() -
         name="ring", title="", source="", m=np.full(3, 2.3), q=np.array([0.1, -0.4, 0.7]),
         p=np.array([0.2, 0.5, -0.3]),
         terms=(
-            mechanics.Spring(
+            Spring(
                 a=np.array([0, 1, 2]), b=np.array([1, 2, 0]), k=np.full(3, 1.7), rest=np.zeros(3)
             ),
         ),

@@ -13,10 +13,11 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import mechanics, scenes, session, simulate
+from springcheck import scenes, session, simulate
 from springcheck.engines.own import kernels
 from springcheck.engines.own import simulation as own
 from springcheck.model import Reals, Scene
+from springcheck.terms import Damping, Spring
 
 Need = Callable[[str], None]
 
@@ -151,7 +152,7 @@ def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(name: str, lo
 def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: Need) -> None:
     need("ase:velocity-verlet")
     counted = {"spring": 0, "damping": 0}
-    for key, term in (("spring", mechanics.Spring), ("damping", mechanics.Damping)):
+    for key, term in (("spring", Spring), ("damping", Damping)):
         original = term.add_force
 
         def counting(self: Any, q: Reals, p: Reals, out: Reals, key: str = key, f: Any = original) -> None:

@@ -17,8 +17,8 @@ from springcheck import mechanics, schemes
 from springcheck.engines import parse
 from springcheck.engines.own import ENGINE, kernels, simulation
 from springcheck.errors import MethodError
-from springcheck.mechanics import Quartic, Spring, WallSpring
 from springcheck.model import Floats, Scene, Term
+from springcheck.terms import Quartic, Spring, WallSpring
 
 METHODS = tuple(ENGINE.methods)
 LAYOUTS = {"one": kernels.ONE, "many": kernels.MANY, "joined": kernels.JOINED, "chain": kernels.CHAIN}
@@ -293,7 +293,7 @@ PROGRAM = """
 import sys
 import numpy as np
 from springcheck.engines.own import kernels, simulation
-from springcheck.mechanics import WallSpring
+from springcheck.terms import WallSpring
 from springcheck.model import Scene
 wall = WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.0]))
 scene = Scene(name="spring", title="", source="", m=np.array([3.7]), q=np.array([0.3]),

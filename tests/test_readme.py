@@ -25,10 +25,10 @@ def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> N
     home = tmp_path / "springcheck"
     shutil.copytree(Path(springcheck.__file__).parent, home, ignore=shutil.ignore_patterns("__pycache__"))
     (term,) = (block for block in blocks("python") if "class Sextic" in block)
-    mechanics = home / "mechanics.py"
-    text = mechanics.read_text().replace("\nTERMS: ", f"\n{term}\n\nTERMS: ")
+    terms = home / "terms.py"
+    text = terms.read_text().replace("\nTERMS: ", f"\n{term}\n\nTERMS: ")
     text = text.replace("Morse, Damping)\n", "Morse, Damping, Sextic)\n")
-    mechanics.write_text(text)
+    terms.write_text(text)
     for name in ("ase", "sundials"):
         declaration = home / "engines" / name / "__init__.py"
         declaration.write_text(declaration.read_text().replace('"morse"', '"morse", "sextic"'))

@@ -23,6 +23,7 @@ from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
 from springcheck.exact import linear
 from springcheck.model import Floats, Scene, Trajectory
+from springcheck.terms import Cosine, Morse, Quartic, Spring, WallSpring
 
 Need = Callable[[str], None]
 
@@ -130,17 +131,15 @@ def well(q: float, p: float, *, k: float, b: float, m: float = 3.7) -> Scene:
     return Scene(
         name="well", title="", source="", m=np.array([m]), q=np.array([q]), p=np.array([p]),
         terms=(
-            mechanics.WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([0.4])),
-            mechanics.Quartic(i=np.array([0]), b=np.array([b]), at=np.array([0.4])),
+            WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([0.4])),
+            Quartic(i=np.array([0]), b=np.array([b]), at=np.array([0.4])),
         ),
         step=0.1, steps=400,
     )  # fmt: skip
 
 
 def pendulum(q: float, p: float, *, depth: float = 2.3, m: float = 1.3) -> Scene:
-    term = mechanics.Cosine(
-        i=np.array([0]), depth=np.array([depth]), wave=np.array([0.6]), at=np.array([0.1])
-    )
+    term = Cosine(i=np.array([0]), depth=np.array([depth]), wave=np.array([0.6]), at=np.array([0.1]))
     return Scene(
         name="pendulum", title="", source="", m=np.array([m]), q=np.array([q]), p=np.array([p]),
         terms=(term,), step=0.1, steps=400,
@@ -148,7 +147,7 @@ def pendulum(q: float, p: float, *, depth: float = 2.3, m: float = 1.3) -> Scene
 
 
 def bond(q: float, p: float, *, steepness: float = 0.7) -> Scene:
-    term = mechanics.Morse(
+    term = Morse(
         a=np.array([0]), b=np.array([1]), depth=np.array([4.1]), steepness=np.array([steepness]),
         rest=np.array([1.1]),
     )  # fmt: skip
@@ -213,8 +212,8 @@ def test_a_closed_form_starts_at_the_start_and_obeys_newton(name: str) -> None:
         replace(
             well(0.1, 0.3, k=2.9, b=1.3),
             terms=(
-                mechanics.WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.0])),
-                mechanics.Quartic(i=np.array([0]), b=np.array([1.3]), at=np.array([0.5])),
+                WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.0])),
+                Quartic(i=np.array([0]), b=np.array([1.3]), at=np.array([0.5])),
             ),
         ),
     ],
@@ -308,7 +307,7 @@ def test_engines_give_a_molecule_its_wave_number(name: str, label: str, need: Ne
     need(label)
     scene = scenes.load_scene(name)
     term = scene.terms[0]
-    assert isinstance(term, mechanics.Spring)
+    assert isinstance(term, Spring)
     u = length(simulate.run(scene, label)) - term.rest[0]
     twice = float(u[1:-1] @ (u[2:] + u[:-2]) / (u[1:-1] @ u[1:-1]))
     w = 2 * np.sqrt((2 - twice) / 4) / scene.step
@@ -365,7 +364,7 @@ def test_units_convert_as_codata_says_in_both_directions(need: Need) -> None:
 def test_the_stiffness_of_carbon_monoxide_is_that_of_its_wave_number() -> None:
     scene = scenes.load_scene("carbon-monoxide")
     term = scene.terms[0]
-    assert isinstance(term, mechanics.Spring)
+    assert isinstance(term, Spring)
     mass = scene.m[0] * scene.m[1] / np.sum(scene.m)
     assert term.k[0] == pytest.approx(mass * (2 * np.pi * LIGHT * 2169.81358) ** 2, rel=1e-9)
 
@@ -373,7 +372,7 @@ def test_the_stiffness_of_carbon_monoxide_is_that_of_its_wave_number() -> None:
 def test_the_bond_of_hydrogen_chloride_has_its_spectroscopic_constants() -> None:
     term = scenes.load_scene("morse-bond").terms[0]
     m = scenes.load_scene("morse-bond").m
-    assert isinstance(term, mechanics.Morse)
+    assert isinstance(term, Morse)
     mass = m[0] * m[1] / np.sum(m)
     w = term.steepness[0] * np.sqrt(2 * term.depth[0] / mass)
     assert w / (2 * np.pi * LIGHT) == pytest.approx(2990.9463, rel=1e-7)

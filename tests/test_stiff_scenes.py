@@ -19,6 +19,7 @@ import pytest
 from springcheck import checks, engines, exact, mechanics, scenes, schemes, simulate
 from springcheck.errors import MethodError, SceneError
 from springcheck.model import Extended, Scene
+from springcheck.terms import Spring
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "stiff"
 ROWS = [
@@ -88,7 +89,7 @@ def test_graded_modes_find_a_chain_over_twelve_decades_and_its_free_translation(
     rng = np.random.default_rng(5)
     n = 7
     m = rng.uniform(0.5, 4, n)
-    spring = mechanics.Spring(
+    spring = Spring(
         a=np.arange(n - 1), b=np.arange(1, n), k=10.0 ** rng.uniform(-6, 6, n - 1), rest=np.zeros(n - 1)
     )
     scene = Scene(

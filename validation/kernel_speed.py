@@ -45,8 +45,8 @@ from time import perf_counter
 import numpy as np
 
 from springcheck.engines.own import simulation
-from springcheck.mechanics import Spring, WallSpring
 from springcheck.model import Floats, Scene, Term
+from springcheck.terms import Spring, WallSpring
 
 METHODS = ("euler", "semi-implicit-euler", "implicit-euler")
 REPEATS = 7
@@ -276,7 +276,7 @@ import sys
 from time import perf_counter
 import numpy as np
 from springcheck.engines.own import simulation
-from springcheck.mechanics import WallSpring
+from springcheck.terms import WallSpring
 from springcheck.model import Scene
 spring = WallSpring(i=np.array([0]), k=np.array([1.0]), at=np.array([0.0]))
 scene = Scene(name="spring", title="", source="", m=np.array([1.0]), q=np.array([0.0]),

@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from springcheck import mechanics, run
+from springcheck import run
 from springcheck.checks import laws
 from springcheck.figures import style
 from springcheck.model import Floats, Scene
+from springcheck.terms import WallSpring
 
 STEPS = 300_000
 FRAMES = 300
@@ -35,7 +36,7 @@ def scene(h: float) -> Scene:
     """64 of the experiment's springs, for a longer time."""
     many = laws.ensemble(h)
     spring = many.terms[0]
-    assert isinstance(spring, mechanics.WallSpring)
+    assert isinstance(spring, WallSpring)
     return replace(
         many,
         m=many.m[:SPRINGS],

@@ -11,6 +11,7 @@ import numpy as np
 from springcheck import exact, mechanics, schemes
 from springcheck.checks import verdicts
 from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
+from springcheck.terms import particles
 
 SMALLEST = np.longdouble(5e-324)
 """What an operation can lose to underflow: one unit of a subnormal double."""
@@ -177,7 +178,7 @@ def _pulls(scene: Scene) -> Integers:
     """How many terms pull at each particle (n,)."""
     count = np.zeros(scene.n, dtype=np.int64)
     for term in scene.terms:
-        for end in mechanics.particles(term):
+        for end in particles(term):
             np.add.at(count, end, 1)
     return count
 

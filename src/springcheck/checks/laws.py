@@ -18,6 +18,7 @@ from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
 from springcheck.checks.experiments import symmetric
 from springcheck.model import Extended, Floats, Scene, Trajectory, Verdict
+from springcheck.terms import Quartic, WallSpring
 
 HALVINGS = 6
 T_THREE = 12.92
@@ -39,9 +40,7 @@ T_SEVEN = 5.41
 DECADES = tuple(10.0**-d for d in range(4, 13))
 
 
-def _scene(
-    terms: tuple[mechanics.WallSpring | mechanics.Quartic, ...], q: Floats, p: Floats, m: Floats
-) -> Scene:
+def _scene(terms: tuple[WallSpring | Quartic, ...], q: Floats, p: Floats, m: Floats) -> Scene:
     return Scene(
         name="experiment",
         title="",
@@ -61,12 +60,8 @@ def _one(x: float) -> Floats:
 
 
 # values far from 1, so that no mass, stiffness or coefficient can hide
-SPRING = _scene(
-    (mechanics.WallSpring(i=np.array([0]), k=_one(2.9), at=_one(0.0)),), _one(0.3), _one(0.7), _one(3.7)
-)
-WELL = _scene(
-    (mechanics.Quartic(i=np.array([0]), b=_one(2.3), at=_one(0.0)),), _one(0.9), _one(0.4), _one(1.3)
-)
+SPRING = _scene((WallSpring(i=np.array([0]), k=_one(2.9), at=_one(0.0)),), _one(0.3), _one(0.7), _one(3.7))
+WELL = _scene((Quartic(i=np.array([0]), b=_one(2.3), at=_one(0.0)),), _one(0.9), _one(0.4), _one(1.3))
 DURATION = 2.5 / np.sqrt(2.9 / 3.7)
 
 
@@ -161,7 +156,7 @@ def ensemble(h: float) -> Scene:
     rng = np.random.default_rng(20260101)
     m, k = np.full(MEMBERS, 3.7), np.full(MEMBERS, 2.9)
     amplitude, phase = rng.uniform(1, 2, MEMBERS), rng.uniform(0, 2 * np.pi, MEMBERS)
-    spring = mechanics.WallSpring(i=np.arange(MEMBERS), k=k, at=np.zeros(MEMBERS))
+    spring = WallSpring(i=np.arange(MEMBERS), k=k, at=np.zeros(MEMBERS))
     start = amplitude * np.cos(phase), amplitude * np.sin(phase) * np.sqrt(m * k)
     return replace(_scene((spring,), start[0], start[1], m), step=h, steps=LONG, every=LONG // 64)
 

@@ -9,6 +9,7 @@ import numpy as np
 from springcheck import exact, mechanics, schemes
 from springcheck.checks.case import REPEATED, Case
 from springcheck.model import Arithmetic, Extended, Floats, Verdict
+from springcheck.terms import particles
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has
@@ -350,7 +351,7 @@ def _worst_local_error(case: Case) -> float:
     # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `mechanics.Norm`
     stiff = np.zeros(scene.n)
     for term in scene.terms:
-        for end in mechanics.particles(term):
+        for end in particles(term):
             np.add.at(stiff, end, term.rigidity * term.bodies)
     for group in case.norm.groups:
         stiff[group] += scene.m[group] / case.norm.duration**2

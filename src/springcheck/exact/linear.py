@@ -16,6 +16,7 @@ import numpy as np
 from springcheck import mechanics
 from springcheck.exact.elliptic import EPS
 from springcheck.model import Extended, Integers, Reals, Scene
+from springcheck.terms import Spring, WallSpring
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,7 +115,7 @@ PI = 4 * np.arctan(np.longdouble(1))
 
 def _wave_frequencies(scene: Scene) -> Extended:
     """Squared frequencies of a uniform chain between walls, slowest first (Lagrange 1788)."""
-    k = next(term.k[0] for term in scene.terms if isinstance(term, mechanics.Spring))
+    k = next(term.k[0] for term in scene.terms if isinstance(term, Spring))
     half = np.sin(PI * np.arange(1, scene.n + 1) / (2 * (scene.n + 1)))
     return np.asarray(4 * k / scene.m[0].astype(np.longdouble) * half * half)
 
@@ -140,12 +141,12 @@ def _spring_rows(scene: Scene, root_m: Extended) -> Extended | None:
     """G (s, n) with M^-1/2 K M^-1/2 = G^T G: one row for each spring.  None where a stiffness is negative."""
     rows: list[Extended] = []
     for term in scene.terms:
-        if isinstance(term, mechanics.WallSpring | mechanics.Spring):
+        if isinstance(term, WallSpring | Spring):
             if np.any(term.k < 0):
                 return None
             block = np.zeros((len(term.k), scene.n), dtype=np.longdouble)
             each = np.arange(len(term.k))
-            if isinstance(term, mechanics.Spring):
+            if isinstance(term, Spring):
                 block[each, term.a], block[each, term.b] = -1, 1
             else:
                 block[each, term.i] = 1

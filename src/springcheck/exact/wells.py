@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck import mechanics
 from springcheck.exact.elliptic import argument, jacobi
 from springcheck.model import Extended, Scene
+from springcheck.terms import Cosine, Morse, Quartic, WallSpring, particles
 
 States = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
@@ -52,13 +52,13 @@ def _duffing(scene: Scene) -> tuple[_Duffing, Extended] | None:
     """The wells and their centres, or None where one has several centres, or no turning point."""
     k, b, at = np.zeros((3, scene.n), dtype=np.longdouble)
     for term in scene.terms:
-        if isinstance(term, mechanics.Quartic):
+        if isinstance(term, Quartic):
             np.add.at(b, term.i, term.b)
             at[term.i] = term.at
-        elif isinstance(term, mechanics.WallSpring):
+        elif isinstance(term, WallSpring):
             np.add.at(k, term.i, term.k)
     for term in scene.terms:
-        if isinstance(term, mechanics.Quartic | mechanics.WallSpring) and np.any(term.at != at[term.i]):
+        if isinstance(term, Quartic | WallSpring) and np.any(term.at != at[term.i]):
             return None
     m = scene.m.astype(np.longdouble)
     k, b, u, v = k / m, b / m, scene.q - at, scene.p / m
@@ -135,15 +135,13 @@ def _one_each(scene: Scene) -> bool:
     """Whether one term alone acts on each particle."""
     count = np.zeros(scene.n, dtype=int)
     for term in scene.terms:
-        for end in mechanics.particles(term):
+        for end in particles(term):
             np.add.at(count, end, 1)
     return bool(np.all(count == 1))
 
 
 def _swings(scene: Scene) -> bool:
-    return _one_each(scene) and all(
-        np.all(t.depth != 0) for t in scene.terms if isinstance(t, mechanics.Cosine)
-    )
+    return _one_each(scene) and all(np.all(t.depth != 0) for t in scene.terms if isinstance(t, Cosine))
 
 
 def _pendulum(scene: Scene, t: Extended) -> States:
@@ -153,7 +151,7 @@ def _pendulum(scene: Scene, t: Extended) -> States:
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     for term in scene.terms:
-        assert isinstance(term, mechanics.Cosine)
+        assert isinstance(term, Cosine)
         i, length = term.i, 1 / term.wave.astype(np.longdouble)
         mass = scene.m[i].astype(np.longdouble)
         # upside down, the pendulum hangs from the other side
@@ -190,7 +188,7 @@ def _is_bond(scene: Scene) -> bool:
     """One bond each that pulls together, and not at the very edge of dissociation."""
     if not _one_each(scene):
         return False
-    terms = [t for t in scene.terms if isinstance(t, mechanics.Morse)]
+    terms = [t for t in scene.terms if isinstance(t, Morse)]
     return all(np.all((t.depth > 0) & (t.steepness != 0) & (_bond(scene, t).excess != 0)) for t in terms)
 
 
@@ -206,7 +204,7 @@ class _Bond:
     excess: Extended
 
 
-def _bond(scene: Scene, term: mechanics.Morse) -> _Bond:
+def _bond(scene: Scene, term: Morse) -> _Bond:
     ma, mb = (scene.m[end].astype(np.longdouble) for end in (term.a, term.b))
     total = ma + mb
     u: Extended = np.asarray(scene.q[term.b].astype(np.longdouble) - scene.q[term.a] - term.rest)
@@ -223,7 +221,7 @@ def _morse(scene: Scene, t: Extended) -> States:
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     for term in scene.terms:
-        assert isinstance(term, mechanics.Morse)
+        assert isinstance(term, Morse)
         bond = _bond(scene, term)
         w = np.abs(term.steepness) * np.sqrt(2 * term.depth / bond.mass)
         z0 = np.expm1(term.steepness * bond.u)

@@ -8,6 +8,7 @@ import numpy as np
 
 from springcheck import mechanics
 from springcheck.model import Floats, Scene, Term
+from springcheck.terms import Spring, WallSpring
 
 
 def scene(
@@ -28,11 +29,9 @@ def scene(
     )
 
 
-def walls(k: Floats, at: Floats) -> mechanics.WallSpring:
+def walls(k: Floats, at: Floats) -> WallSpring:
     """One wall spring for each particle."""
-    return mechanics.WallSpring(
-        i=np.arange(len(k)), k=np.asarray(k, np.float64), at=np.asarray(at, np.float64)
-    )
+    return WallSpring(i=np.arange(len(k)), k=np.asarray(k, np.float64), at=np.asarray(at, np.float64))
 
 
 def random_scene(rng: np.random.Generator, *, steps: int = 200, decades: float = 6.0) -> Scene:
@@ -88,11 +87,11 @@ def _chain(rng: np.random.Generator, steps: int, *, free: bool) -> Scene:
     size = 10 ** rng.uniform(-3, 3)
     m, k = _spread(rng, 1, n), _spread(rng, 1, n - 1)
     rest = np.where(rng.random(n - 1) < 0.5, 0.0, size * rng.uniform(0.5, 2, n - 1))
-    terms: tuple[Term, ...] = (mechanics.Spring(a=np.arange(n - 1), b=np.arange(1, n), k=k, rest=rest),)
+    terms: tuple[Term, ...] = (Spring(a=np.arange(n - 1), b=np.arange(1, n), k=k, rest=rest),)
     if not free:
         ends = np.array([0, n - 1])
         at = np.array([0.0, np.sum(rest)])
-        terms = (mechanics.WallSpring(i=ends, k=_spread(rng, 1, 2), at=at), *terms)
+        terms = (WallSpring(i=ends, k=_spread(rng, 1, 2), at=at), *terms)
     q = np.concatenate([[0.0], np.cumsum(rest)]) + 0.1 * size * rng.normal(size=n)
     made = scene(m, terms, q, np.zeros(n), step=1.0, steps=steps)
     stiff = mechanics.stiffness(made, q).astype(np.float64)

@@ -14,6 +14,7 @@ import numpy as np
 from springcheck import exact, mechanics, schemes
 from springcheck.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.model import Arithmetic, Floats, Reals, Scene, Trajectory
+from springcheck.terms import Quartic, Spring, WallSpring
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
 Where: TypeAlias = Literal["spring", "chain", "long spring"]
@@ -114,7 +115,7 @@ def stiffer(scene: Scene, factor: float) -> Scene:
     """Every stiffness or coefficient times a factor."""
 
     def term(t: Any) -> Any:
-        return replace(t, b=t.b * factor) if isinstance(t, mechanics.Quartic) else replace(t, k=t.k * factor)
+        return replace(t, b=t.b * factor) if isinstance(t, Quartic) else replace(t, k=t.k * factor)
 
     return _springs(scene, term)
 
@@ -313,10 +314,10 @@ def unpaired(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     def force(q: Reals, p: Reals) -> Reals:
         out = right(q, p)
         for term in scene.terms:
-            if isinstance(term, mechanics.Spring):
+            if isinstance(term, Spring):
                 tension = term.k * (q[..., term.b] - q[..., term.a] - term.rest)
                 np.subtract.at(out, term.b, size * tension)
-            elif isinstance(term, mechanics.WallSpring):
+            elif isinstance(term, WallSpring):
                 np.subtract.at(out, term.i, size * term.k * (q[..., term.i] - term.at))
         return out
 

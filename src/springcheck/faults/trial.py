@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, mechanics, schemes
+from springcheck import checks, schemes
 from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
 from springcheck.faults import clean, steppers
 from springcheck.faults.seeded import Fault, Where
 from springcheck.faults.table import FAULTS
 from springcheck.model import Scene, Trajectory
+from springcheck.terms import Spring
 
 
 @cache
@@ -27,7 +28,7 @@ def scene(where: Where) -> Scene:
         made = clean.scene(
             np.array([1.3, 0.7, 2.1]),
             (
-                mechanics.Spring(
+                Spring(
                     a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])
                 ),
             ),

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import mechanics
 from springcheck.model import Floats, Kind, Scene, Term, Units
 from springcheck.scenes import tables
+from springcheck.terms import Damping, Spring, WallSpring
 
 
 class MistakeError(ValueError):
@@ -129,10 +129,10 @@ def _links(chain: tables.ChainTable) -> Iterator[Term]:
     ends = np.unique([0, chain.masses - 1])
     # a chain of one mass hangs on both walls
     k = np.full(len(ends), chain.stiffness * (2 if chain.masses == 1 else 1))
-    yield mechanics.WallSpring(i=ends, k=k, at=np.zeros(len(ends)))
+    yield WallSpring(i=ends, k=k, at=np.zeros(len(ends)))
     if chain.masses > 1:
         a = np.arange(chain.masses - 1)
-        yield mechanics.Spring(a=a, b=a + 1, k=np.full(len(a), chain.stiffness), rest=np.zeros(len(a)))
+        yield Spring(a=a, b=a + 1, k=np.full(len(a), chain.stiffness), rest=np.zeros(len(a)))
 
 
 def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator[Term]:
@@ -158,12 +158,10 @@ def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator
     for fast in (False, True):
         if walls[fast]:
             i, k, at = zip(*walls[fast], strict=True)
-            yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.array(at), fast=fast)
+            yield WallSpring(i=np.array(i), k=np.array(k), at=np.array(at), fast=fast)
         if pairs[fast]:
             a, b, k, rest = zip(*pairs[fast], strict=True)
-            yield mechanics.Spring(
-                a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest), fast=fast
-            )
+            yield Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest), fast=fast)
 
 
 def _two_ends(one: int, other: int, field: str) -> None:
@@ -186,10 +184,10 @@ def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
             shared.append((loops[0], loops[1], 1 / capacitor.capacitance))
     if single:
         i, k = zip(*single, strict=True)
-        yield mechanics.WallSpring(i=np.array(i), k=np.array(k), at=np.zeros(len(i)))
+        yield WallSpring(i=np.array(i), k=np.array(k), at=np.zeros(len(i)))
     if shared:
         a, b, k = zip(*shared, strict=True)
-        yield mechanics.Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.zeros(len(a)))
+        yield Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.zeros(len(a)))
 
 
 def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
@@ -216,4 +214,4 @@ def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:
     rows += [(row.loop, row.resistance, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
     if rows:
         i = np.array([_number(particle, bodies, field) for particle, _, field in rows])
-        yield mechanics.Damping(i=i, c=np.array([c for _, c, _ in rows]), m=bodies.m[i])
+        yield Damping(i=i, c=np.array([c for _, c, _ in rows]), m=bodies.m[i])

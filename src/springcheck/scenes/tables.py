@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
-from springcheck import mechanics
+from springcheck import terms
 from springcheck.model import Kind, Units
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -148,7 +148,7 @@ def _of_term(term: Any) -> type[Table]:
 
 
 TERMS: dict[str, tuple[Any, type[Table]]] = {
-    term.key: (term, _of_term(term)) for term in mechanics.TERMS if term.columns
+    term.key: (term, _of_term(term)) for term in terms.TERMS if term.columns
 }
 """Terms that are read by their columns alone, with their tables."""
 

@@ -14,6 +14,7 @@ from springcheck import exact, mechanics, schemes
 from springcheck.checks.recorded import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.model import Extended, Floats, Integers, Reals, Scene
+from springcheck.terms import Spring, WallSpring
 
 CARRIES = 1e-3
 """Modes whose amplitude is at least this part of the largest have a phase worth naming: in a mode that
@@ -81,7 +82,7 @@ def truth(scene: Scene) -> Truth:
     if not norm.unit > 0:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
     known = exact.modes(scene) if mechanics.has_modes(scene) else None
-    springs = (mechanics.WallSpring, mechanics.Spring)
+    springs = (WallSpring, Spring)
     turning = exact.modes(
         replace(scene, terms=tuple(term for term in scene.terms if isinstance(term, springs)))
     )

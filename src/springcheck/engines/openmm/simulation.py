@@ -31,6 +31,7 @@ from springcheck.engines import quiet
 from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
 from springcheck.schemes import SCHEMES
+from springcheck.terms import Damping, Morse, Spring, WallSpring
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
@@ -130,7 +131,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
 
 def _pull(scene: Scene) -> Force:
     """The force that OpenMM computes: all but friction."""
-    return mechanics.force(term for term in scene.terms if not isinstance(term, mechanics.Damping))
+    return mechanics.force(term for term in scene.terms if not isinstance(term, Damping))
 
 
 def _origins(scene: Scene, method: Method) -> Floats:
@@ -142,14 +143,14 @@ def _origins(scene: Scene, method: Method) -> Floats:
     from its own rest position, so that every bond has rest length 0 and the two laws are one.
     """
     origins = np.zeros(scene.n)
-    pairs = [term for term in scene.terms if isinstance(term, mechanics.Spring)]
-    springs = [t for t in scene.terms if isinstance(t, mechanics.WallSpring | mechanics.Spring)]
+    pairs = [term for term in scene.terms if isinstance(term, Spring)]
+    springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
     hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
     bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
-    def safe(term: mechanics.Spring) -> bool:
+    def safe(term: Spring) -> bool:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
         return bool(np.all((term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy))))
 
@@ -168,9 +169,9 @@ def _largest_w2(scene: Scene) -> float:
     """An upper bound of the squared frequencies of a linear scene, by Gershgorin's circles [1/T2]."""
     row = np.zeros(scene.n)
     for term in scene.terms:
-        if isinstance(term, mechanics.WallSpring):
+        if isinstance(term, WallSpring):
             np.add.at(row, term.i, np.abs(term.k))
-        elif isinstance(term, mechanics.Spring):
+        elif isinstance(term, Spring):
             np.add.at(row, term.a, 2 * np.abs(term.k))
             np.add.at(row, term.b, 2 * np.abs(term.k))
     return float(np.max(row / scene.m))
@@ -186,7 +187,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     fast.setForceGroup(1)
     for term in scene.terms:
         bonds = fast if getattr(term, "fast", False) else slow
-        if isinstance(term, mechanics.WallSpring):
+        if isinstance(term, WallSpring):
             anchors: dict[float, int] = {}
             for i, k, at in zip(
                 term.i.tolist(), term.k.tolist(), (term.at - origins[term.i]).tolist(), strict=True
@@ -195,7 +196,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                     anchors[at] = system.addParticle(0.0)
                     x.append(at)
                 bonds.addBond(anchors[at], i, 0.0, k)
-        elif isinstance(term, mechanics.Spring):
+        elif isinstance(term, Spring):
             lengths = np.abs(term.rest - (origins[term.b] - origins[term.a]))
             for a, b, k, length in zip(
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
@@ -207,7 +208,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for term in scene.terms:
         if term.key in EXTERNAL:
             system.addForce(_external(term, origins))
-        elif isinstance(term, mechanics.Morse):
+        elif isinstance(term, Morse):
             _stays_right_way_round(scene, term)
             system.addForce(_morse(term, origins))
     positions = np.zeros((len(x), 3))
@@ -227,7 +228,7 @@ def _external(term: Any, origins: Floats) -> mm.CustomExternalForce:
     return force
 
 
-def _morse(term: mechanics.Morse, origins: Floats) -> mm.CustomBondForce:
+def _morse(term: Morse, origins: Floats) -> mm.CustomBondForce:
     force = mm.CustomBondForce("depth*(1-exp(-steepness*(r-rest)))^2")
     for name in ("depth", "steepness", "rest"):
         force.addPerBondParameter(name)
@@ -240,7 +241,7 @@ def _morse(term: mechanics.Morse, origins: Floats) -> mm.CustomBondForce:
     return force
 
 
-def _stays_right_way_round(scene: Scene, term: mechanics.Morse) -> None:
+def _stays_right_way_round(scene: Scene, term: Morse) -> None:
     """MethodError where a Morse bond could reach length 0: OpenMM's knows its length, not its sign."""
     energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
     barrier = term.depth * np.expm1(term.steepness * term.rest) ** 2

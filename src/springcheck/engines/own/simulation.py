@@ -21,6 +21,7 @@ from springcheck import mechanics
 from springcheck.engines.own import kernels
 from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Floats, Label, Method, Scene
+from springcheck.terms import Damping, WallSpring
 
 WORTH = 1_000_000
 """Spring-steps from which compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
@@ -130,7 +131,7 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
     # friction is part of what implicit Euler solves for: 1 + h c/m stands where 1 does without it
     slowed = 1 + h * mechanics.rates(scene).astype(np.float64)
     if implicit:
-        scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, mechanics.Damping)))
+        scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, Damping)))
     walls = _single_walls(scene)
     if walls is not None:
         k, at = walls
@@ -184,7 +185,7 @@ def _single_walls(scene: Scene) -> tuple[Floats, Floats] | None:
     """Stiffness and rest point of every particle (n,), where each has at most one wall spring and no more."""
     k, at, count = np.zeros(scene.n), np.zeros(scene.n), np.zeros(scene.n, dtype=np.int64)
     for term in scene.terms:
-        if not isinstance(term, mechanics.WallSpring):
+        if not isinstance(term, WallSpring):
             return None
         np.add.at(count, term.i, 1)
         k[term.i], at[term.i] = term.k, term.at

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 
 from springcheck import mechanics
 from springcheck.model import Floats, Reals, Scene
+from springcheck.terms import particles
 
 LARGE = 32
 """Particles above which the sparse solver is taken; below, the dense one is faster."""
@@ -20,7 +21,7 @@ def options(scene: Scene) -> dict[str, Any]:
     n = scene.n
     rows, columns = [np.arange(n), n + np.arange(n)], [n + np.arange(n)] * 2
     for term in scene.terms:
-        ends = mechanics.particles(term)
+        ends = particles(term)
         for i in ends:
             for j in ends:
                 rows.append(n + i)

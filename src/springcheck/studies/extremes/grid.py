@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import mechanics
 from springcheck.model import Label, Scene, Term
 from springcheck.studies.stability.propagators import MASS, STEP
+from springcheck.terms import Damping, WallSpring
 
 STEPS = 20
 """Of the cells that are judged step by step."""
@@ -170,15 +170,13 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[str]) -> Scene:
     index = np.arange(n)
     m = np.array([x.m for x in cells])
     fast = "springs marked fast" in requires
-    terms: list[Term] = [
-        mechanics.WallSpring(i=index, k=np.array([x.k for x in cells]), at=np.zeros(n), fast=fast)
-    ]
+    terms: list[Term] = [WallSpring(i=index, k=np.array([x.k for x in cells]), at=np.zeros(n), fast=fast)]
     if "damping" in requires:
         # the method is there for friction: h c/m = 1/80
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):
             c = np.minimum(rate * m, 1e300)
-        terms.append(mechanics.Damping(i=index, c=np.where(first.block == "force", c, 0.0), m=m))
+        terms.append(Damping(i=index, c=np.where(first.block == "force", c, 0.0), m=m))
     every = max(1, first.steps // 10) if first.block == "length" else 1
     return Scene(
         name="extreme",

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import engines, mechanics, schemes, simulate
+from springcheck import engines, schemes, simulate
 from springcheck.errors import MethodError
 from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Term
+from springcheck.terms import Damping, WallSpring
 
 FORCE = 1024.0
 """Largest force on a scanned spring, in the scene's unit of force."""
@@ -71,10 +72,10 @@ def scene(
     k = np.tile(springs.k, copies)
     requires = engines.method(springs.label).requires
     fast = "springs marked fast" in requires
-    terms: list[Term] = [mechanics.WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
+    terms: list[Term] = [WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
     if np.any(springs.brake) or "damping" in requires:
         c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
-        terms.append(mechanics.Damping(i=np.arange(n), c=c, m=np.full(n, MASS)))
+        terms.append(Damping(i=np.arange(n), c=c, m=np.full(n, MASS)))
     return Scene(
         name="scan",
         title="springs side by side",

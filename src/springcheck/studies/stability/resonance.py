@@ -16,6 +16,7 @@ import numpy as np
 from springcheck import engines, exact, mechanics, schemes, simulate
 from springcheck.errors import SceneError
 from springcheck.model import Extended, Floats, Label, Reals, Scene, Term
+from springcheck.terms import Spring, WallSpring
 
 TURN = (1.0, 7.0)
 """h w of the fast spring, from and to."""
@@ -99,10 +100,10 @@ def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
 def _copied(term: Term, n: int, scale: Floats) -> Term:
     """A term's springs once for each copy, the j-th with its stiffness times scale[j], at rest in 0."""
     shift = n * np.arange(len(scale))[:, None]
-    if isinstance(term, mechanics.WallSpring):
+    if isinstance(term, WallSpring):
         i = (term.i + shift).ravel()
         return replace(term, i=i, k=np.outer(scale, term.k).ravel(), at=np.zeros(len(i)))
-    if isinstance(term, mechanics.Spring):
+    if isinstance(term, Spring):
         a, b = (term.a + shift).ravel(), (term.b + shift).ravel()
         return replace(term, a=a, b=b, k=np.outer(scale, term.k).ravel(), rest=np.zeros(len(a)))
     raise SceneError(f"a scan of resonances knows springs only, not {term.key!r}")
