@@ -91,6 +91,17 @@ def test_a_forced_run_that_was_killed_leaves_the_old_store_and_is_taken_up_witho
     assert list(store.read(path)) == ["ase:velocity-verlet"]
 
 
+def test_a_store_whose_writer_was_killed_as_it_tidied_up_is_complete(tmp_path: Path) -> None:
+    path, s = tmp_path / "s.h5", scene()
+    written(path, s)
+    (tmp_path / "s.h5.parts").mkdir()
+    (tmp_path / "s.h5.parts" / "lock").touch()
+    assert store.summary(path).complete
+    with pytest.raises(StoreError, match="exists"):
+        store.open_new(path, "run")
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["s.h5"]
+
+
 def test_a_journal_without_work_leaves_nothing(tmp_path: Path) -> None:
     with store.open_new(tmp_path / "s.h5", "run") as journal:
         journal.finished()

@@ -117,13 +117,17 @@ def test_points_are_read_back_as_they_were() -> None:
         assert to_points(of_points(scene, method.method, points, 1.5)) == (list(points), 1.5)
 
 
-def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(tmp_path: Path) -> None:
+def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = list(map(engines.parse, OWN))
     first = precision.record(scene, labels, path, budget=2.0, progress=raising(12))
     assert first.interrupted
     assert not store.summary(path).complete
     assert json.loads(store.document(path, precision.DOCUMENT)) == first.document()
+    assert cli.main(["check", str(path)]) == 0
+    assert "unfinished" in capsys.readouterr().out
     done = [point for point in first.points if point.complete]
     with pytest.raises(StoreError, match=r"another command, or of other versions"):
         precision.record(scene, labels[:2], path, budget=2.0)

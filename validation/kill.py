@@ -6,8 +6,11 @@ A writer stores trajectories and tables, with a checkpoint now and then and a co
 reports each as soon as it is stored.  It is killed (SIGKILL) at a random moment of a part, a checkpoint or
 the final commit, 400 times over, long parts adopted in every other round; then before every third of
 the 900 system calls on files that a round makes (all of them with 1200 kills).  After each kill
-everything reported must be there with its digest, and every file must pass `check`.  Then: a full disk at
-forty sizes, a read-only folder, a reader that holds the file open through a commit, and two writers.
+everything reported must be there with its digest, and every file must pass `check`.  Then the commands
+themselves, `run`, `precision`, `stability` and `extremes`, killed at random moments a quarter as often and
+started again until they end: every trajectory, table and point that one of them had finished must be in
+the store at the end, bit for bit, so none is lost and none measured twice.  Then: a full disk at forty
+sizes, a read-only folder, a reader that holds the file open through a commit, and two writers.
 
 Kills show that no order of operations loses anything; that fsync reaches the disk is the system's word.
 
@@ -32,10 +35,11 @@ from pathlib import Path
 
 import numpy as np
 
-from springcheck import store
+from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.model import Scene
 from springcheck.store import adopt, reading
+from springcheck.studies import outcome, precision
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "checkpoint", "collection")
@@ -217,6 +221,85 @@ def random_kills(folder: Path, kills: int) -> int:
     return losses
 
 
+def commands(folder: Path, kills: int) -> int:
+    """The commands that users give, killed at random moments and started again to their end -> losses."""
+    rng = random.Random(21)
+    losses = 0
+    own = ["--method", "own:*", "--quiet"]
+    for name, longest, arguments in (
+        ("run", 0.25, ["run", "spring", *own]),
+        ("precision", 0.8, ["precision", "spring-uneven", "--budget", "2", *own]),
+        ("stability", 0.8, ["stability", "overdamped", *own]),
+        ("extremes", 0.4, ["extremes", "--quick", *own]),
+    ):
+        path = folder / f"{name}.h5"
+        work = partial(command, [*arguments, "-o", str(path)])
+        killed, rounds, kept = 0, 0, 0
+        known: dict[str, object] = {}
+        # once through here, so that what is forked has imported and compiled everything
+        losses += cli.main([*arguments, "-o", str(path)])
+        path.unlink()
+        while killed < kills // 4 or known:
+            pid, pipe = child(work)
+            time.sleep(rng.uniform(0, longest))
+            os.kill(pid, signal.SIGKILL)
+            ended = reports(pipe)
+            os.waitpid(pid, 0)
+            os.close(pipe)
+            killed += not ended
+            now = finished(path)
+            # killed between the last file operation and the report
+            ended = ended or (["ended 0"] if path.is_file() and store.summary(path).complete else [])
+            gone = [one for one, value in known.items() if not goes_on(value, now.get(one))]
+            kept, known = kept + len(now.keys() - known.keys()), now
+            if ended:
+                gone += [f"{finding.place}: {finding.what}" for finding in store.check(path)]
+                gone += [] if ended == ["ended 0"] else ended
+                path.unlink()
+                known, rounds = {}, rounds + 1
+            if gone:
+                losses += len(gone)
+                print("  lost:", gone)
+        print(f"springcheck {name}: {killed} kills, {rounds} times to the end, {kept} kept, lost {losses}")
+    return losses
+
+
+def command(arguments: list[str], say: Callable[[str], None]) -> None:
+    """One command line, and its exit status."""
+    say(f"ended {cli.main(arguments)}")
+
+
+def finished(path: Path) -> dict[str, object]:
+    """What a store and its journal hold: digests of trajectories, points of precision, columns of tables."""
+    if not path.is_file() and not reading.parts_folder(path).is_dir():
+        return {}
+    try:
+        found: dict[str, object] = {label: digest(file, label) for label, file in store.sources(path).items()}
+        tables = store.read_tables(path)
+    except StoreError as error:
+        if "no such file" in str(error):
+            return {}
+        raise
+    for name, one in tables.items():
+        if name.startswith("precision/") and ":" in name:
+            points, _ = outcome.to_points(one)
+            found[name] = [point for point in points if point.outcome != precision.CUT_OFF]
+        elif name != "precision/methods":
+            found[name] = {
+                # as text: NaN equals NaN, and every digit counts
+                column: repr(np.asarray(values).tolist())
+                for column, values in one.columns.items()
+            }
+    return found
+
+
+def goes_on(before: object, after: object) -> bool:
+    """Whether nothing of what was there is gone or another; a method's points may have become more."""
+    if isinstance(before, list) and isinstance(after, list):
+        return after[: len(before)] == before
+    return after == before
+
+
 def dies_before(call: int) -> Callable[..., None]:
     """A profiler that ends the process before its call-th system call on a file."""
     made = 0
@@ -351,6 +434,7 @@ def main() -> int:
         folder.chmod(0o755)
         total = random_kills(folder, kills) + every_call(folder, max(1, 1200 // kills))
         adopt.LARGE = 1 << 28
+        total += commands(folder, kills)
         total += full_disk(folder) + read_only(folder) + reader_and_writers(folder)
     return int(total > 0)
 

@@ -450,7 +450,9 @@ def _check(options: argparse.Namespace) -> int:
     for finding in findings:
         print(f"{options.file}: {finding.place}: {finding.what}")
     if not findings:
-        print(f"{options.file}: whole; every digest matches")
+        ended = store.summary(Path(options.file)).complete
+        rest = "" if ended else "; unfinished: the command that writes it goes on when it is given again"
+        print(f"{options.file}: whole; every digest matches{rest}")
     return 1 if findings else 0
 
 

@@ -332,12 +332,20 @@ def summary(path: str | Path) -> Summary:
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in everything),
-        complete=path.is_file() and not parts_folder(path).is_dir(),
+        complete=path.is_file() and bool(root.get("complete", False)) and not _is_claimed(path),
         root=root,
         runs=tuple(runs),
         tables=tuple(_tables(path)),
         documents=documents,
     )
+
+
+def _is_claimed(path: Path) -> bool:
+    """Whether a journal stands beside a store; what a kill at its very end has left of one is none."""
+    try:
+        return claim(parts_folder(path)) is not None
+    except StoreError:
+        return True
 
 
 def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
