@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import engines, scenes, store
+from springcheck import engines, exact, inspection, scenes, session, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
+from springcheck.figures import trajectories
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.stability import limits
 
@@ -179,3 +180,55 @@ def test_a_study_with_nothing_to_draw_says_so(
     extremes.record(path, ["sundials:bdf"], quick=True)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 2
     assert "can be drawn" in capsys.readouterr().err
+
+
+def long_scene(steps: int, step: float) -> str:
+    return f"""
+title = "A long run"
+[[particle]]
+mass = 3.7
+position = 0.3
+momentum = 0.7
+[[spring]]
+ends = ["wall", 0]
+stiffness = 2.9
+[time]
+step = {step}
+steps = {steps}
+"""
+
+
+@pytest.mark.parametrize(("step", "end"), [(0.2, True), (0.002, False)])
+def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, step: float, end: bool) -> None:
+    scene = scenes.parse(long_scene(20_000, step), name="long")
+    path = tmp_path / "long.h5"
+    session.run(scene, path, methods=["own:semi-implicit-euler"])
+    found = inspection.drawable(path, store.summary(path))
+    whole = store.read_one(path, "own:semi-implicit-euler")
+    run, followed = (x["own:semi-implicit-euler"] for x in (found.runs, found.followed))
+    np.testing.assert_array_equal(run.q, whole.q[::5])
+    np.testing.assert_array_equal(followed.q, whole.q[-500:] if end else whole.q[::5])
+    np.testing.assert_array_equal(followed.t, whole.t[-500:] if end else whole.t[::5])
+    assert any("the last 500 frames" in note for note in found.notes) == end
+    truth = trajectories.true_motion(scene, [followed])
+    assert truth is not None
+    t, q, _ = truth
+    assert (t[0], t[-1]) == pytest.approx((followed.t[0], followed.t[-1]))
+    assert 1400 < len(t) <= 1501
+    np.testing.assert_allclose(q, exact.true_motion(scene, t / step, step)[0], atol=1e-12)
+    assert trajectories.draw(scene, found.runs, tmp_path, followed=found.followed)
+
+
+def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("two-scales"), tmp_path / "two-scales.h5"
+    session.run(scene, path, methods=["own:euler", "own:implicit-euler"])
+    found = inspection.drawable(path, store.summary(path))
+    assert np.max(np.abs(found.runs["own:euler"].q)) > 1e200
+    for name, picture in trajectories.pictures(scene, found.runs, found.followed).items():
+        for axes in picture.axes:
+            assert max(np.abs(axes.get_ylim())) <= 1000, name
+            lines = [line for line in axes.lines if line.get_label() == "own:implicit-euler"]
+            assert lines, name
+            low, high = axes.get_ylim()
+            y = np.concatenate([np.asarray(line.get_ydata(), float) for line in lines])
+            assert np.mean((low <= y) & (y <= high)) > 0.9, name

@@ -431,8 +431,9 @@ def _plot(options: argparse.Namespace) -> int:
         written += extremes.draw(studies.extremes, folder)
     notes: list[str] = []
     if summary.runs or not studies.any:
-        scene, runs, notes = inspection.drawable(path, summary)
-        written += trajectories.draw(scene, runs, folder)
+        found = inspection.drawable(path, summary)
+        written += trajectories.draw(found.scene, found.runs, folder, followed=found.followed)
+        notes = found.notes
     if not written:
         raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
     if not options.quiet:

@@ -20,8 +20,15 @@ from springcheck.studies.stability import Stability
 
 T = TypeVar("T")
 
-MOST_FRAMES = 20_000
+MOST_FRAMES = 4001
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
+
+END_FRAMES = 500
+"""Frames at the end of a run whose motion is too fast for that."""
+
+RESOLVED = 0.25
+"""Largest way between two drawn frames, as a part of the whole, that still shows the motion: half a radian
+of an oscillation.  Beyond, lines between them are chords, and a slow wave is seen that is not there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,18 +74,41 @@ def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
     )
 
 
-def drawable(path: Path, summary: store.Summary) -> tuple[Scene, dict[str, Trajectory], list[str]]:
-    """Scene and trajectories of a store to draw, and what was left out of them."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawable:
+    """Trajectories to draw: over their whole length, and the part whose motion can be followed."""
+
+    scene: Scene
+    runs: dict[str, Trajectory]
+    followed: dict[str, Trajectory]
+    notes: list[str]
+    """What was left out."""
+
+
+def drawable(path: Path, summary: store.Summary) -> Drawable:
+    """Scene and trajectories of a store to draw.  SpringcheckError where it has none."""
     if not summary.runs:
         raise SpringcheckError(f"{path}: holds no trajectory and no study to draw")
-    scene = session.stored_scene(path)
     runs: dict[str, Trajectory] = {}
     notes = []
+    fast = False
     for run in summary.runs:
         runs[run.label], stride = store.strided(path, run.label, MOST_FRAMES)
         if stride > 1:
             notes.append(f"{run.label}: every {stride}th of {run.frames} frames is drawn")
-    return scene, runs, notes
+            fast |= not _shows_motion(runs[run.label])
+    followed = runs
+    if fast:
+        followed = {run.label: store.end(path, run.label, END_FRAMES) for run in summary.runs}
+        notes.append(f"position and phase portrait: the last {END_FRAMES} frames, energy: the whole run")
+    return Drawable(scene=session.stored_scene(path), runs=runs, followed=followed, notes=notes)
+
+
+def _shows_motion(run: Trajectory) -> bool:
+    """Whether its frames stand close enough to be joined by lines."""
+    q = run.q[:, 0] if len(run.q) > 1 else np.zeros(2)
+    with np.errstate(over="ignore"):
+        return bool(np.max(np.abs(np.diff(q))) <= RESOLVED * np.ptp(q))
 
 
 def studied(path: Path, summary: store.Summary) -> Studies:

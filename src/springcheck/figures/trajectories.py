@@ -23,21 +23,45 @@ UNITS = {
 CIRCUIT = (" (C)", " (Wb)", " (s)", " (J)")
 
 
-def draw(scene: Scene, runs: Mapping[str, Trajectory], folder: Path) -> list[Path]:
-    """Draw all figures of a store into a folder; returns the files."""
-    usable = {label: run for label, run in runs.items() if len(run.t) > 1}
-    if not usable:
+ROOM = 5.0
+"""What leaves the true motion by more than this factor leaves the picture: the others would be a line."""
+
+ENERGY_ROOM = 1e3
+"""The same for energies."""
+
+DECADES = 100.0
+"""Ratio of largest to smallest energy from which the scale is logarithmic."""
+
+
+def draw(
+    scene: Scene,
+    runs: Mapping[str, Trajectory],
+    folder: Path,
+    *,
+    followed: Mapping[str, Trajectory] | None = None,
+) -> list[Path]:
+    """Draw all figures of a store into a folder; returns the files (see `pictures`)."""
+    if not any(len(run.t) > 1 for run in runs.values()):
         return []
-    groups = _groups(usable)
     written = []
     with style():
-        for name, picture in (
-            ("phase-portrait", _phase_portrait),
-            ("position", _position),
-            ("energy", _energy),
-        ):
-            written += save(picture(scene, groups), folder, name)
+        for name, picture in pictures(scene, runs, runs if followed is None else followed).items():
+            written += save(picture, folder, name)
     return written
+
+
+def pictures(
+    scene: Scene, runs: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
+) -> dict[str, Figure]:
+    """The figures by name.  `followed`: the parts of the runs in which the motion itself is shown."""
+    usable, parts = (
+        _groups({label: run for label, run in found.items() if len(run.t) > 1}) for found in (runs, followed)
+    )
+    return {
+        "phase-portrait": _phase_portrait(scene, parts),
+        "position": _position(scene, parts),
+        "energy": _energy(scene, usable),
+    }
 
 
 Group = tuple[str, list[Trajectory]]
@@ -51,19 +75,25 @@ def _groups(runs: Mapping[str, Trajectory]) -> list[Group]:
     return [(SCHEMES[name].title, members) for name, members in found.items()]
 
 
+def _all(groups: Sequence[Group]) -> list[Trajectory]:
+    return [run for _, members in groups for run in members]
+
+
 def _units(scene: Scene) -> tuple[str, str, str, str]:
     return CIRCUIT if scene.kind == "circuit" else UNITS[scene.units]
 
 
-def _truth(scene: Scene, runs: Sequence[Group]) -> tuple[Floats, Floats, Floats] | None:
-    """A smooth true motion over the longest run: t (f,), q, p (f, n)."""
+def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> tuple[Floats, Floats, Floats] | None:
+    """A smooth true motion from the first frame of these runs to the last: t (f,) [T], q, p (f, n)."""
     if not exact.has_true_motion(scene):
         return None
-    end = max(abs(float(run.t[-1])) for _, members in runs for run in members)
-    f = 1500
-    h = np.copysign(end / (f - 1), scene.step)
-    q, p = exact.true_motion(scene, np.arange(f), h)
-    return np.arange(f) * h, np.asarray(q, np.float64), np.asarray(p, np.float64)
+    times = [np.abs(run.t[[0, -1]]) for run in runs]
+    first, last = (round(x / abs(scene.step)) for x in (np.min(times), np.max(times)))
+    # some 1500 whole parts of steps, or whole steps
+    finer = max(1, -(-1500 // max(1, last - first)))
+    steps = np.unique(np.rint(np.linspace(first * finer, last * finer, 1501)).astype(np.int64))
+    q, p = exact.true_motion(scene, steps, scene.step / finer)
+    return steps * (scene.step / finer), np.asarray(q, np.float64), np.asarray(p, np.float64)
 
 
 def _line(axes: Axes, x: Floats, y: Floats, i: int, label: str) -> None:
@@ -89,6 +119,22 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside right upper", frameon=False)
 
 
+def _room(groups: Sequence[Group], pick: Any, truth: Floats | None) -> float:
+    """The largest value that is worth showing; that of the middle one of the runs without a truth."""
+    largest = [float(np.max(np.abs(pick(run)))) for run in _all(groups)]
+    return ROOM * (float(np.median(largest)) if truth is None else float(np.max(np.abs(truth))))
+
+
+def _within(x: Floats, room: float) -> Floats:
+    """Values far outside of the picture brought nearer, for what draws them overflows."""
+    return np.clip(x, -10 * room, 10 * room) if room > 0 else x
+
+
+def _fit(limits: tuple[float, float], room: float) -> tuple[float, float]:
+    """Limits of an axis, those beyond the room drawn in."""
+    return (max(limits[0], -room), min(limits[1], room)) if room > 0 else limits
+
+
 def _overlay(axes: Axes, groups: Sequence[Group], pick: Any) -> None:
     for i, (title, members) in enumerate(groups):
         for j, run in enumerate(members):
@@ -102,12 +148,16 @@ def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
     q_unit, p_unit, _, _ = _units(scene)
     figure = Figure(figsize=(7.6, 5.2), layout="constrained")
     axes = figure.add_subplot()
-    truth = _truth(scene, groups)
+    truth = true_motion(scene, _all(groups))
     if truth is not None:
         axes.plot(
             truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion"
         )
-    _overlay(axes, groups, lambda run: (run.q[:, 0], run.p[:, 0]))
+    q_room = _room(groups, lambda run: run.q[:, 0], None if truth is None else truth[1][:, 0])
+    p_room = _room(groups, lambda run: run.p[:, 0], None if truth is None else truth[2][:, 0])
+    _overlay(axes, groups, lambda run: (_within(run.q[:, 0], q_room), _within(run.p[:, 0], p_room)))
+    axes.set_xlim(_fit(axes.get_xlim(), q_room))
+    axes.set_ylim(_fit(axes.get_ylim(), p_room))
     axes.plot(*[[float(x[0])] for x in (scene.q, scene.p)], "k+", markersize=10, label="start")
     axes.set_xlabel(f"{_q(scene)}{q_unit}")
     axes.set_ylabel(f"{_p(scene)}{p_unit}")
@@ -122,10 +172,13 @@ def _position(scene: Scene, groups: Sequence[Group]) -> Figure:
     q_unit, _, t_unit, _ = _units(scene)
     figure = Figure(figsize=(7.6, 4.2), layout="constrained")
     axes = figure.add_subplot()
-    truth = _truth(scene, groups)
+    truth = true_motion(scene, _all(groups))
     if truth is not None:
         axes.plot(truth[0], truth[1][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion")
-    _overlay(axes, groups, lambda run: (run.t, run.q[:, 0]))
+    room = _room(groups, lambda run: run.q[:, 0], None if truth is None else truth[1][:, 0])
+    _overlay(axes, groups, lambda run: (run.t, _within(run.q[:, 0], room)))
+    axes.set_ylim(_fit(axes.get_ylim(), room))
+    axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_xlabel(f"time t{t_unit}")
     axes.set_ylabel(f"{_q(scene)}{q_unit}")
     axes.set_title(f"{scene.title}: {_q(scene).split()[0]}{_which(scene)}")
@@ -146,17 +199,23 @@ def _energy(scene: Scene, groups: Sequence[Group]) -> Figure:
             return np.asarray(mechanics.energy(scene, run.q, run.p), np.float64)
 
     upper.axhline(start / unit, color="#999999", linewidth=4, alpha=0.6, label="true motion")
-    _overlay(upper, groups, lambda run: (run.t, energies(run) / unit))
-    low, high = upper.get_ylim()
-    if low > 0 and high / low > 20:
+    _overlay(upper, groups, lambda run: (run.t, _within(energies(run) / unit, ENERGY_ROOM)))
+    shown = np.concatenate([energies(run) / unit for run in _all(groups)])
+    if np.min(shown) > 0 and np.max(shown) > DECADES * np.min(shown):
         upper.set_yscale("log")
+    upper.set_ylim(_fit(upper.get_ylim(), ENERGY_ROOM))
     upper.set_ylabel("energy / energy of the start" if start else f"energy{e_unit}")
     upper.set_title(f"{scene.title}: energy")
 
     # below one unit in the last place there is nothing to see: such points stand on the lower edge
     floor = 2.0**-53
-    _overlay(lower, groups, lambda run: (run.t, np.maximum(np.abs(energies(run) - start) / unit, floor)))
+
+    def apart(run: Trajectory) -> Floats:
+        return _within(np.maximum(np.abs(energies(run) - start) / unit, floor), ENERGY_ROOM)
+
+    _overlay(lower, groups, lambda run: (run.t, apart(run)))
     lower.set_yscale("log")
+    lower.set_ylim(_fit(lower.get_ylim(), ENERGY_ROOM))
     lower.set_xlabel(f"time t{t_unit}")
     lower.set_ylabel("|energy - start| / start" if start else f"|energy - start|{e_unit}")
     _legend(figure, upper)

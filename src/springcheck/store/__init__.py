@@ -1,7 +1,7 @@
 """The HDF5 store: trajectories, verdicts and studies of one scene in one file; alone imports h5py.
 
 Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `read`, `windows`, `strided`,
-`summary`, `read_tables`, `verdicts`, `comparison`.
+`end`, `summary`, `read_tables`, `verdicts`, `comparison`.
 """
 
 from springcheck.store.checking import Finding, check
@@ -17,6 +17,7 @@ from springcheck.store.reading import (
     attributes,
     comparison,
     document,
+    end,
     read,
     read_one,
     read_tables,
@@ -41,6 +42,7 @@ __all__ = [
     "check",
     "comparison",
     "document",
+    "end",
     "export",
     "machine",
     "open_new",

@@ -10,7 +10,7 @@
     /plots                     NXentry of NXdata; root @default leads there
 
 The numbers are stored once, contiguous, as little-endian float64, and neither compressed nor chunked:
-trajectories are noise to gzip (validation/store_speed.py), and a contiguous array is written past
+trajectories are noise to gzip (validation/long_runs.py), and a contiguous array is written past
 libhdf5 at the speed of the disk.  /particles holds virtual datasets of three dimensions over them, whose
 y and z are a fill value, so it costs no bytes.  `time` and `step` are hard links to one array each.
 """

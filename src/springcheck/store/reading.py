@@ -265,6 +265,13 @@ def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, 
         return _trajectory(label, known, _rows(datasets, slice(None, None, stride)), stride), stride
 
 
+def end(path: str | Path, label: str, rows: int) -> Trajectory:
+    """The last `rows` frames of a trajectory."""
+    source = source_of(Path(path), label)
+    with opened(source) as file:
+        return _trajectory(label, parameters(file, label), _rows(_datasets(file, label), slice(-rows, None)))
+
+
 def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats | None]:
     return {
         name: None if dataset is None else np.asarray(dataset[rows], dtype=np.float64)
