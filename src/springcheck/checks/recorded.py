@@ -31,7 +31,7 @@ def start(case: Case) -> Verdict:
     run, scene = case.trajectory, case.scene
     if case.steps[0] != 0:
         return case.not_applicable("start", "this piece does not hold the start")
-    value = float(max(np.max(np.abs(run.q[0] - scene.q)), np.max(np.abs(run.p[0] - scene.p))))
+    value = float(np.max(np.abs([run.q[0] - scene.q, run.p[0] - scene.p])))
     return case.verdict("start", value, 0.0, "", "the start is recorded, not computed")
 
 
