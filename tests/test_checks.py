@@ -11,8 +11,10 @@ import pytest
 
 import springcheck
 from springcheck import checks, mechanics, scenes, schemes
+from springcheck.checks import recorded
 from springcheck.faults import clean, steppers
 from springcheck.model import Arithmetic, Scene, Trajectory, Verdict
+from springcheck.terms import Spring, WallSpring
 
 Need = Callable[[str], None]
 
@@ -184,3 +186,64 @@ def test_a_right_engine_passes_to_the_very_end_of_the_range_of_numbers(label: st
     verdicts = checks.judge(scene, run)
     assert all(v.passed is not False for v in verdicts), [v for v in verdicts if v.passed is False]
     assert any(v.check == "frequency" and v.passed for v in verdicts)
+
+
+def test_a_force_left_out_is_seen_in_any_arithmetic_far_beyond_stability() -> None:
+    """Explicit Euler's next position does not feel the kick, so no rounding of the kick excuses the next."""
+    scene = replace(scenes.load_scene("anharmonic"), q=np.array([-5.7e9]), p=np.array([-1.5e9]), steps=1)
+    run = springcheck.run(scene, "own:euler")
+    for how in (Arithmetic(), Arithmetic(state=2.0**-24, force=2.0**-24), Arithmetic(force=2.0**-24)):
+        declared = replace(run, arithmetic=how)
+        assert alarms(checks.judge(scene, declared, [recorded.step_defect])) == []
+        unkicked = replace(declared, p=np.array([scene.p, scene.p]))
+        assert len(alarms(checks.judge(scene, unkicked, [recorded.step_defect]))) == 1
+
+
+@pytest.mark.parametrize("quantity", ["q", "p"])
+@pytest.mark.parametrize(("frame", "check"), [(0, recorded.start), (-1, recorded.step_defect)])
+def test_a_state_that_is_no_number_is_never_passed(frame: int, check: checks.Check, quantity: str) -> None:
+    scene = replace(scenes.load_scene("spring-uneven"), steps=5)
+    run = springcheck.run(scene, "own:euler")
+    states = getattr(run, quantity).copy()
+    states[frame] = np.nan
+    (verdict,) = checks.judge(scene, replace(run, **{quantity: states}), [check])
+    assert verdict.passed is False
+
+
+def test_the_strongest_force_is_that_of_one_spring_or_of_all_on_a_particle() -> None:
+    pulled = Spring(a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([2.9, 2.9]), rest=np.array([0.5, 0.5]))
+    walls = WallSpring(i=np.array([1, 1]), k=np.array([1.3, 1.7]), at=np.zeros(2))
+    q = np.array([[-3.0, 0.0, 3.0], [0.5, 1.0, 1.5]])
+    # the outer springs of the first state cancel at the middle one; in the second only the walls pull
+    assert mechanics.strongest((pulled, walls), q) == pytest.approx([2.9 * 2.5, 1.3 + 1.7])
+
+
+def overflowing(declared: float) -> tuple[Scene, Trajectory]:
+    """A right run whose kick is left out wherever the force exceeds what its arithmetic is said to hold."""
+    scene = replace(scenes.load_scene("spring-uneven"), steps=60)
+    (spring,) = scene.terms
+    assert isinstance(spring, WallSpring)
+    q, p, h = [scene.q], [scene.p], scene.step
+    for _ in range(scene.steps):
+        force = -spring.k * (q[-1] - spring.at)
+        kick = h * force * (np.abs(force) < declared)
+        q, p = [*q, q[-1] + h * (p[-1] / scene.m)], [*p, p[-1] + kick]
+    run = springcheck.run(scene, "own:euler")
+    how = Arithmetic(overflow=declared)
+    return scene, replace(run, q=np.array(q), p=np.array(p), arithmetic=how)
+
+
+def test_a_step_off_is_the_engine_s_limit_only_where_that_explains_every_step_that_is_off() -> None:
+    scene, right = overflowing(np.inf)
+    force = np.abs(mechanics.force(scene.terms)(right.q, right.p))[:, 0]
+    limit = float(np.sort(force[:-1])[-9])
+    scene, run = overflowing(limit)
+    (verdict,) = checks.judge(scene, run, [recorded.step_defect])
+    first = int(np.argmax(force >= limit)) + 1
+    assert verdict.passed is False
+    assert f"step {first}, the first that is off, has a force of {force[first - 1]:.3g}" in verdict.why
+    p = run.p.copy()
+    p[int(np.argmin(force[1:-1])) + 2] *= 1 + 1e-12
+    (verdict,) = checks.judge(scene, replace(run, p=p), [recorded.step_defect])
+    assert verdict.passed is False
+    assert "limit" not in verdict.why

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
+from platform import machine as processor
 
 import numpy as np
 import pytest
@@ -188,6 +189,57 @@ def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Ne
         assert judged(scene, run) == []
         as_documented = replace(run, arithmetic=replace(run.arithmetic, excess=0.0))
         assert ("step-defect" in judged(scene, as_documented)) == bool(factor)
+
+
+@pytest.mark.parametrize("precision", ["single", "mixed", "double"])
+@pytest.mark.parametrize(
+    ("method", "size", "step"), [("euler", 1, 289), ("verlet", 1e3, 1), ("leapfrog", 1e3, 2)]
+)
+def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
+    method: str, size: float, step: int, precision: str, need: Need
+) -> None:
+    label = f"openmm:{method}@OpenCL-{precision}"
+    need(label)
+    plain = scenes.load_scene("anharmonic")
+    scene = replace(plain, q=plain.q * size, p=plain.p * size, steps=step + 9)
+    run = springcheck.run(scene, label)
+    (verdict,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
+    assert verdict.passed is False
+    assert f"overflows beyond 2**31, and step {step}, the first that is off" in verdict.why
+    before = replace(run, t=run.t[:step], q=run.q[:step], p=run.p[:step], energy=run.energy[:step])
+    assert judged(scene, before) == []
+
+
+def test_pocl_turns_every_force_beyond_fixed_point_into_the_lowest_number_and_sums_modulo_2_to_the_64(
+    need: Need,
+) -> None:
+    """`(long)(x * 0x100000000)` of each term, which C leaves open out of range; x86 answers -2**63."""
+    label = "openmm:leapfrog@OpenCL-double"
+    need(label)
+    if not pocl_on_x86():
+        pytest.skip("what a conversion out of range gives is this device's own")
+    plain = scenes.load_scene("anharmonic")
+    k, b, unit = float(np.float32(2.9)), float(np.float32(1.7)), 2.0**32
+
+    def fixed(force: float) -> int:
+        return int(force * unit) if abs(force) < 2.0**31 else -(2**63)
+
+    for q in (-46279.44742758134, -1082.0, -1081.0, 1081.0, 1082.0, -8e8, 8e8):
+        scene = replace(plain, q=np.array([q]), p=np.zeros(1), steps=1, every=1)
+        run = springcheck.run(scene, label)
+        total = (fixed(-k * q) + fixed(-b * q * q * q) + 2**63) % 2**64 - 2**63
+        assert run.p[1, 0] == pytest.approx(scene.step * (total / unit), rel=2.0**-50, abs=0)
+
+
+def pocl_on_x86() -> bool:
+    import openmm
+
+    system = openmm.System()
+    system.addParticle(1.0)
+    platform = openmm.Platform.getPlatformByName("OpenCL")
+    context = openmm.Context(system, openmm.VerletIntegrator(1.0), platform)
+    name = platform.getPropertyValue(context, "OpenCLPlatformName")
+    return name == "Portable Computing Language" and processor() in ("x86_64", "AMD64")
 
 
 def test_every_engine_has_methods_of_known_schemes() -> None:

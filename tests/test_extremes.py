@@ -17,7 +17,11 @@ from springcheck.studies.extremes import grid, judging, refusals, running
 
 Need = Callable[[str], None]
 METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
-GPU = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
+GPU = [
+    f"openmm:{method}@OpenCL-{precision}"
+    for method in ("verlet", "euler")
+    for precision in ("single", "mixed", "double")
+]
 
 
 @pytest.mark.parametrize("name", [*METHODS, *GPU])
@@ -27,6 +31,18 @@ def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
     assert not atlas.wrong, atlas.wrong[:3]
     assert len(atlas.cells) >= 100
     assert atlas.counts()["right"] >= 20
+
+
+def test_a_long_run_is_judged_up_to_where_its_forces_leave_fixed_point(need: Need) -> None:
+    need("openmm:euler@OpenCL-double")
+    atlas = extremes.measure(["openmm:euler@OpenCL-double"], quick=True)
+    cells = [
+        cell for cell in atlas.cells if cell.block == "length" and "overflows beyond 2**31" in cell.reason
+    ]
+    assert {cell.parameters["h_w"] for cell in cells} == {1.0, 1.9}
+    # growth is (1 + (h w)**2)**(1/2) a step and the first force 2**10: 42 steps, and 28, to 2**31
+    assert all("grown out of range after step 0:" in cell.reason for cell in cells)
+    assert {cell.outcome for cell in cells} == {"unstable, as theory says"}
 
 
 def test_the_whole_grid_has_two_thousand_cells_for_three_methods_alone() -> None:

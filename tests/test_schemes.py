@@ -122,3 +122,12 @@ def test_irrational_coefficients_are_those_of_the_cube_root_of_two() -> None:
         for name in ("forest-ruth", "yoshida4"):
             for (_, c), value in zip(SCHEMES[name].stages, expected, strict=False):
                 assert abs(mpmath.mpf(str(c)) - value) < mpmath.mpf(10) ** -36
+
+
+@pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda s: s.name)
+def test_a_force_gets_as_far_within_a_step_as_the_matrix_says(scheme: Scheme) -> None:
+    none, one, two = (schemes.matrix(scheme, h=H, m=np.array([M]), k=x * K)[0] for x in range(3))
+    moves = np.any(np.abs(one[0] - none[0]) > ULP)
+    # what a later force makes of an earlier one goes with the square of the stiffness
+    felt = np.any(np.abs(two[1] - 2 * one[1] + none[1]) > 8 * ULP)
+    assert scheme.reach == (2 if felt else int(moves))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
-from springcheck.terms import LINEAR, Damping, Spring, WallSpring, gather, particles
+from springcheck.terms import LINEAR, Damping, Spring, WallSpring, apart, gather, particles
 
 
 def acting(scene: Scene) -> dict[str, NDArray[np.bool_]]:
@@ -155,6 +155,14 @@ def force(terms: Iterable[Term]) -> Force:
         return out
 
     return total
+
+
+def strongest(terms: Iterable[Term], q: Reals) -> Reals:
+    """The largest |force| at q (..., n) -> (...) of any one spring, or of all on a particle [M L/T2]."""
+    parts = tuple(terms)
+    each = ((parts, q), *(((alone,), where) for alone, where in (apart(term, q) for term in parts)))
+    sizes = [np.abs(force(some)(where, np.zeros_like(where))) for some, where in each]
+    return np.asarray(np.max(np.concatenate(sizes, axis=-1), axis=-1))
 
 
 def magnitude(terms: Iterable[Term], near: Reals | None = None) -> Force:

@@ -64,6 +64,19 @@ class Scheme:
         return any(kind in ("slow", "fast") for kind, _ in self.stages)
 
     @property
+    def reach(self) -> int:
+        """How far a force gets within its step: 0 to the momentum, 1 to the position, 2 to a later force."""
+        reach, kicked = 0, False
+        for kind, _ in self.stages:
+            if kind == "drift":
+                reach = max(reach, int(kicked))
+            elif kind != "friction":
+                reach, kicked = 2 if reach else 0, True
+        uses = np.array(self.a, dtype=np.float64)
+        # a stage takes its position from velocities, and these from the forces of stages before
+        return reach if self.stages else 2 if np.any(uses @ uses) else int(np.any(uses))
+
+    @property
     def one_step(self) -> bool:
         """Whether `step` can carry the scheme out."""
         return bool(self.stages or self.b)

@@ -7,7 +7,7 @@ file, put it into `TERMS`, and name its key in the methods of the engines that s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -285,6 +285,18 @@ TERMS: tuple[type[Any], ...] = (WallSpring, Spring, Quartic, Cosine, Morse, Damp
 LINEAR = frozenset({"wall-spring", "spring", "damping"})
 
 
+def _ends(term: Term) -> tuple[str, ...]:
+    return ("i",) if term.bodies == 1 else ("a", "b")
+
+
 def particles(term: Term) -> tuple[Integers, ...]:
     """The particles on which a term acts: (i,), or both ends (a, b) of its bonds."""
-    return tuple(getattr(term, name) for name in (("i",) if term.bodies == 1 else ("a", "b")))
+    return tuple(getattr(term, name) for name in _ends(term))
+
+
+def apart(term: Any, q: Reals) -> tuple[Term, Reals]:
+    """The term with ends of its own for each of its springs, and where these are at q (..., n)."""
+    ends = particles(term)
+    own = np.arange(len(ends) * len(ends[0])).reshape(len(ends), -1)
+    where = np.concatenate([gather(q, end) for end in ends], axis=-1)
+    return replace(term, **dict(zip(_ends(term), own, strict=True))), where

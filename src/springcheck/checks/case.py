@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,7 +11,18 @@ import numpy as np
 
 from springcheck import exact, mechanics, schemes
 from springcheck.checks import verdicts
-from springcheck.model import Extended, Floats, Integers, Reals, Scene, Trajectory, Verdict
+from springcheck.model import (
+    Arithmetic,
+    Extended,
+    Floats,
+    Force,
+    Integers,
+    Reals,
+    Scene,
+    Term,
+    Trajectory,
+    Verdict,
+)
 from springcheck.terms import particles
 
 SMALLEST = np.longdouble(5e-324)
@@ -97,8 +109,13 @@ class Case:
         """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 
-    def allowance_at(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
-        """One rounding of everything that one step from states (..., n) adds up, (..., n) each."""
+    def allowance_at(
+        self, q: Reals, p: Reals, *, smallest: np.longdouble = SMALLEST
+    ) -> tuple[Extended, Extended]:
+        """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
+
+        `smallest` is what an operation may lose to underflow.
+        """
         run, scene = self.trajectory, self.judged
         rounding = run.arithmetic
         near = q.astype(np.longdouble)
@@ -123,11 +140,35 @@ class Case:
             extra += h * lost / self.roundings
         if run.rebuilds_velocity and not rounding.keeps_displacement:
             extra += rounding.state * m * (q + size_q) / h
-        extra += SMALLEST * (1 + m)
-        # carried on through the rest of the step: a shifted position is felt by the next kick
-        shift = h / m * extra + SMALLEST
-        felt = h * (sizes(q + shift, p) - sizes(q, p))
+        extra += smallest * (1 + m)
+        # carried on as far as the scheme carries it and no farther: beyond stability what a later force
+        # feels is larger than the force itself
+        reach = self.scheme.reach
+        shift = h / m * (extra if reach else smallest * (1 + m)) + smallest
+        felt = h * (sizes(q + shift, p) - sizes(q, p)) if reach == 2 else 0
         return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
+
+    @cached_property
+    def strongest(self) -> Reals:
+        """The largest force on the scheme's way from each frame to the next (f-1,) [M L/T2].
+
+        Of any one spring, or of all on a particle; 0 where modes take many steps at once.
+        """
+        peak = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble)
+
+        def watched(terms: Iterable[Term]) -> Force:
+            parts = tuple(terms)
+            true = mechanics.force(parts)
+
+            def force(q: Reals, p: Reals) -> Reals:
+                np.maximum(peak, mechanics.strongest(parts, q), out=peak)
+                return true(q, p)
+
+            return force
+
+        q, p = (x[:-1].astype(np.longdouble) for x in (self.trajectory.q, self.trajectory.p))
+        advance(self, q, p, self.trajectory.every, forces=watched)
+        return peak
 
     @cached_property
     def envelope(self) -> tuple[Extended, Extended]:
@@ -174,6 +215,11 @@ class Case:
         return verdicts.not_applicable(self.trajectory.label, check, why)
 
 
+def overflows(how: Arithmetic) -> str:
+    """The reason of steps that are off because their forces leave the range of a fixed-point sum."""
+    return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
+
+
 def _pulls(scene: Scene) -> Integers:
     """How many terms pull at each particle (n,)."""
     count = np.zeros(scene.n, dtype=np.int64)
@@ -187,14 +233,21 @@ REPEATED = 1000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""
 
 
-def advance(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:
-    """So many steps of the scheme from states (f, n), in extended precision."""
+def advance(
+    case: Case,
+    q: Extended,
+    p: Extended,
+    steps: int,
+    *,
+    forces: Callable[[Iterable[Term]], Force] = mechanics.force,
+) -> tuple[Extended, Extended]:
+    """So many steps of the scheme from states (f, n), in extended precision; `forces` makes the forces."""
     if steps > REPEATED and case.linear:
         return _leap(case, q, p, steps)
     scene = case.judged
-    force = mechanics.force(scene.terms)
+    force = forces(scene.terms)
     slow, fast = mechanics.split(scene.terms)
-    parts = mechanics.force(slow), mechanics.force(fast)
+    parts = forces(slow), forces(fast)
     m = scene.m.astype(np.longdouble)
     a: Reals = q
     b: Reals = p

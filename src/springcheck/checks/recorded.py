@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck import exact, mechanics, schemes
-from springcheck.checks.case import REPEATED, Case
-from springcheck.model import Arithmetic, Extended, Floats, Verdict
+from springcheck.checks.case import REPEATED, Case, overflows
+from springcheck.model import Arithmetic, Extended, Floats, Reals, Verdict
 from springcheck.terms import particles
 
 CONTRACTED = 1e-3
@@ -30,7 +31,7 @@ def start(case: Case) -> Verdict:
     run, scene = case.trajectory, case.scene
     if case.steps[0] != 0:
         return case.not_applicable("start", "this piece does not hold the start")
-    value = float(max(np.max(np.abs(run.q[0] - scene.q)), np.max(np.abs(run.p[0] - scene.p))))
+    value = float(np.max(np.abs([run.q[0] - scene.q, run.p[0] - scene.p])))
     return case.verdict("start", value, 0.0, "", "the start is recorded, not computed")
 
 
@@ -59,31 +60,40 @@ def step_defect(case: Case) -> Verdict:
         return case.not_applicable(
             "step-defect", f"{run.every} steps lie between frames, and {_closed(case)}"
         )
-    q, p = case.next_states
-    dq, dp = np.abs(q - run.q[1:]), np.abs(p - run.p[1:])
-    of_q, of_p = case.allowance
     if run.every == 1:
-        value = float(max(np.max(dq / of_q), np.max(dp / of_p)))
-        return case.verdict(
-            "step-defect",
-            value,
-            float(case.roundings),
-            "roundings",
-            f"roundings along one step of {case.scheme.title}; does not grow with the run",
-        )
-    bound = case.roundings * _amplified(case, run.every)
-    if not bound * run.arithmetic.state < 1:
-        return case.not_applicable(
-            "step-defect", "between two frames a rounding may grow to the whole motion"
-        )
-    sizes = case.norm(dq, dp), case.norm(of_q, of_p)
-    value = float(np.max(sizes[0] / np.max(sizes[1])))
-    return case.verdict(
-        "step-defect",
-        value,
-        bound,
-        "roundings",
-        f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run",
+        bound = float(case.roundings)
+        why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
+    else:
+        bound = case.roundings * _amplified(case, run.every)
+        if not bound * run.arithmetic.state < 1:
+            return case.not_applicable(
+                "step-defect", "between two frames a rounding may grow to the whole motion"
+            )
+        why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
+    seen = _defects(case)
+    why = _beyond_range(case, ~(seen <= bound)) or why
+    return case.verdict("step-defect", float(np.max(seen)), bound, "roundings", why)
+
+
+def _defects(case: Case) -> Reals:
+    """How far each frame is from the scheme's own steps after the frame before (f-1,), in roundings."""
+    q, p = case.next_states
+    dq, dp = np.abs(q - case.trajectory.q[1:]), np.abs(p - case.trajectory.p[1:])
+    of_q, of_p = case.allowance
+    if case.trajectory.every == 1:
+        return np.asarray(np.max(np.maximum(dq / of_q, dp / of_p), axis=1))
+    return case.norm(dq, dp) / np.max(case.norm(of_q, of_p))
+
+
+def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
+    """The limit of the engine's arithmetic that explains every step that is off (f-1,), or nothing."""
+    how = case.trajectory.arithmetic
+    if not np.isfinite(how.overflow) or not np.any(off) or not np.all(case.strongest[off] >= how.overflow):
+        return ""
+    first = int(np.argmax(off))
+    return (
+        f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
+        f"has a force of {case.strongest[first]:.3g}"
     )
 
 
@@ -374,6 +384,7 @@ def arithmetic(case: Case) -> Verdict:
     coarseness = case.rounding / finer.rounding
     if coarseness < 1 / FLOOR or len(case.trajectory.t) < ENOUGH:
         return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
+    why = _beyond_range(case, ~(_defects(case) <= seen.bound))
     return Verdict(
         method=seen.method,
         check="arithmetic",
@@ -381,7 +392,8 @@ def arithmetic(case: Case) -> Verdict:
         bound=seen.bound,
         unit=seen.unit,
         passed=bool(FLOOR <= seen.value <= seen.bound),
-        why=f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
+        why=why
+        or f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
     )
 
 

@@ -35,7 +35,9 @@ from springcheck.terms import Damping, Morse, Spring, WallSpring
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
-mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow near 2**31 above."""
+mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow from 2**31 on.  Each term's force is
+converted by itself, by `(long)(x * 0x100000000)`, which C leaves open out of range: pocl on x86 gives
+-2**63 for every such force, of either sign, and the sum is modulo 2**64, so that two of them make 0."""
 
 _PRECISIONS = {
     name: Arithmetic(

@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from springcheck import checks, engines, model, schemes
-from springcheck.checks.case import SMALLEST
+from springcheck.checks.case import overflows
 from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Trajectory
 from springcheck.studies.extremes.grid import Spec
 
@@ -112,11 +112,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         of_q, of_p = case.allowance
         dq, dp = np.abs(exact_q - q[1:]), np.abs(exact_p - p[1:])
         ratio = _largest(dq, dp, of_q, of_p)
-        # without what underflow may take
-        low_p = SMALLEST * (1 + scene.m)
-        low_q = SMALLEST + np.abs(np.longdouble(scene.step)) / scene.m * low_p
-        felt = np.abs(np.longdouble(scene.step)) * np.abs(_stiffness(case.judged)) * low_q
-        strict = _largest(dq, dp, of_q - low_q, of_p - low_p - felt)
+        strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
         inside = sizes(
             label, case.judged, q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), exact_q, exact_p
@@ -184,7 +180,7 @@ def _reason(
             return f"the force constant {spec.k:.3g} is beyond single precision, in which it is kept"
     peak = np.max(inside.force[:, i], initial=0)
     reasons = {
-        "fixed-point sum of forces overflows beyond 2**31": inside.force[bad, i] >= how.overflow,
+        overflows(how): inside.force[bad, i] >= how.overflow,
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
             len(bad), how.quantum > DIGITS * peak
         ),

@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck import checks, engines, exact, simulate
 from springcheck.checks import recorded
+from springcheck.checks.case import overflows
 from springcheck.model import Label, Scene, Stopped
 from springcheck.studies.extremes import grid, judging
 from springcheck.studies.extremes.grid import Spec
@@ -94,14 +95,16 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         scene = grid.scene([spec], label, engines.method(label).requires)
         with np.errstate(all="ignore"):
             run = simulate.run(scene, label)
-            case = checks.Case(trajectory=run, scene=scene)
+            case, limit = _within_range(checks.Case(trajectory=run, scene=scene))
             verdict = recorded.closed_form(case)
-            if verdict.passed is None and len(run.t) > 1:
+            if verdict.passed is None and len(case.trajectory.t) > 1:
                 verdict = recorded.step_defect(case)
             growth = judging.growth_of(case, scene)[0]
         unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
         outcome: Outcome = "unstable, as theory says" if unstable else "right"
-        reason = ""
+        reason = limit
+        if limit and not unstable:
+            outcome = "engine's limit"
         value, bound = verdict.value, verdict.bound
         if run.outcome.status != "complete":
             # the driver ends a run at the last finite frame; the next one is out of range by theory
@@ -116,10 +119,25 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
             reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"
             if not (unstable and (left or gone)):
                 outcome, reason = "silently wrong", f"{run.outcome.status}: {run.outcome.message}"
-        if outcome != "silently wrong" and len(run.t) > 1 and not value <= bound:
+        if outcome != "silently wrong" and len(case.trajectory.t) > 1 and not value <= bound:
             outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
         found.append(_cell(label, spec, outcome, reason, value, bound))
     return found
+
+
+def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
+    """The frames before a force leaves the range of a fixed-point sum, and what it then says."""
+    run = case.trajectory
+    beyond = (
+        case.strongest >= run.arithmetic.overflow if np.isfinite(run.arithmetic.overflow) else np.zeros(0)
+    )
+    if not np.any(beyond):
+        return case, ""
+    held = slice(int(np.argmax(beyond)) + 1)
+    energy = None if run.energy is None else run.energy[held]
+    before = replace(run, t=run.t[held], q=run.q[held], p=run.p[held], energy=energy)
+    reason = f"grown out of range after step {case.steps[held][-1]}: {overflows(run.arithmetic)}"
+    return checks.Case(trajectory=before, scene=case.scene), reason
 
 
 def _cell(label: Label, spec: Spec, outcome: Outcome, reason: str, value: float, bound: float) -> Cell:
