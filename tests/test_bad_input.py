@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+import springcheck
 from springcheck.cli import main
 from springcheck.scenes import folder
 
@@ -152,3 +155,40 @@ def test_a_trajectory_that_is_not_in_the_store(capsys: pytest.CaptureFixture[str
     refused(capsys, ["export", "spring.h5", "own:verlet", "x.h5md"], "own:verlet")
     refused(capsys, ["export", "spring.h5", "own:euler", "x.xyz"], ".h5md")
     refused(capsys, ["inspect", "spring.h5", "--trajectory", "own:euler", "--rows", "0"], "--rows")
+
+
+def test_an_exported_trajectory_is_not_called_damaged(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", "--method", "own:euler", "--quiet"]) == 0
+    assert main(["export", "spring.h5", "own:euler", "out.h5md"]) == 0
+    capsys.readouterr()
+    for command in ("inspect", "plot"):
+        refused(capsys, [command, "out.h5md"], "exported trajectory, no store", "identify")
+    assert main(["check", "out.h5md"]) == 1
+    assert capsys.readouterr().out == "out.h5md: /: is an exported trajectory, no store of springcheck\n"
+    assert main(["identify", "out.h5md"]) == 0
+
+
+def test_figures_are_not_drawn_into_a_file(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("mine.toml").write_text(SPRING)
+    assert main(["run", "mine.toml", "--method", "own:euler", "--quiet"]) == 0
+    refused(capsys, ["plot", "mine.h5", "-o", "mine.toml"], "mine.toml is a file", "-o")
+    assert Path("mine.toml").read_text() == SPRING
+
+
+@pytest.mark.parametrize("blocks", [1, 3, 40])
+def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, "-m", "springcheck", "run", "spring", "--method", "own:*", "-o", "here.h5"],
+        env=os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * blocks, 1024 * blocks)),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert (
+        done.stderr == "springcheck: cannot write here.h5: the file would be larger than this system allows\n"
+    )
+    assert not Path("here.h5").exists()

@@ -73,6 +73,16 @@ def test_the_text_names_methods_motions_and_the_store(capsys: pytest.CaptureFixt
     assert max(len(line) for line in text.splitlines()) <= 80
 
 
+def test_text_in_a_pipe_has_no_trailing_blanks(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (scenes.folder() / "spring.toml").read_text().replace("steps = 200", "steps = 1")
+    Path("one.toml").write_text(text)
+    assert main(["run", "one.toml", "--method", "own:*", "--verdicts"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Mass on a spring: 1 step of 0.1"
+    assert len(lines) > 20
+    assert [line for line in lines if line != line.rstrip()] == []
+
+
 def test_quiet_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", *OWN, "--quiet"]) == 0
     assert capsys.readouterr().out == ""

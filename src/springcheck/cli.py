@@ -184,8 +184,15 @@ def _console(quiet: bool = False) -> Console:
 
 def _show(lines: Sequence[RenderableType], *, quiet: bool = False) -> None:
     console = _console(quiet)
-    for line in lines:
-        console.print(line)
+    if quiet or sys.stdout.isatty():
+        for line in lines:
+            console.print(line)
+        return
+    with console.capture() as captured:
+        for line in lines:
+            console.print(line)
+    # a table's last column is padded, which a file or a diff need not keep
+    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
 
 
 def _document(data: Any) -> None:

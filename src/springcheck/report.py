@@ -55,7 +55,8 @@ def headline(report: Report) -> Text:
     """Title, grid and start of a scene."""
     scene = report.scene
     size = "" if scene.n == 1 else f", {scene.n} particles"
-    return plain(f"{scene.title}: {scene.steps} steps of {scene.step:g}{size}", "bold")
+    steps = "1 step" if scene.steps == 1 else f"{scene.steps} steps"
+    return plain(f"{scene.title}: {steps} of {scene.step:g}{size}", "bold")
 
 
 def grid() -> Table:

@@ -53,6 +53,8 @@ def look(i: int) -> dict[str, Any]:
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG; StoreError where the folder cannot be written."""
+    if folder.exists() and not folder.is_dir():
+        raise StoreError(f"{folder} is a file: figures need a folder, name another one with -o")
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -19,6 +19,8 @@ from springcheck.store.layout import Column
 
 PIECE = 1 << 20
 
+NO_STORE = "no store of springcheck"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
@@ -73,7 +75,9 @@ def check_file(path: Path) -> list[Finding]:
             )
     try:
         said = trust.guarded(path, trust.OURS)
-        found += [Finding(place=place, what=what) for place, what in json.loads(said)]
+        said_of = [Finding(place=place, what=what) for place, what in json.loads(said)]
+        # of what is no store nothing else needs to be said
+        found = said_of if said_of and NO_STORE in said_of[0].what else found + said_of
     except StoreError as error:
         found.append(Finding(place="/", what=str(error)))
     return found
@@ -83,8 +87,12 @@ def structure(path: Path) -> Iterator[Finding]:
     """What libhdf5 finds: H5MD, one complete set of arrays per label, digests, tables."""
     try:
         with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-            if file.attrs.get("format") != layout.FORMAT:
-                yield Finding(place="/", what=f"is not marked as {layout.FORMAT!r}: no store of springcheck")
+            marked = file.attrs.get("format")
+            if marked == layout.EXPORTED:
+                yield Finding(place="/", what=f"is an exported trajectory, {NO_STORE}")
+                return
+            if marked != layout.FORMAT:
+                yield Finding(place="/", what=f"is not marked as {layout.FORMAT!r}: {NO_STORE}")
                 return
             if "h5md" not in file or file["h5md"].attrs.get("version", np.zeros(2)).tolist() != [1, 1]:
                 yield Finding(place="/h5md", what="missing, or not version 1.1")

@@ -90,7 +90,7 @@ class Draft:
         """
         if self.rows == 0:
             raise ValueError(f"{self.label}: a trajectory without frames")
-        with files.told(self.path.parent, "write into"):
+        with files.told(self.path.parent, "write"):
             if self._file is None:
                 self._create(self.rows)
             self._flush()
@@ -111,7 +111,7 @@ class Draft:
         """Write what is held: at once where it is all there is, else behind the caller's back."""
         if not self._held:
             return
-        with files.told(self.path.parent, "write into"):
+        with files.told(self.path.parent, "write"):
             self._wait()
             if self._file is None:
                 self._create(self.scene.frames)

@@ -40,6 +40,7 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
 def _write(path: Path, file: Any, group: Any, label: str, total: int) -> None:
     with layout.fresh(path, 2 * total) as out:
         layout.begin(out)
+        layout.write_attributes(out, {"format": layout.EXPORTED})
         target = out.create_group("particles/trajectory")
         file.copy(group["box"], target, "box")
         first: Any = None

@@ -18,6 +18,9 @@ from typing import BinaryIO
 
 from springcheck.errors import StoreError
 
+JOURNAL = ".parts"
+"""Ending of the folder of a store that is being written."""
+
 CAUSES = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
@@ -51,6 +54,14 @@ def cause(error: BaseException) -> str:
     return error.strerror or f"it is damaged ({' '.join(said.split())[:120]})"
 
 
+def shown(path: Path) -> Path:
+    """The name under which a user knows a file: a part of a journal is the store's."""
+    for one in (path, path.parent):
+        if one.name.endswith(JOURNAL) and (one / "lock").exists():
+            return one.with_name(one.name.removesuffix(JOURNAL))
+    return path
+
+
 @contextlib.contextmanager
 def told(path: Path, doing: str) -> Iterator[None]:
     """Turn whatever goes wrong with a file into a StoreError of one line: "cannot `doing` path: why"."""
@@ -67,7 +78,7 @@ def told(path: Path, doing: str) -> Iterator[None]:
         OverflowError,
         MemoryError,
     ) as error:
-        raise StoreError(f"cannot {doing} {path}: {cause(error)}") from error
+        raise StoreError(f"cannot {doing} {shown(path)}: {cause(error)}") from error
 
 
 def room(path: Path, size: int) -> None:
@@ -77,7 +88,7 @@ def room(path: Path, size: int) -> None:
         free = shutil.disk_usage(folder).free
     if size > free:
         raise StoreError(
-            f"{path.name} would take {readable(size)}; {readable(free)} are free in {folder}: "
+            f"{shown(path).name} would take {readable(size)}; {readable(free)} are free in {folder}: "
             "record less (every, quantities) or choose another folder with -o"
         )
 

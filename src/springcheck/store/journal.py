@@ -54,7 +54,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         parts.mkdir(exist_ok=True)
         lock = files.Lock(parts / "lock")
     try:
-        with files.told(parts, "write into"):
+        with files.told(parts, "write"):
             run = _claim(path, parts, command, force=force)
     except BaseException:
         _leave(parts)
@@ -140,7 +140,7 @@ class Journal:
         if table.name.split("/")[0] in layout.RESERVED:
             raise ValueError(f"a table cannot be called {table.name!r}")
         image = merge.image({"part": table.name}, [table])
-        with files.told(self.folder, "write into"):
+        with files.told(self.folder, "write"):
             files.put_bytes(image, self._part("table", table.name))
 
     def tables(self) -> dict[str, Table]:

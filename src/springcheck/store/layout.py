@@ -37,6 +37,8 @@ from springcheck.store import files
 Scalar: TypeAlias = str | float | int | bool
 
 FORMAT = "springcheck store 1"
+EXPORTED = "springcheck trajectory 1"
+"""Format of a store, and of a trajectory on its own."""
 LIBVER = ("v110", "v110")
 """Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
 

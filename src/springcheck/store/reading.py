@@ -28,7 +28,7 @@ PIECE = 1 << 20
 
 def parts_folder(path: Path) -> Path:
     """The journal of a store."""
-    return path.with_name(path.name + ".parts")
+    return path.with_name(path.name + files.JOURNAL)
 
 
 def claim(parts: Path) -> dict[str, str] | None:
@@ -82,6 +82,10 @@ def opened(path: Path) -> Iterator[Any]:
     """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
     trust.trust(path, trust.OURS)
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        if file.attrs.get("format") == layout.EXPORTED:
+            raise StoreError(
+                f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
+            )
         if file.attrs.get("format") != layout.FORMAT:
             raise StoreError(f"cannot read {path}: it is HDF5, but no store of springcheck")
         yield file
