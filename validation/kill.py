@@ -52,7 +52,6 @@ CALLS = {
     "rmdir",
     "posix_fallocate",
     "mkdir",
-    "pwrite",
     "truncate",
 }
 

@@ -12,9 +12,9 @@ import os
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 
@@ -34,7 +34,6 @@ class Draft:
         layout.check_label(label)
         self.path, self.label, self.scene, self.sequence = path, label, scene, sequence
         self.rows = 0
-        self._written = 0
         self._temporary = path.with_name(path.name + ".new")
         self._columns = layout.columns(label, scene, scene.frames)
         self._hash = {name: hashlib.sha256() for name in self._columns}
@@ -46,7 +45,8 @@ class Draft:
         )
         self._held, self._length = 0, length
         self._offsets: dict[str, int] = {}
-        self._file: Any = None
+        self._files: dict[str, FileIO] = {}
+        """One for each column, at its next byte: columns are written side by side."""
         self._threads: ThreadPoolExecutor | None = None
         self._running: list[Future[None]] = []
 
@@ -91,7 +91,7 @@ class Draft:
         if self.rows == 0:
             raise ValueError(f"{self.label}: a trajectory without frames")
         with files.told(self.path.parent, "write"):
-            if self._file is None:
+            if not self._files:
                 self._create(self.rows)
             self._flush()
             self._wait()
@@ -105,7 +105,9 @@ class Draft:
     def _create(self, frames: int) -> None:
         self._columns = layout.columns(self.label, self.scene, frames)
         self._offsets = _lay_out(self._temporary, self.label, self.scene, frames, self._columns)
-        self._file = self._temporary.open("rb+", buffering=0)
+        for name, offset in self._offsets.items():
+            self._files[name] = self._temporary.open("rb+", buffering=0)
+            self._files[name].seek(offset)
 
     def _flush(self) -> None:
         """Write what is held: at once where it is all there is, else behind the caller's back."""
@@ -113,20 +115,18 @@ class Draft:
             return
         with files.told(self.path.parent, "write"):
             self._wait()
-            if self._file is None:
+            if not self._files:
                 self._create(self.scene.frames)
-            first = self._written
             filled = {name: buffer[: self._held] for name, buffer in self._buffer.items()}
             if self._held == self._length < self.scene.frames:
                 self._threads = self._threads or ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1))
                 self._running = [
-                    self._threads.submit(self._write, name, values, first) for name, values in filled.items()
+                    self._threads.submit(self._write, name, values) for name, values in filled.items()
                 ]
                 self._buffer, self._spare = self._spare, self._buffer
             else:
                 for name, values in filled.items():
-                    self._write(name, values, first)
-        self._written += self._held
+                    self._write(name, values)
         self._held = 0
 
     def _wait(self) -> None:
@@ -135,14 +135,14 @@ class Draft:
         for done in running:
             done.result()
 
-    def _write(self, name: str, values: np.ndarray, first: int) -> None:
+    def _write(self, name: str, values: np.ndarray) -> None:
         self._hash[name].update(values.data)
-        row = values[0].nbytes
-        view = values.data.cast("B")
-        offset = self._offsets[name] + first * row
-        while view:
-            count = os.pwrite(self._file.fileno(), view, offset)
-            view, offset = view[count:], offset + count
+        self._put(name, values.data.cast("B"))
+
+    def _put(self, name: str, content: memoryview) -> None:
+        """Write all of it: the system may take less at a time."""
+        while content:
+            content = content[self._files[name].write(content) :]
 
     def _shorten(self) -> None:
         long, offsets = self._temporary.with_name(self._temporary.name + ".long"), self._offsets
@@ -151,9 +151,8 @@ class Draft:
             self._create(self.rows)
             with long.open("rb") as source:
                 for name, column in self._columns.items():
-                    self._file.seek(self._offsets[name])
                     for block in seal.blocks(source, offsets[name], column.size):
-                        self._file.write(block)
+                        self._put(name, memoryview(block))
             self._close()
         finally:
             long.unlink(missing_ok=True)
@@ -194,9 +193,9 @@ class Draft:
         if self._threads is not None:
             self._threads.shutdown()
             self._threads = None
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        for file in self._files.values():
+            file.close()
+        self._files.clear()
 
     def __enter__(self) -> Draft:
         return self
