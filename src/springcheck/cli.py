@@ -304,7 +304,9 @@ def _stability(options: argparse.Namespace) -> int:
     scene = scenes.load_scene(options.scene)
     path = Path(options.output or f"{scene.name}-stability.h5")
     with _progress(options) as started:
-        found = stability.record(scene, path, options.method, force=options.force, progress=_naming(started))
+        found = stability.record(
+            scene, path, options.method, force=options.force, progress=_naming(started, "stability")
+        )
     if options.json:
         _document(stability.document(found))
     else:
@@ -322,7 +324,11 @@ def _extremes(options: argparse.Namespace) -> int:
     path = Path(options.output or "extremes.h5")
     with _progress(options) as started:
         found = extremes.record(
-            path, options.method, quick=options.quick, force=options.force, progress=_naming(started)
+            path,
+            options.method,
+            quick=options.quick,
+            force=options.force,
+            progress=_naming(started, "extremes"),
         )
     if options.json:
         _document(extremes.document(found))
@@ -333,9 +339,17 @@ def _extremes(options: argparse.Namespace) -> int:
     return 0 if found.passed else 1
 
 
-def _naming(started: Any) -> Callable[[str], None] | None:
-    """A line of progress for each thing that is begun."""
-    return None if started is None else lambda what: started(what, 1)(1)
+def _naming(started: Any, study: str) -> Callable[[str, int, int], None] | None:
+    """A progress bar of pieces, with the name of the one that is measured."""
+    if started is None:
+        return None
+    bars: list[Callable[..., None]] = []
+
+    def named(what: str, done: int, pieces: int) -> None:
+        bars[:] = bars or [started(study, pieces)]
+        bars[0](1 if done else 0, f"{study}: {what}")
+
+    return named
 
 
 def _spending(started: Any, budget: float) -> Callable[[float, str], None] | None:
@@ -374,9 +388,9 @@ def _progress(options: argparse.Namespace) -> Iterator[Any]:
         transient=True,
     )
 
-    def started(label: object, steps: int) -> Callable[[int], None]:
+    def started(label: object, steps: int) -> Callable[..., None]:
         task = bars.add_task(str(label), total=steps)
-        return lambda done: bars.advance(task, done)
+        return lambda done, what=None: bars.update(task, advance=done, description=what)
 
     with bars:
         yield started

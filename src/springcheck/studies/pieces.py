@@ -10,6 +10,9 @@ from springcheck.model import Label
 
 T = TypeVar("T")
 
+Progress = Callable[[str, int, int], None]
+"""Told of the piece that is next, of how many are done and of how many there are."""
+
 
 class Pieces:
     """What an earlier call has finished, and where this one keeps what it finishes.
@@ -19,6 +22,8 @@ class Pieces:
 
     def __init__(self, journal: store.Journal | None = None) -> None:
         self._journal = journal
+        self._progress: Progress | None = None
+        self._expected = 0
         self._finished = journal.tables() if journal else {}
         self.names: list[str] = []
         """Names of the pieces, in the order in which they were asked for."""
@@ -34,14 +39,24 @@ class Pieces:
         if self._journal is not None:
             self._journal.add(table)
 
+    def expect(self, pieces: int, progress: Progress | None) -> None:
+        """So many pieces are asked for from here on."""
+        self._expected, self._progress = pieces, progress
+
     def piece(
         self,
         name: str,
+        what: str,
         measure: Callable[[], T],
         to_table: Callable[[T], store.Table],
         from_table: Callable[[store.Table], T],
     ) -> T:
-        """The piece of this name: taken up where it is finished, else measured and kept."""
+        """The piece of this name: taken up where it is finished, else measured and kept.
+
+        `what` is its name for people.
+        """
+        if self._progress:
+            self._progress(what, len(self.names), self._expected)
         self.names.append(name)
         table = self.finished(name)
         if table is not None:

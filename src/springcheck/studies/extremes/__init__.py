@@ -22,7 +22,7 @@ from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label
 from springcheck.studies.extremes import grid, keeping, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.pieces import Pieces, command
+from springcheck.studies.pieces import Pieces, Progress, command
 from springcheck.studies.stability import propagators
 
 __all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows", "stored"]
@@ -77,7 +77,7 @@ def measure(
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
     pieces: Pieces | None = None,
 ) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
@@ -87,31 +87,27 @@ def measure(
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
     """
-    pieces = pieces or Pieces()
-    cells: list[Cell] = []
+    usable = []
     left_out = []
     for label in engines.match(tuple(methods) or ALL):
-        method = engines.method(label)
-        if "wall-spring" not in method.terms or "particles" not in method.kinds:
-            left_out.append((str(label), "it moves no particles on springs"))
-            continue
-        absent = engines.absence(label.engine) or (
-            None if engines.method(label).adaptive else propagators.absence(label)
-        )
-        if absent:
-            left_out.append((str(label), absent))
-            continue
-        name = f"{keeping.CELLS}{label}"
-        if progress and pieces.finished(name) is None:
-            progress(str(label))
-        cells += pieces.piece(
-            name, partial(of_method, label, quick=quick), partial(keeping.of_cells, name), keeping.to_cells
-        )
-    if not cells:
+        reason = _absence(label)
+        if reason is None:
+            usable.append(label)
+        else:
+            left_out.append((str(label), reason))
+    if not usable:
         raise MethodError("none of these methods is here: " + "; ".join(map(": ".join, left_out)))
+    work: list[tuple[str, Callable[[], list[Cell]]]] = [
+        (str(label), partial(of_method, label, quick=quick)) for label in usable
+    ]
     if not methods:
-        name = f"{keeping.CELLS}refusals"
-        cells += pieces.piece(name, refusals.cells, partial(keeping.of_cells, name), keeping.to_cells)
+        work.append(("refusals", refusals.cells))
+    pieces = pieces or Pieces()
+    pieces.expect(len(work), progress)
+    cells: list[Cell] = []
+    for what, measured in work:
+        name = f"{keeping.CELLS}{what}"
+        cells += pieces.piece(name, what, measured, partial(keeping.of_cells, name), keeping.to_cells)
     return Atlas(
         cells=tuple(cells),
         windows=tuple(windows(cells)),
@@ -120,13 +116,21 @@ def measure(
     )
 
 
+def _absence(label: Label) -> str | None:
+    """Why a method has no cells, or None."""
+    method = engines.method(label)
+    if "wall-spring" not in method.terms or "particles" not in method.kinds:
+        return "it moves no particles on springs"
+    return engines.absence(label.engine) or (None if method.adaptive else propagators.absence(label))
+
+
 def record(
     path: str | Path,
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
     force: bool = False,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Atlas:
     """Like `measure`, kept in a store: one table of cells for each method as it is finished, the document.
 

@@ -8,18 +8,18 @@ steps (`resonance`), and the scenes `two-scales` and `overdamped` what stiffness
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from springcheck import engines, mechanics, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label, Scene
-from springcheck.studies.pieces import Pieces, command
+from springcheck.studies.pieces import Pieces, Progress, command
 from springcheck.studies.stability import costs, keeping, limits, propagators, regions, resonance
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
@@ -38,8 +38,6 @@ __all__ = [
     "sentences",
     "stored",
 ]
-
-T = TypeVar("T")
 
 DOCUMENT = "stability"
 """Name of the study's document in a store."""
@@ -72,7 +70,7 @@ def measure(
     scene: Scene,
     methods: Sequence[str] = (),
     *,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
     pieces: Pieces | None = None,
 ) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
@@ -96,20 +94,21 @@ def measure(
             left_out.append((str(label), absent))
         else:
             usable.append(label)
+    damped = regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ()
+    resonant = [label for label in usable if resonance.serves(scene, label)]
+    family = next((name for name in costs.RATIOS if name == scene.name), None)
+    stiff = [
+        (label, partial(costs.measure, label, family))
+        for label in chosen
+        if family and costs.serves(label, family)
+    ]
     pieces = pieces or Pieces()
-
-    def told(what: str, measured: Callable[[], T]) -> Callable[[], T]:
-        def measure() -> T:
-            if progress:
-                progress(what)
-            return measured()
-
-        return measure
-
+    pieces.expect(len(usable) + len(damped) + len(resonant) + len(stiff), progress)
     found_limits = [
         pieces.piece(
             f"{keeping.LIMITS}{label}",
-            told(f"limit of {label}", partial(limits.measure, label)),
+            f"limit of {label}",
+            partial(limits.measure, label),
             keeping.of_limit,
             keeping.to_limit,
         )
@@ -118,33 +117,32 @@ def measure(
     found_regions = [
         pieces.piece(
             f"{keeping.REGIONS}{label}",
-            told(f"region of {label}", partial(regions.measure, label)),
+            f"region of {label}",
+            partial(regions.measure, label),
             keeping.of_region,
             keeping.to_region,
         )
-        for label in (regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ())
+        for label in damped
     ]
     found_resonances = [
         pieces.piece(
             f"{keeping.RESONANCES}{label}",
-            told(f"resonances of {label}", partial(resonance.measure, scene, label)),
+            f"resonances of {label}",
+            partial(resonance.measure, scene, label),
             keeping.of_resonance,
             keeping.to_resonance,
         )
-        for label in usable
-        if mechanics.split(scene.terms)[1]
-        and engines.method(label).requires == {"springs marked fast"}
-        and not engines.refusal(scene, label)
+        for label in resonant
     ]
     rows = [
         pieces.piece(
             f"{keeping.COSTS}{label}",
-            told(f"cost of stiffness for {label}", partial(costs.measure, label, scene.name)),
+            f"stiffness, {label}",
+            cost,
             partial(keeping.of_costs, str(label)),
             keeping.to_costs,
         )
-        for label in chosen
-        if scene.name in costs.RATIOS and costs.serves(label, scene.name)
+        for label, cost in stiff
     ]
     if not usable and not rows:
         raise MethodError(
@@ -167,7 +165,7 @@ def record(
     methods: Sequence[str] = (),
     *,
     force: bool = False,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
 ) -> Stability:
     """Like `measure`, kept in a store: tables under /stability as they are finished, and the document.
 

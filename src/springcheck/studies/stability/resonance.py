@@ -48,6 +48,13 @@ def fast_frequency(scene: Scene) -> float:
     return float(np.sqrt(np.max(exact.modes(replace(scene, terms=fast)).w2)))
 
 
+def serves(scene: Scene, label: Label) -> bool:
+    """Whether a method takes the scene's fast springs in steps of their own."""
+    fast = mechanics.split(scene.terms)[1]
+    marked = engines.method(label).requires == {"springs marked fast"}
+    return bool(fast) and marked and not engines.refusal(scene, label)
+
+
 def measure(scene: Scene, label: Label) -> Resonance:
     """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
     reason = engines.refusal(scene, label)
