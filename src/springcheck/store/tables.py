@@ -52,10 +52,13 @@ def write(file: Any, table: Table) -> None:
         if table.auxiliary:
             write_attributes(group, {"auxiliary_signals": list(table.auxiliary)})
         if table.log:
-            scales = {name: "log" if name in table.log else "linear" for name in (*table.axes, table.signal)}
+            scale = {name: "log" if name in table.log else "linear" for name in (*table.axes, table.signal)}
+            axes = [scale[name] for name in table.axes]
+            # the plural is silx's, the singular H5Web's
             style = {
-                "axes_scale_type": [scales[name] for name in table.axes],
-                "signal_scale_type": scales[table.signal],
+                "axes_scale_types": axes,
+                "axes_scale_type": axes,
+                "signal_scale_type": scale[table.signal],
             }
             write_attributes(group, {_STYLE: json.dumps(style)})
     for name, column in table.columns.items():
@@ -89,7 +92,7 @@ def read(group: Any, name: str) -> Table:
     signal = str(group.attrs.get("signal", ""))
     axes = tuple(str(axis) for axis in group.attrs.get("axes", ()))
     style = json.loads(group.attrs.get(_STYLE, "{}"))
-    scales = [*style.get("axes_scale_type", ()), style.get("signal_scale_type")]
+    scales = [*style.get("axes_scale_types", ()), style.get("signal_scale_type")]
     return Table(
         name=name,
         columns={column: _values(group[column]) for column in group},
