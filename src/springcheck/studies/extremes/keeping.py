@@ -42,8 +42,7 @@ def of_cells(name: str, cells: Sequence[Cell]) -> Table:
 
 
 def _decades(values: np.ndarray) -> np.ndarray:
-    known = np.isfinite(values) & (values > 0)
-    return np.log10(values, out=np.full_like(values, np.nan), where=known)
+    return np.asarray(np.log10(np.where(np.isfinite(values) & (values > 0), values, np.nan)))
 
 
 def to_cells(table: Table) -> list[Cell]:
