@@ -9,8 +9,8 @@ carries H5Web, with h5grove behind it.  Needs, beside springcheck: `pip install 
 Shown means: a figure with a title whose canvas is not blank, or a grid whose cells, in exact notation, are
 the numbers that h5py reads.  Exit status 1 and the paths, where something is not shown.
 
-Expected, in about four minutes: "0 are not shown".  Seen with jupyterlab-h5web 12.9.0 (H5Web 18.0.0), h5grove
-4.0.0 and Chromium 156.
+Expected, in about six minutes: "0 are not shown".  Seen with jupyterlab-h5web
+12.9.0 (H5Web 18.0.0), h5grove 4.0.0 and Chromium 156.
 """
 
 from __future__ import annotations
