@@ -13,7 +13,7 @@ import pytest
 from springcheck import engines, store
 from springcheck.figures import extremes as figures
 from springcheck.studies import extremes
-from springcheck.studies.extremes import grid, judging, refusals, running
+from springcheck.studies.extremes import grid, judging, keeping, refusals, running
 
 Need = Callable[[str], None]
 METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
@@ -118,4 +118,14 @@ def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() ->
 def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
     atlas = extremes.record(tmp_path / "extremes.h5", ["own:euler"], quick=True)
     assert store.check(tmp_path / "extremes.h5") == []
+    table = store.read_tables(tmp_path / "extremes.h5")["extremes/own:euler"]
+    columns = {name: np.asarray(column) for name, column in table.columns.items()}
+    assert (table.signal, table.axes) == ("outcome_number", ("log10_force", "log10_h_w"))
+    assert [keeping.OUTCOMES[i] for i in columns["outcome_number"]] == [cell.outcome for cell in atlas.cells]
+    for name in ("force", "h_w"):
+        wanted = np.array([cell.parameters[name] for cell in atlas.cells])
+        assert np.array_equal(columns[name], wanted)
+        drawn = np.isfinite(columns[f"log10_{name}"])
+        assert np.array_equal(drawn, (wanted > 0) & np.isfinite(wanted))
+        np.testing.assert_allclose(columns[f"log10_{name}"][drawn], np.log10(wanted[drawn]), rtol=1e-15)
     assert {path.suffix for path in figures.draw(atlas, tmp_path)} == {".png", ".svg"}

@@ -101,7 +101,11 @@ def test_silx_finds_the_default_plot_and_every_observable(tmp_path: Path) -> Non
         comparison = Comparison(labels=("a", "b"), max_difference=np.eye(2))
         journal.add(
             store.Table(
-                name="precision/x", columns={"h": [1.0, 2.0], "e": [3.0, 4.0]}, signal="e", axes=("h",)
+                name="precision/x",
+                columns={"h": [1.0, 2.0], "e": [3.0, 4.0]},
+                signal="e",
+                axes=("h",),
+                log=("h",),
             )
         )
         journal.commit(s, comparison=comparison)
@@ -121,7 +125,10 @@ def test_silx_finds_the_default_plot_and_every_observable(tmp_path: Path) -> Non
                 assert np.array_equal(found.signal[()], values)
                 assert np.array_equal(found.axes[0][()], one.t)
         assert nxdata.get_default(file["comparison"]).is_image
-        assert nxdata.get_default(file["precision/x"]).is_curve
+        table = nxdata.get_default(file["precision/x"])
+        assert table.is_curve
+        assert table.plot_style.axes_scale_types == ("log",)
+        assert table.plot_style.signal_scale_type == "linear"
 
 
 def test_h5dump_of_hdf5_1_10_reads_all_of_it(tmp_path: Path) -> None:

@@ -175,7 +175,9 @@ def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]
         write_attributes(base, {"units_are": REDUCED})
     offsets = {name: _contiguous(file, column) for name, column in found.items()}
     time, step = file[found["time"].path], file[found["step"].path]
-    write_attributes(time, {"unit": unit["time"], "units": unit["time"], "long_name": "t"})
+    write_attributes(
+        time, {"unit": unit["time"], "units": unit["time"], "long_name": _named("t", unit["time"], scene)}
+    )
     for name in found:
         if name in {"time", "step"}:
             continue
@@ -183,13 +185,19 @@ def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]
         two = len(found[name].shape) == 2
         axes = ["time", "."] if two else ["time"]
         write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
-        write_attributes(
-            element["value"], {"unit": unit[name], "units": unit[name], "long_name": f"{name} of {label}"}
-        )
+        if two:
+            write_attributes(element, {"default_slice": [".", "0"]})
+        shown = _named(f"{name} of {label}", unit[name], scene)
+        write_attributes(element["value"], {"unit": unit[name], "units": unit[name], "long_name": shown})
         _link(element, time, step)
     if scene.kind == "particles" and ("q" in found or "p" in found):
         _particles(file, label, scene, found, frames)
     return offsets
+
+
+def _named(text: str, unit: str, scene: Scene) -> str:
+    """What viewers write at an axis: H5Web adds no unit to a long_name, and reduced numbers carry none."""
+    return text if scene.units == "reduced" or unit == "1" else f"{text} ({unit})"
 
 
 def _contiguous(file: Any, column: Column) -> int:

@@ -132,18 +132,16 @@ def _check_tables(file: Any, path: Path) -> None:
 def _plots(file: Any) -> None:
     """/plots: the first particle's q (or p), the energies, of all runs of the most common length."""
     observables = file.get("observables", {})
-    plots = file.create_group("plots")
-    layout.write_attributes(plots, {"NX_class": "NXentry"})
-    made = [name for name in ("q", "p", "energy") if _plot(file, observables, plots, name)]
-    if made:
-        layout.write_attributes(plots, {"default": made[0]})
-        layout.write_attributes(file, {"default": "plots"})
+    drawn = next((name for name in tables.names(file) if "signal" in file[name].attrs), None)
+    if not observables and drawn is None:
         return
-    drawn = [name for name in tables.names(file) if "signal" in file[name].attrs]
-    if drawn:
-        plots[drawn[0].replace("/", " ")] = h5py.SoftLink(f"/{drawn[0]}")
-        layout.write_attributes(plots, {"default": drawn[0].replace("/", " ")})
-        layout.write_attributes(file, {"default": "plots"})
+    plots = file.create_group("plots")
+    made = [name for name in ("q", "p", "energy") if _plot(file, observables, plots, name)]
+    if drawn is not None and not made:
+        made = [drawn.replace("/", " ")]
+        plots[made[0]] = h5py.SoftLink(f"/{drawn}")
+    layout.write_attributes(plots, {"NX_class": "NXentry", "default": made[0]})
+    layout.write_attributes(file, {"default": "plots"})
 
 
 def _plot(file: Any, observables: Any, plots: Any, name: str) -> bool:
@@ -156,9 +154,8 @@ def _plot(file: Any, observables: Any, plots: Any, name: str) -> bool:
     group = plots.create_group(name)
     first = kept[curves[0]]
     title = {"q": "q of the first particle", "p": "p of the first particle", "energy": "total energy"}[name]
-    layout.write_attributes(
-        group, {"NX_class": "NXdata", "signal": curves[0], "axes": ["time"], "title": title}
-    )
+    layout.write_attributes(group, {"NX_class": "NXdata", "signal": curves[0], "axes": ["time"]})
+    group.create_dataset("title", data=title, dtype=h5py.string_dtype("utf-8"))
     if len(curves) > 1:
         layout.write_attributes(group, {"auxiliary_signals": curves[1:]})
     group["time"] = h5py.SoftLink(f"{first.name}/time")
@@ -170,6 +167,6 @@ def _plot(file: Any, observables: Any, plots: Any, name: str) -> bool:
         view = h5py.VirtualLayout((frames,), "<f8")
         view[:] = h5py.VirtualSource(".", value.name, value.shape, "<f8")[:, 0]
         group.create_virtual_dataset(label, view)
-        unit = value.attrs["unit"]
-        layout.write_attributes(group[label], {"units": unit, "long_name": f"{name} of {label}"})
+        shown = {key: value.attrs[key] for key in ("units", "long_name")}
+        layout.write_attributes(group[label], shown)
     return True

@@ -1,8 +1,9 @@
-"""Tables beside the trajectories: one dataset per column, drawn by silx where axes are named."""
+"""Tables beside the trajectories: one dataset per column, drawn by silx and H5Web where a signal is named."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,6 +14,8 @@ import numpy as np
 from springcheck.model import Comparison, Verdict
 from springcheck.store.layout import RESERVED, Scalar, write_attributes
 
+_STYLE = "SILX_style"
+"""The attribute from which silx and H5Web take scales."""
 _PASSED = {None: -1, False: 0, True: 1}
 
 
@@ -21,7 +24,8 @@ class Table:
     """Columns of one or two dimensions under a name such as ``precision/own:euler``.
 
     Numbers, truth values or text.  `units` by column; `signal` and `axes` name the columns that a viewer
-    draws ("." for an axis without one).
+    draws ("." for an axis without one), `auxiliary` those beside the signal, `log` those of signal and axes
+    that want a logarithmic scale.
     """
 
     name: str
@@ -30,6 +34,8 @@ class Table:
     attributes: Mapping[str, Scalar] = field(default_factory=dict)
     signal: str = ""
     axes: tuple[str, ...] = ()
+    auxiliary: tuple[str, ...] = ()
+    log: tuple[str, ...] = ()
 
 
 def write(file: Any, table: Table) -> None:
@@ -43,6 +49,18 @@ def write(file: Any, table: Table) -> None:
         write_attributes(group, {"NX_class": "NXdata", "signal": table.signal})
         if table.axes:
             write_attributes(group, {"axes": list(table.axes)})
+        if table.auxiliary:
+            write_attributes(group, {"auxiliary_signals": list(table.auxiliary)})
+        if table.log:
+            scale = {name: "log" if name in table.log else "linear" for name in (*table.axes, table.signal)}
+            axes = [scale[name] for name in table.axes]
+            # the plural is silx's, the singular H5Web's
+            style = {
+                "axes_scale_types": axes,
+                "axes_scale_type": axes,
+                "signal_scale_type": scale[table.signal],
+            }
+            write_attributes(group, {_STYLE: json.dumps(style)})
     for name, column in table.columns.items():
         values = np.asarray(column)
         if values.dtype.kind in "UO":
@@ -70,14 +88,20 @@ def digest(group: Any) -> str:
 
 def read(group: Any, name: str) -> Table:
     """A table as it was written."""
-    left = {"kind", "NX_class", "signal", "axes", "sha256"}
+    left = {"kind", "NX_class", "signal", "axes", "auxiliary_signals", _STYLE, "sha256"}
+    signal = str(group.attrs.get("signal", ""))
+    axes = tuple(str(axis) for axis in group.attrs.get("axes", ()))
+    style = json.loads(group.attrs.get(_STYLE, "{}"))
+    scales = [*style.get("axes_scale_types", ()), style.get("signal_scale_type")]
     return Table(
         name=name,
         columns={column: _values(group[column]) for column in group},
         units={column: group[column].attrs["unit"] for column in group if "unit" in group[column].attrs},
         attributes={key: scalar(value) for key, value in group.attrs.items() if key not in left},
-        signal=str(group.attrs.get("signal", "")),
-        axes=tuple(str(axis) for axis in group.attrs.get("axes", ())),
+        signal=signal,
+        axes=axes,
+        auxiliary=tuple(str(column) for column in group.attrs.get("auxiliary_signals", ())),
+        log=tuple(column for column, scale in zip((*axes, signal), scales, strict=False) if scale == "log"),
     )
 
 
@@ -159,6 +183,7 @@ def of_comparison(comparison: Comparison) -> Table:
         units={"max_difference": "1"},
         attributes={"about": "largest difference over all frames, in units of the start"},
         signal="max_difference",
+        log=("max_difference",),
     )
 
 

@@ -218,6 +218,7 @@ def of_points(scene: Scene, method: str, points: Sequence[Point], seconds: float
         },
         signal="max_error",
         axes=("run_seconds",),
+        log=("run_seconds", "max_error"),
     )
 
 

@@ -36,16 +36,23 @@ def of_limit(x: Limit) -> Table:
         attributes={name: getattr(x, name) for name in _OF_LIMIT},
         signal="radius",
         axes=("h_w",),
+        auxiliary=("radius_predicted",),
+        log=("h_w", "radius"),
     )
 
 
 def of_region(x: Region) -> Table:
-    """A region: radii and stability (j, i) by damping ratio (j,) and h w (i,)."""
+    """A region: radii and stability (j, i) by damping ratio (j,) and h w (i,).
+
+    Its axes are decades, evenly spaced, because H5Web draws every image on even axes.
+    """
     return Table(
         name=f"{REGIONS}{x.method}",
         columns={
             "damping_ratio": x.ratio,
             "h_w": x.turn,
+            "log10_damping_ratio": np.log10(x.ratio),
+            "log10_h_w": np.log10(x.turn),
             "radius": x.radius,
             "radius_predicted": x.radius_predicted,
             "stable": x.stable,
@@ -53,7 +60,9 @@ def of_region(x: Region) -> Table:
         },
         attributes={name: getattr(x, name) for name in _OF_REGION},
         signal="radius",
-        axes=("damping_ratio", "h_w"),
+        axes=("log10_damping_ratio", "log10_h_w"),
+        auxiliary=("radius_predicted",),
+        log=("radius",),
     )
 
 
@@ -71,6 +80,7 @@ def of_resonance(x: Resonance) -> Table:
         attributes={"scene": x.scene},
         signal="radius",
         axes=("h_w",),
+        auxiliary=("radius_predicted",),
     )
 
 
