@@ -4,8 +4,8 @@
 
 A store of ours, the same without its seal, an exported trajectory and files in the oldest and newest format
 of libhdf5 are damaged in turn: bytes flipped, ranges overwritten, ends cut off, datasets and attributes
-removed or replaced by others of the wrong type.  Each is read by `read`, `summary`, `read_foreign` and
-`check`.  Every one must give a result or a StoreError of one line, within the time limit; a result that
+removed or replaced by others of the wrong type.  Each is read by `read`, `summary`, `read_tables`,
+`read_foreign` and `check`.  Every one must give a result or a StoreError of one line, within the time limit; a result that
 differs from the numbers that were stored must not come out of a file that still carries its seal.
 
 Why the files without a seal are tried in a process of their own: with HDF5 2.0 about one damaged file in
@@ -50,7 +50,11 @@ def originals(folder: Path) -> dict[str, bytes]:
                 q, p = rng.normal(size=(2, scene.frames, 2))
                 draft.append(np.linspace(0, 6, scene.frames), q, p, p[:, 0])
                 draft.finish({"scheme": "explicit-euler"})
-        journal.add(store.Table(name="precision/x", columns={"h": [0.1, 0.2], "why": ["a", "b"]}, signal="h"))
+        journal.add(
+            store.Table(
+                name="precision/x", columns={"h": [0.1, 0.2], "why": ["a", "b"]}, signal="h", log=("h",)
+            )
+        )
         journal.commit(scene, documents={"report": "text"})
     store.export(folder / "s.h5", LABEL, folder / "e.h5md")
     known = seal.find(folder / "s.h5")
@@ -118,7 +122,13 @@ def mutilate(file: Any, rng: random.Random) -> None:
 def attempt(path: Path, kind: str, truth: bytes) -> list[str]:
     """What each reader made of a file: "read", "told", or what must not happen."""
     made = []
-    readers: list[Callable[[Path], object]] = [store.read, store.summary, store.read_foreign, store.check]
+    readers: list[Callable[[Path], object]] = [
+        store.read,
+        store.summary,
+        store.read_tables,
+        store.read_foreign,
+        store.check,
+    ]
     for reader in readers:
         try:
             result = reader(path)
