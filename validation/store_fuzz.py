@@ -5,8 +5,9 @@
 A store of ours, the same without its seal, an exported trajectory and files in the oldest and newest format
 of libhdf5 are damaged in turn: bytes flipped, ranges overwritten, ends cut off, datasets and attributes
 removed or replaced by others of the wrong type.  Each is read by `read`, `summary`, `read_tables`,
-`read_foreign` and `check`.  Every one must give a result or a StoreError of one line, within the time limit; a result that
-differs from the numbers that were stored must not come out of a file that still carries its seal.
+`read_foreign` and `check`.  Every one must give a result or a StoreError of one line, within the time
+limit; a result that differs from the numbers that were stored must not come out of a file that still carries
+its seal.
 
 Why the files without a seal are tried in a process of their own: with HDF5 2.0 about one damaged file in
 1400 sends libhdf5 into a loop that no exception ends, whoever reads it.
