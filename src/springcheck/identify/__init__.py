@@ -6,7 +6,7 @@ fit is the yardstick.  What single steps leave over names the arithmetic.
 """
 
 from springcheck.identify.report import identify
-from springcheck.identify.result import NONE, Identification
+from springcheck.identify.result import Candidate, Identification
 from springcheck.identify.stepper import identify_stepper, load_stepper
 
-__all__ = ["NONE", "Identification", "identify", "identify_stepper", "load_stepper"]
+__all__ = ["Candidate", "Identification", "identify", "identify_stepper", "load_stepper"]

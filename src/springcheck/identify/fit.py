@@ -34,6 +34,8 @@ class Map:
     """Weight (f - 1,) of each pair of states."""
     conditioned: bool
     """Whether the states span the plane beyond their noise."""
+    whole: bool = False
+    """Whether entries and covariance are those of the orbit of all states, not of pairs."""
     once: bool | None = None
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show."""
@@ -154,6 +156,7 @@ def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: 
         covariance=whole.covariance,
         z=found.z - whole.centre,
         centre=found.centre + whole.centre * found.size,
+        whole=True,
         once=whole.once,
     )
 

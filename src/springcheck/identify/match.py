@@ -19,6 +19,9 @@ CHANCE = 1e-7
 STRIDES = 12, 100
 """Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
 
+WHOLE = 2
+"""Roundings of a step that act on a whole state and not on what a step adds to it."""
+
 NEAR = 0.02
 """Distance of entries, of size 1, within which a first guess is worth refining."""
 
@@ -223,7 +226,7 @@ def _refine(
 ) -> list[Match]:
     """Gauss-Newton on the four entries, weighted by their covariance; all first guesses at once."""
     observed = found.entries.reshape(4)
-    weights = _weights(scheme, found, terms, s)
+    weights = _weights(scheme, found, terms, s, unknowns[0], unknowns[1])
 
     def log_masses(values: Extended, strides: Floats) -> Extended:
         if terms.log_stiffness is None:
@@ -301,16 +304,19 @@ def _inverse(normal: Floats) -> Floats:
     return np.asarray(np.linalg.pinv(even, hermitian=True) / scale[:, :, None] / scale[:, None, :])
 
 
-def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats) -> Floats:
+def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats, a: Extended, friction: Extended) -> Floats:
     """Inverse covariances (c, 4, 4): of the fit, of coefficients rounded once, of the interval.
 
     The rounding of h k or h/m is the same in every step, so no number of pairs averages it away: an entry
-    of the map over s steps is uncertain by the roundings of its path times s, whatever the fit says.
+    of the map over s steps is uncertain by the roundings of its path times what s steps add to a state,
+    s h w of it and no more than s, whatever the fit says.  A factor near 1, of friction or of a velocity
+    that is rebuilt over the step, is rounded as well, and acts on the whole state in each of s steps.
     """
     b = np.abs(found.entries.astype(np.float64))
     largest = max(1.0, float(np.max(b)))
     path = 1 if scheme.flow else roundings(scheme)
-    coherent = terms.rounding * path * s * largest
+    added = np.minimum(np.sqrt(np.abs(a)) + np.abs(friction), 1).astype(np.float64)
+    coherent = terms.rounding * (path * added + WHOLE) * s * largest
     clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
     bias = np.diag(np.repeat(terms.bias * found.residual, 2) ** 2)
     total = found.covariance + clock + bias + coherent[:, None, None] ** 2 * np.eye(4)

@@ -18,8 +18,14 @@ BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
 last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
 
+SINGLE = 2.0**-24
+"""Unit roundoff of single precision."""
+
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
+
+EXCLUDED = 25.0
+"""By which chi-squared exceeds that of the best where a scheme is excluded: five standard errors."""
 
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
@@ -109,18 +115,20 @@ def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
 
 def find(
     record: Record, maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], Joint | None, list[Terms]]:
-    """All accepted schemes, and the plainest; without friction first, and with it where nothing fits.
+) -> tuple[list[Joint], bool, list[Terms]]:
+    """All schemes that the states do not exclude, the plainest first, and True; or all tried, and False.
 
-    Coefficients are taken as rounded in double precision first.  Where the states are coarser than that
-    the arithmetic may have been so too: a second round allows coefficients of single precision to numbers
-    of single precision, and a last one a bias of the size of what single steps leave over.
+    Without friction first, and with it where nothing fits.  Coefficients are taken as rounded in double
+    precision first, unless the states show that the arithmetic was coarser, or are too few to show that it
+    was not.  A second round allows coefficients of single precision to numbers that are coarser than double,
+    and a last one a bias of the size of what single steps leave over.
     """
     residual = max(float(np.max(found.residual)) for found in maps)
     finely = record.q_storage.name == record.v_storage.name == "double"
-    rounds = [(ROUNDING, 0.0)]
+    rounds = [(ROUNDING, 0.0)] if finely or all(found.whole for found in maps) else []
     if residual > 2.0**-40 and not finely:
-        rounds.append((2.0**-24, 0.0))
+        rounds.append((SINGLE, 0.0))
+    rounds = rounds or [(ROUNDING, 0.0)]
     if residual > COARSE:
         rounds.append((ROUNDING, BIAS))
     tried: list[Joint] = []
@@ -132,14 +140,29 @@ def find(
             terms = [replace(what, damped=damped, rounding=rounding, bias=bias) for what in base]
             for strides in ranges:
                 joints = search(maps, terms, strides)
-                accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
+                accepted = [x for x in joints if x.accepted]
                 if accepted:
-                    # what is 25 worse in chi-squared than the best, five standard errors, is excluded too
-                    best = min(x.chi2 for x in accepted)
-                    accepted = [x for x in accepted if x.chi2 <= best + 25]
-                    return accepted, accepted[0], terms
+                    if strides is few and not bias and (_open_ended(accepted) or not (finely or damped)):
+                        accepted += [x for x in search(maps, terms, many) if x.accepted]
+                    if not damped and min(x.chi2 for x in accepted) > EXCLUDED:
+                        friction = [replace(what, damped=True) for what in terms]
+                        accepted += [x for x in search(maps, friction, strides) if x.accepted]
+                    return _likely(accepted), True, terms
                 tried += joints if not damped and strides is not many else []
-    return tried, None, base
+    return tried, False, base
+
+
+def _open_ended(accepted: list[Joint]) -> bool:
+    """Whether more steps to a frame than were looked at may fit as well: the error of a step falls with
+    their number, and where the exact flow fits, any scheme does from some number on."""
+    return len(accepted) > 1 or any(x.scheme == "exact" or 2 * x.stride > STRIDES[0] for x in accepted)
+
+
+def _likely(accepted: list[Joint]) -> list[Joint]:
+    """Those of which the best is not five standard errors better, each once, the plainest first."""
+    best = min(x.chi2 for x in accepted)
+    each = {(x.scheme, x.stride): x for x in sorted(accepted, key=lambda x: -x.chi2)}
+    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
 
 
 def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> bool:
@@ -193,6 +216,17 @@ def disagreements(
                 f"(relative difference {off:+.2e}, known to {error:.0e})"
             )
     return out
+
+
+def separation(maps: list[Map], one: Joint, other: Joint) -> float:
+    """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
+    total = 0.0
+    for found, a, b in zip(maps, one.parts, other.parts, strict=True):
+        off = np.array(a.predicted) - np.array(b.predicted)
+        error = np.sqrt(np.diag(found.covariance))
+        even = found.covariance / error[:, None] / error[None, :]
+        total += float((off / error) @ np.linalg.pinv(even, hermitian=True) @ (off / error))
+    return math.sqrt(max(total, 0.0))
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:
