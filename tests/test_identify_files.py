@@ -128,8 +128,13 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "none (adaptive or unknown)" in text
-    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588
-    assert "would fit if velocities were about 0.59" in text
+    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588; a scheme that is not has one alone
+    assert "several schemes would fit" in text
+    assert "exact: 0.595733; velocity-verlet: 0.566082; position-verlet: 0.611256" in text
+    t, q, v = motion("semi-implicit-euler", 3)
+    assert main(["identify", written(t, q, 1.7 * v)]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "semi-implicit-euler, 3 steps a frame would fit if velocities were 0.588235 times as large" in text
 
 
 def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
@@ -142,7 +147,8 @@ def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.Captur
     first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
     assert lines[first + 1].startswith("        ")
     text = " ".join(" ".join(lines).split())
-    assert text.startswith("bead: not told apart one of: exact; velocity-verlet, 1 to 100 steps a frame;")
+    assert text.startswith("bead: several schemes, which the data cannot tell apart one of: exact; velocity-")
+    assert "; rk4, 1 to 100 steps a frame;" in text
     assert "no error of a step is visible" in text
 
 

@@ -13,6 +13,9 @@ from springcheck.model import Extended, Floats
 FEWEST = 5
 """Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
 
+LEAST = 2.0**-102
+"""Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
+
 SAMPLE = 500
 """Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
 
@@ -127,6 +130,16 @@ def _states(x: ArrayLike, name: str, frames: int) -> Floats:
     return out
 
 
+def _alive(positions: Floats, moving: Floats) -> int:
+    """Frames until a motion has died down so far that single precision keeps no relative precision of it.
+
+    From there on products underflow, and what is left is no scheme's step any more.
+    """
+    alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
+    last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
+    return last + 1 if last + 1 >= FEWEST else len(positions)
+
+
 def _masses(mass: ArrayLike | None, n: int) -> Floats | None:
     if mass is None:
         return None
@@ -180,14 +193,16 @@ def read(
         quantum = v_storage.quantum(moving / masses)
     else:
         quantum = v_storage.quantum(moving) / unit.astype(np.float64)
+    finely = q_storage.name == v_storage.name == "double"
+    kept = slice(None if finely else _alive(positions, moving))
     return Record(
         interval=interval,
         jitter=jitter,
         clock=clock,
-        q=positions.astype(np.longdouble),
-        v=moving.astype(np.longdouble) / unit,
-        q_quantum=q_storage.quantum(positions),
-        v_quantum=quantum,
+        q=positions[kept].astype(np.longdouble),
+        v=moving[kept].astype(np.longdouble) / unit,
+        q_quantum=q_storage.quantum(positions[kept]),
+        v_quantum=quantum[kept],
         q_storage=q_storage,
         v_storage=v_storage,
         mass=masses,

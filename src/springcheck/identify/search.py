@@ -129,33 +129,55 @@ def find(
     if residual > 2.0**-40 and not finely:
         rounds.append((SINGLE, 0.0))
     rounds = rounds or [(ROUNDING, 0.0)]
-    if residual > COARSE:
+    # what is one orbit, rounded once, has no bias of its arithmetic
+    if residual > COARSE and not all(found.whole for found in maps):
         rounds.append((ROUNDING, BIAS))
     tried: list[Joint] = []
     first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
     few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
-    for damped, ranges in ((False, [*first, few]), (True, [*first, few]), (False, [many])):
-        # what is coarse hides many strides at once, so that none of them could be named
-        for rounding, bias in rounds if many not in ranges else [x for x in rounds if not x[1]]:
+    # coarse numbers make room for other schemes' few steps, so there many steps are tried before a wider room
+    close = [*first, few] if finely else [*first, few, many]
+    for damped, ranges in ((False, close), (True, close), (False, [many] if finely else [])):
+        for rounding, bias in rounds:
             terms = [replace(what, damped=damped, rounding=rounding, bias=bias) for what in base]
             for strides in ranges:
+                # what is coarse hides many strides at once, so that none of them could be named
+                if bias and finely and strides is many:
+                    continue
                 joints = search(maps, terms, strides)
                 accepted = [x for x in joints if x.accepted]
                 if accepted:
-                    if strides is few and not bias and (_open_ended(accepted) or not (finely or damped)):
-                        accepted += [x for x in search(maps, terms, many) if x.accepted]
-                    if not damped and min(x.chi2 for x in accepted) > EXCLUDED:
-                        friction = [replace(what, damped=True) for what in terms]
-                        accepted += [x for x in search(maps, friction, strides) if x.accepted]
+                    accepted += _further(maps, terms, accepted, strides, few, many, coarse=not finely)
                     return _likely(accepted), True, terms
                 tried += joints if not damped and strides is not many else []
     return tried, False, base
 
 
-def _open_ended(accepted: list[Joint]) -> bool:
-    """Whether more steps to a frame than were looked at may fit as well: the error of a step falls with
-    their number, and where the exact flow fits, any scheme does from some number on."""
-    return len(accepted) > 1 or any(x.scheme == "exact" or 2 * x.stride > STRIDES[0] for x in accepted)
+def _further(
+    maps: list[Map],
+    terms: list[Terms],
+    accepted: list[Joint],
+    strides: range,
+    few: range,
+    many: range,
+    *,
+    coarse: bool,
+) -> list[Joint]:
+    """What the states do not exclude either, beside what was accepted of these strides.
+
+    Where friction is hardly needed, it may be there.  More steps to a frame may fit as well as few: the
+    error of a step falls with their number, and where the exact flow fits, so does any scheme from some
+    number on.  In double precision that is looked at only where few steps leave a choice.
+    """
+    out: list[Joint] = []
+    damped, bias = terms[0].damped, terms[0].bias
+    open_ended = len(accepted) > 1 or any(x.scheme == "exact" or 2 * x.stride > STRIDES[0] for x in accepted)
+    if strides is few and (coarse or not bias) and (open_ended or (coarse and not damped)):
+        out += [x for x in search(maps, terms, many) if x.accepted]
+    if not damped and not (bias and not coarse) and min(x.chi2 for x in accepted) > EXCLUDED:
+        friction = [replace(what, damped=True) for what in terms]
+        out += [x for x in search(maps, friction, strides) if x.accepted]
+    return out
 
 
 def _likely(accepted: list[Joint]) -> list[Joint]:
