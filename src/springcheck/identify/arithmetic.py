@@ -80,7 +80,7 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
             precision="double",
             note="velocities carry the rounding of positions over the step: rebuilt as a difference of them",
         )
-    if record.q_storage.name == record.v_storage.name == "double":
+    if record.fine:
         if scheme.flow or not visible:
             return Defect(ulp=ulp, precision="")
         name, note = coarse.kinematic(record, j, found, match)

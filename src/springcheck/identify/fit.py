@@ -131,10 +131,9 @@ def fit(record: Record, j: int) -> Map:
         weight=weight,
         conditioned=conditioned,
     )
-    names = {record.q_storage.name, record.v_storage.name}
-    if names == {"double"} or not conditioned:
+    if record.fine or not conditioned:
         return found
-    return _seen_through_storage(found, quanta, inverse, text=any(name.startswith("text") for name in names))
+    return _seen_through_storage(found, quanta, inverse, text=record.text)
 
 
 def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: bool) -> Map:

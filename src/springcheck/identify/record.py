@@ -63,6 +63,16 @@ class Record:
     mass: Floats | None
     momenta: bool
 
+    @property
+    def fine(self) -> bool:
+        """Whether all numbers have the digits of double precision."""
+        return self.q_storage.name == self.v_storage.name == "double"
+
+    @property
+    def text(self) -> bool:
+        """Whether some numbers were written as decimal text of few digits."""
+        return any(x.name.startswith("text") for x in (self.q_storage, self.v_storage))
+
 
 def storage(x: Floats) -> Storage:
     """How x was written down, from the numbers themselves."""

@@ -24,6 +24,7 @@ from springcheck.identify.search import (
     difference,
     disagreements,
     find,
+    frictionless,
     numbers,
     search,
     separation,
@@ -211,7 +212,7 @@ def _known(
     return Identification(
         verdict="named" if scheme else "not told apart",
         scheme=scheme,
-        aliases=(*aliases(scheme), *([LEAPFROG[scheme]] if scheme in LEAPFROG else [])) if scheme else (),
+        aliases=_other_names(scheme, damped=_damped(joints)) if scheme else (),
         candidates=candidates,
         step=float(record.interval) / stride if stride else math.nan,
         stride=stride,
@@ -230,6 +231,20 @@ def _known(
     )
 
 
+def _other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
+    leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
+    still = [] if damped else [f"{name} without friction" for name in frictionless(scheme)]
+    return (*aliases(scheme), *leapfrog, *still)
+
+
+def _hidden_friction(record: Record, found: Map) -> float:
+    """Largest rate c/m [1/T] that the map's determinant leaves room for: five standard errors of it."""
+    gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
+    error = math.sqrt(float(gradient @ found.covariance @ gradient))
+    loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
+    return (loss + 5 * error) / abs(float(record.interval))
+
+
 def _common(values: Sequence[T]) -> T | None:
     """The value that all are, or None."""
     return values[0] if len(set(values)) == 1 else None
@@ -243,7 +258,7 @@ def _candidate(record: Record, moving: list[int], joint: Joint) -> Candidate:
     omega, stiffness, friction = numbers(record, moving, joint)
     return Candidate(
         scheme=joint.scheme,
-        aliases=aliases(joint.scheme),
+        aliases=_other_names(joint.scheme, damped=_damped([joint])),
         stride=joint.stride,
         step=float(record.interval) / joint.stride,
         turns=max(part.turns for part in joint.parts),
@@ -268,6 +283,12 @@ def _remarks(
         rates = [candidates[0].friction, *([] if len(joints) == 1 else [candidates[-1].friction])]
         shown = " or ".join(dict.fromkeys(", ".join(f"{x:.6g}" for x in rate) for rate in rates))
         out.append(f"the motion is damped at a rate c/m of {shown}")
+    elif not record.fine:
+        most = max(_hidden_friction(record, found) for found in maps)
+        with_it = {name: frictionless(name) for name in dict.fromkeys(x.scheme for x in candidates)}
+        same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
+        if same:
+            out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
     if any(x.turns for x in candidates):
         might = "makes" if all(x.turns for x in candidates) else "may make"
         out.append(
@@ -282,9 +303,7 @@ def _untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_s
     """Why several schemes or numbers of steps are left, and what more the states would have to show."""
     plainest = joints[0]
     if plainest.scheme == "exact":
-        why = (
-            "no error of a step is visible: fine enough steps of many schemes come as near to the exact flow"
-        )
+        why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
         told = ["more digits", "a larger step"]
     else:
         least, nearest = min(

@@ -75,6 +75,18 @@ def aliases(name: str) -> tuple[str, ...]:
 
 
 @cache
+def frictionless(name: str) -> tuple[str, ...]:
+    """Schemes with a friction of their own whose map is this one's where there is none."""
+    a, none = np.array([0.3, 1.1, 2.9], dtype=np.longdouble), np.zeros(3, dtype=np.longdouble)
+    own = unit_matrix(SCHEMES[name], a, none)
+    return tuple(
+        scheme.name
+        for scheme in OWN_FRICTION
+        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, none) - own)) < 1e-15
+    )
+
+
+@cache
 def distinct() -> tuple[str, ...]:
     """One name of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
     out: list[str] = []
@@ -113,70 +125,95 @@ def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
     ]
 
 
+FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Room:
+    """What is allowed for beside the numbers' own uncertainty, and the strides looked at, in turn."""
+
+    damped: bool = False
+    rounding: float = ROUNDING
+    bias: float = 0.0
+    strides: tuple[range, ...] = (FEW,)
+
+
 def find(
     record: Record, maps: list[Map], base: list[Terms], stride: int | None
 ) -> tuple[list[Joint], bool, list[Terms]]:
     """All schemes that the states do not exclude, the plainest first, and True; or all tried, and False.
 
-    Without friction first, and with it where nothing fits.  Coefficients are taken as rounded in double
-    precision first, unless the states show that the arithmetic was coarser, or are too few to show that it
-    was not.  A second round allows coefficients of single precision to numbers that are coarser than double,
-    and a last one a bias of the size of what single steps leave over.
+    What is plainer comes first, and ends the search where it fits.
     """
     residual = max(float(np.max(found.residual)) for found in maps)
-    finely = record.q_storage.name == record.v_storage.name == "double"
-    rounds = [(ROUNDING, 0.0)] if finely or all(found.whole for found in maps) else []
-    if residual > 2.0**-40 and not finely:
-        rounds.append((SINGLE, 0.0))
-    rounds = rounds or [(ROUNDING, 0.0)]
-    # what is one orbit, rounded once, has no bias of its arithmetic
-    if residual > COARSE and not all(found.whole for found in maps):
-        rounds.append((ROUNDING, BIAS))
+    whole = all(found.whole for found in maps)
+    first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
     tried: list[Joint] = []
-    first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
-    few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
-    # coarse numbers make room for other schemes' few steps, so there many steps are tried before a wider room
-    close = [*first, few] if finely else [*first, few, many]
-    for damped, ranges in ((False, close), (True, close), (False, [many] if finely else [])):
-        for rounding, bias in rounds:
-            terms = [replace(what, damped=damped, rounding=rounding, bias=bias) for what in base]
-            for strides in ranges:
-                # what is coarse hides many strides at once, so that none of them could be named
-                if bias and finely and strides is many:
-                    continue
+    for rooms in _plan(fine=record.fine, text=record.text, whole=whole, residual=residual):
+        accepted: list[Joint] = []
+        for room in rooms:
+            terms = [
+                replace(what, damped=room.damped, rounding=room.rounding, bias=room.bias) for what in base
+            ]
+            for strides in (*first, *room.strides):
                 joints = search(maps, terms, strides)
-                accepted = [x for x in joints if x.accepted]
-                if accepted:
-                    accepted += _further(maps, terms, accepted, strides, few, many, coarse=not finely)
-                    return _likely(accepted), True, terms
-                tried += joints if not damped and strides is not many else []
+                fitting = [x for x in joints if x.accepted]
+                if fitting:
+                    further = strides is FEW and (MANY in room.strides or not room.bias)
+                    accepted += fitting
+                    accepted += _further(maps, terms, fitting, coarse=not record.fine) if further else []
+                    break
+                tried += joints if not room.damped and strides is not MANY else []
+        if accepted:
+            return _likely(accepted), True, terms
     return tried, False, base
 
 
-def _further(
-    maps: list[Map],
-    terms: list[Terms],
-    accepted: list[Joint],
-    strides: range,
-    few: range,
-    many: range,
-    *,
-    coarse: bool,
-) -> list[Joint]:
-    """What the states do not exclude either, beside what was accepted of these strides.
+def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[Room]]:
+    """What is allowed for, the plainest first; what stands together is equally plain.
 
-    Where friction is hardly needed, it may be there.  More steps to a frame may fit as well as few: the
-    error of a step falls with their number, and where the exact flow fits, so does any scheme from some
-    number on.  In double precision that is looked at only where few steps leave a choice.
+    Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
+    unless the states show that the arithmetic was coarser, or are too few to show that it was not; text
+    does not show it, so there single precision is as plain as friction.  A bias of the size of what single
+    steps leave over comes last: what is one orbit, rounded once, has none.  Coarse numbers make room for
+    other schemes' few steps, so there many are tried before a wider room; with a bias many hide at once, so
+    that none could be named.
+    """
+    biased = [BIAS] if residual > COARSE and not whole else []
+    if fine:
+        rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
+        return [*rooms, [Room(strides=(MANY,))]]
+    near = (FEW, MANY)
+    double, double_damped, single, single_damped = (
+        Room(damped=damped, rounding=rounding, strides=near)
+        for rounding in (ROUNDING, SINGLE)
+        for damped in (False, True)
+    )
+    coarse = residual > 2.0**-40
+    out: list[list[Room]] = []
+    if whole or not coarse:
+        out += [[double], [double_damped, single] if text and coarse else [double_damped]]
+    if coarse:
+        out += [[single], [single_damped]]
+    return out + [
+        [Room(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
+    ]
+
+
+def _further(maps: list[Map], terms: list[Terms], accepted: list[Joint], *, coarse: bool) -> list[Joint]:
+    """What the states do not exclude either, beside what was accepted of few steps to a frame.
+
+    More of them may fit as well: the error of a step falls with their number, and where the exact flow
+    fits, so does any scheme from some number on.  In double precision that is looked at only where few
+    steps leave a choice.  Friction that is hardly needed may still be there.
     """
     out: list[Joint] = []
-    damped, bias = terms[0].damped, terms[0].bias
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or 2 * x.stride > STRIDES[0] for x in accepted)
-    if strides is few and (coarse or not bias) and (open_ended or (coarse and not damped)):
-        out += [x for x in search(maps, terms, many) if x.accepted]
-    if not damped and not (bias and not coarse) and min(x.chi2 for x in accepted) > EXCLUDED:
+    if open_ended or (coarse and not terms[0].damped):
+        out += [x for x in search(maps, terms, MANY) if x.accepted]
+    if not terms[0].damped and min(x.chi2 for x in accepted) > EXCLUDED:
         friction = [replace(what, damped=True) for what in terms]
-        out += [x for x in search(maps, friction, strides) if x.accepted]
+        out += [x for x in search(maps, friction, FEW) if x.accepted]
     return out
 
 
@@ -222,13 +259,15 @@ def disagreements(
 ) -> list[str]:
     """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
 
-    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.
+    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  Text does
+    not show whether h k and h/m were rounded to single precision, and the state with them.
     """
     _, stiffness, _ = numbers(record, moving, joint)
     path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        error += 8 * SINGLE if record.text else 0.0
         pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
         error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
         off = k / float(stated[j]) - 1 if stated[j] else math.inf
