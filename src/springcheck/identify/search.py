@@ -208,7 +208,7 @@ def _further(maps: list[Map], terms: list[Terms], accepted: list[Joint], *, coar
     steps leave a choice.  Friction that is hardly needed may still be there.
     """
     out: list[Joint] = []
-    open_ended = len(accepted) > 1 or any(x.scheme == "exact" or 2 * x.stride > STRIDES[0] for x in accepted)
+    open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
     if open_ended or (coarse and not terms[0].damped):
         out += [x for x in search(maps, terms, MANY) if x.accepted]
     if not terms[0].damped and min(x.chi2 for x in accepted) > EXCLUDED:
