@@ -159,6 +159,80 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
     assert any("more digits" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("form", ["single", "text"])
+@pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])
+def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_called_another(
+    name: str, form: str
+) -> None:
+    rng = np.random.default_rng(31)
+    named = 0
+    for i in range(4):
+        made = case(name, rng, stride=1 + 5 * i)
+        coarse = {"single": single, "text": text}[form]
+        found = identify(made.t, coarse(made.q), coarse(made.p), **made.names)
+        assert (name, made.stride) in [(x.scheme, x.stride) for x in found.candidates], found
+        assert found.scheme in (name, None)
+        assert (found.scheme is None) == (len(schemes(found)) > 1)
+        assert (found.verdict == "named") == (found.scheme is not None)
+        named += found.scheme == name
+    assert named > 0
+
+
+def test_all_states_together_show_what_pairs_of_them_do_not() -> None:
+    # RK4 loses a**3/72 of its area in a step, 1e-8 here, and single precision rounds at 6e-8: an eighth of
+    # a rounding in each of 200 frames, which by pairs of them alone would be 2 standard errors
+    made = case("rk4", np.random.default_rng(7), frames=201, lowest=0.02)
+    x = 0.095
+    k = made.m * (x / made.h) ** 2
+    q, p = [made.q[0]], [made.p[0]]
+    for _ in range(200):
+        a, b = step(SCHEMES["rk4"], q[-1], p[-1], h=made.h, m=made.m, force=lambda q, p: -k * q)
+        q.append(a)
+        p.append(b)
+    found = identify(made.t, single(np.array(q)), single(np.array(p)), mass=made.m, stiffness=k)
+    assert (found.scheme, found.stride) == ("rk4", 1)
+
+
+def test_a_name_that_several_share_is_null_in_the_document_with_what_would_tell_them_apart() -> None:
+    made = case("position-verlet", np.random.default_rng(33), lowest=0.3)
+    document = json.loads(json.dumps(identify(made.t, made.q, made.p, mass=made.m).document()))
+    assert (document["verdict"], document["scheme"], document["nearest"]) == ("not told apart", None, None)
+    assert (document["stride"], document["step"]) == (1, pytest.approx(made.h))
+    assert (document["omega"], document["stiffness"]) == (None, None)
+    assert [x["scheme"] for x in document["candidates"]] == ["position-verlet", "implicit-midpoint"]
+    assert document["candidates"][0]["stiffness"] == pytest.approx(float(made.k[0]))
+    assert any(note.startswith("the data cannot tell these apart") for note in document["notes"])
+    assert document["fits"] is True
+
+
+@pytest.mark.parametrize("width", [np.float64, np.float32])
+def test_too_few_frames_to_see_whether_roundings_were_fed_back_are_called_neither(width: type) -> None:
+    told = set()
+    for seed in range(6):
+        made = case("velocity-verlet", np.random.default_rng(seed), frames=7, lowest=0.3, width=width)
+        mass = made.m.astype(np.float32).astype(np.float64)
+        told.add(identify(made.t, single(made.q), single(made.p), mass=mass).precision)
+    wrong = "single" if width is np.float64 else "double, stored in single"
+    assert wrong not in told
+    assert "single, or double stored in single" in told
+
+
+def test_friction_that_a_coarse_file_hides_is_said_to_be_possible() -> None:
+    m, k, h = np.array([3.7]), np.array([2.9]), 0.31
+    q, p = [np.array([1.3])], [np.array([0.9])]
+    weak = np.array([1e-10])
+    for _ in range(100):
+        a, b = step(SCHEMES["langevin-middle"], q[-1], p[-1], h=h, m=m, force=lambda q, p: -k * q, rate=weak)
+        q.append(a)
+        p.append(b)
+    found = identify(np.arange(101) * h, single(np.array(q)), single(np.array(p)), mass=m)
+    assert found.scheme == "velocity-verlet"
+    assert "langevin-middle without friction" in found.aliases
+    note = next(note for note in found.notes if "would not show" in note)
+    assert "langevin-middle" in note
+    assert 1e-10 < float(note.split()[4]) < 1e-6
+
+
 def test_the_exact_flow_is_no_scheme_with_an_error() -> None:
     m, k, t = 3.7, 2.9, np.arange(101) * 1.31
     w = np.sqrt(np.longdouble(k) / m)

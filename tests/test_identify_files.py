@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -170,6 +171,24 @@ def test_states_that_show_nothing_are_one_line_and_status_2(
     assert error.count("\n") == 1
     assert words in error
     assert path in error
+
+
+def test_an_adaptive_solver_of_our_own_store_is_called_that_and_is_no_failure(
+    capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+) -> None:
+    need("sundials:adams")
+    assert main(["run", "spring", "--method", "own:euler", "--method", "sundials:adams", "--quiet"]) == 0
+    assert main(["identify", "spring.h5"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "own:euler: explicit-euler" in text
+    assert "sundials:adams: adaptive solver, no fixed scheme to find" in text
+    assert main(["identify", "spring.h5", "--trajectory", "sundials:adams", "--json"]) == 0
+    found = document(capsys)
+    assert (found["verdict"], found["scheme"], found["fits"]) == ("adaptive", None, False)
+    # the label of a store of ours is what excuses it; the same numbers from elsewhere fit nothing
+    assert main(["export", "spring.h5", "sundials:adams", "away.h5md"]) == 0
+    assert main(["identify", "away.h5md"]) == 1
+    assert "none (adaptive or unknown)" in capsys.readouterr().out
 
 
 def test_a_trajectory_that_is_not_in_the_file_is_one_line_with_those_that_are(
