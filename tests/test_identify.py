@@ -144,6 +144,17 @@ def test_text_with_a_fixed_number_of_decimals_is_seen() -> None:
     assert found.precision == "text, 4 decimals"
 
 
+def test_decimals_are_not_taken_for_digits_where_the_largest_number_is_one() -> None:
+    # 1.00 has neighbours ten times as far above as below, so two digits look coarser than two decimals are
+    for name, x in (("ruth3", 0.031), ("position-verlet", 0.98), ("semi-implicit-euler", 0.19)):
+        made = case(name, np.random.default_rng(6), lowest=x, stride=4)
+        q, v = made.q / np.max(np.abs(made.q)), made.p / made.m / np.max(np.abs(made.q))
+        rate = np.max(np.abs(v))
+        found = identify(made.t * rate, np.round(q, 2), v=np.round(v / rate, 2))
+        assert "digits" not in found.precision
+        assert name in schemes(found)
+
+
 def test_what_rounding_hides_is_said_and_not_guessed() -> None:
     made = case("rk4", np.random.default_rng(4), lowest=0.02, frames=101)
     x = 0.02 * np.sqrt(made.m / made.k) / made.h

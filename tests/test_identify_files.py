@@ -17,7 +17,7 @@ from springcheck.schemes import SCHEMES, step
 M, K, H = 3.7, 2.9, 0.31
 FIELDS = {
     *("scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"),
-    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"),
+    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes", "verdict", "candidates"),
 }
 
 

@@ -100,8 +100,10 @@ def storage(x: Floats) -> Storage:
     binary = Storage(name="single" if single else "double").quantum(values)
     found = [text for text in found if np.all(text.quantum(values) >= 2 * binary)]
     if found:
-        # both can hold the numbers; the coarser of the two leaves less to chance
-        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(values)))))
+        # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
+        # neighbours below it ten times as close as those above
+        below = values * (1 - 2.0**-40)
+        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
     return Storage(name="single") if single else Storage()
 
 
