@@ -358,7 +358,7 @@ def test_position_verlet_and_the_implicit_midpoint_rule_differ_by_the_stiffness_
     made = case("implicit-midpoint", np.random.default_rng(14), lowest=0.3)
     free = identify(made.t, made.q, made.p, mass=made.m)
     assert (free.scheme, schemes(free)) == (None, {"position-verlet", "implicit-midpoint"})
-    assert any("the stiffness, where it is known" in note for note in free.notes)
+    assert any("the stiffness, where known" in note for note in free.notes)
     assert identify(made.t, made.q, made.p, **made.names).scheme == "implicit-midpoint"
 
 

@@ -309,18 +309,21 @@ def _untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_s
         least, nearest = min(
             ((separation(maps, plainest, x), x) for x in joints[1:]), key=lambda pair: pair[0]
         )
-        why = (
-            f"the data cannot tell these apart: the maps of {plainest} and {nearest} are {least:.1g} "
-            "standard errors of the numbers' rounding from each other"
-        )
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
-        told = [f"about {digits} more digit{'s' * (digits > 1)}"] if 0 < digits <= MOST_DIGITS else []
-        told += ["a larger step", "more frames"] if digits <= 2 else []
+        pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
+        if digits > MOST_DIGITS:
+            other = "mass" if record.momenta else "stiffness"
+            why, told = f"{pair} are the same, on springs of different {other}", []
+        else:
+            why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
+            told = [f"about {digits} more digit{'s' * (digits > 1)}", "a larger step"] if digits > 0 else []
+            told += ["more frames"] if digits <= 2 else []
     if record.momenta:
         told.append("the mass")
     elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
-        told.append("the stiffness, where it is known: they differ in it")
-    return [why, *([f"what would tell them apart: {', or '.join(told)}"] if told else [])]
+        told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
+    listed = " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return [why, *([f"what would tell them apart: {listed}"] if told else [])]
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:
