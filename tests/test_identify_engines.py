@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import springcheck
-from springcheck.identify import NONE, Identification, identify
+from springcheck.identify import Identification, identify
 from springcheck.model import Trajectory
 
 PRECISIONS = {"double": "fixed-point force", "mixed": "mixed", "single": "single"}
@@ -90,7 +90,7 @@ def test_sundials_is_no_scheme_of_many_small_steps(label: str, need: Callable[[s
             for tolerance in (1e-12, 1e-9):
                 _, found = run(scene, label, every, tolerance)
                 told = found.scheme, found.fits, found.nearest
-                assert told == (NONE, False, "exact"), (scene, every, tolerance, found)
+                assert told == (None, False, "exact"), (scene, every, tolerance, found)
 
 
 @pytest.mark.parametrize("method", ["RK45", "DOP853", "LSODA"])
@@ -106,7 +106,7 @@ def test_no_tolerance_makes_an_adaptive_solver_a_scheme(method: str) -> None:
             rtol=tolerance,
             atol=tolerance / 100,
         ).y
-        assert identify(t, z[0], z[1], mass=m).scheme == NONE
+        assert identify(t, z[0], z[1], mass=m).verdict == "none"
 
 
 def test_errors_of_the_size_of_a_coarse_force_but_in_positions_are_not_taken_for_one() -> None:
@@ -123,5 +123,5 @@ def test_errors_of_the_size_of_a_coarse_force_but_in_positions_are_not_taken_for
         found = identify(h * np.arange(201), np.array(q), np.array(p), mass=m)
         told = (found.scheme, found.precision, found.fits)
         assert told == (
-            ("explicit-euler", "fixed-point force", True) if where == "force" else (NONE, "unknown", False)
+            ("explicit-euler", "fixed-point force", True) if where == "force" else (None, "unknown", False)
         )

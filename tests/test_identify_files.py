@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -16,7 +17,7 @@ from springcheck.schemes import SCHEMES, step
 M, K, H = 3.7, 2.9, 0.31
 FIELDS = {
     *("scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"),
-    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"),
+    *("symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes", "verdict", "candidates"),
 }
 
 
@@ -128,8 +129,13 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "none (adaptive or unknown)" in text
-    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588
-    assert "would fit if velocities were about 0.59" in text
+    # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588; a scheme that is not has one alone
+    assert "several schemes would fit" in text
+    assert "exact: 0.595733; velocity-verlet: 0.566082; position-verlet: 0.611256" in text
+    t, q, v = motion("semi-implicit-euler", 3)
+    assert main(["identify", written(t, q, 1.7 * v)]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "semi-implicit-euler, 3 steps a frame would fit if velocities were 0.588235 times as large" in text
 
 
 def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.CaptureFixture[str]) -> None:
@@ -141,7 +147,10 @@ def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.Captur
     assert all(len(line) <= 80 for line in lines)
     first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
     assert lines[first + 1].startswith("        ")
-    assert "more; named is the plainest" in " ".join(" ".join(lines).split())
+    text = " ".join(" ".join(lines).split())
+    assert text.startswith("bead: several schemes, which the data cannot tell apart one of: exact; velocity-")
+    assert "; rk4, 1 to 100 steps a frame;" in text
+    assert "no error of a step is visible" in text
 
 
 @pytest.mark.parametrize(
@@ -162,6 +171,24 @@ def test_states_that_show_nothing_are_one_line_and_status_2(
     assert error.count("\n") == 1
     assert words in error
     assert path in error
+
+
+def test_an_adaptive_solver_of_our_own_store_is_called_that_and_is_no_failure(
+    capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+) -> None:
+    need("sundials:adams")
+    assert main(["run", "spring", "--method", "own:euler", "--method", "sundials:adams", "--quiet"]) == 0
+    assert main(["identify", "spring.h5"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "own:euler: explicit-euler" in text
+    assert "sundials:adams: adaptive solver, no fixed scheme to find" in text
+    assert main(["identify", "spring.h5", "--trajectory", "sundials:adams", "--json"]) == 0
+    found = document(capsys)
+    assert (found["verdict"], found["scheme"], found["fits"]) == ("adaptive", None, False)
+    # the label of a store of ours is what excuses it; the same numbers from elsewhere fit nothing
+    assert main(["export", "spring.h5", "sundials:adams", "away.h5md"]) == 0
+    assert main(["identify", "away.h5md"]) == 1
+    assert "none (adaptive or unknown)" in capsys.readouterr().out
 
 
 def test_a_trajectory_that_is_not_in_the_file_is_one_line_with_those_that_are(

@@ -433,7 +433,7 @@ def _identify(options: argparse.Namespace) -> int:
         _document(documents[0] if len(documents) == 1 else {"identifications": documents})
     else:
         _show([line for label, one in found.items() for line in report.identification(label, one)])
-    return 0 if all(one.fits for one in found.values()) else 1
+    return 0 if all(one.fits or one.verdict == "adaptive" for one in found.values()) else 1
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -17,6 +17,11 @@ REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
 
+STORED = "double, stored in single"
+EITHER = "single, or double stored in single"
+"""Where the states are too few to tell an orbit that was rounded once from one rounded in every step."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defect:
     """How far one step falls short, and what explains it.  `precision` is "" where nothing does."""
@@ -75,7 +80,7 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
             precision="double",
             note="velocities carry the rounding of positions over the step: rebuilt as a difference of them",
         )
-    if record.q_storage.name == record.v_storage.name == "double":
+    if record.fine:
         if scheme.flow or not visible:
             return Defect(ulp=ulp, precision="")
         name, note = coarse.kinematic(record, j, found, match)
@@ -90,10 +95,11 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
     # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
     slack = 1 + 10 / np.sqrt(len(z))
     if _largest(missing, slack * half + path * 2.0**-52 * rebuilt) <= 1:
-        return Defect(ulp=ulp, precision=_stored(record, found, match, quanta))
+        return Defect(ulp=ulp, precision=_stored(record, found))
     if _largest(missing, slack * half + single) <= 1:
         texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
-        return Defect(ulp=ulp, precision=texts[0] if texts else "single")
+        # one orbit, rounded once, leaves no room for more than that
+        return Defect(ulp=ulp, precision=texts[0] if texts else "" if found.once else "single")
     return Defect(ulp=ulp, precision="")
 
 
@@ -125,61 +131,9 @@ def _written(record: Record, otherwise: str) -> str:
     return f"the numbers happen to be exact as {' and '.join(sorted(coarse))}" if coarse else otherwise
 
 
-def _stored(record: Record, found: Map, match: Match, quanta: Floats) -> str:
-    """The storage's name; for single precision, whether the arithmetic was finer than the file.
-
-    The whole trajectory is one orbit of the scheme, seen through rounding to the nearest, or rounding was
-    fed back into the motion and it strays from every orbit.
-    """
+def _stored(record: Record, found: Map) -> str:
+    """The storage's name; for single precision, whether the arithmetic was finer than the file."""
     texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
     if texts:
         return texts[0] if len(set(texts)) == 1 else " and ".join(dict.fromkeys(texts))
-    missing = _orbit(found, match, 1 / np.maximum(quanta, 2.0**-60)) / np.maximum(quanta, 2.0**-60)
-    frames = len(missing)
-    # rounding to nearest: root mean square 1/sqrt(12), largest 1/2; a fit of few numbers shifts both
-    within = np.max(np.abs(missing)) <= 0.5 + 3 / np.sqrt(frames)
-    if within and np.sqrt(np.mean(missing**2)) <= (1 + 2 / np.sqrt(frames)) / np.sqrt(12.0):
-        return "double, stored in single"
-    return "single"
-
-
-def _orbit(found: Map, match: Match, weights: Floats) -> Floats:
-    """What the orbit of the scheme closest to all states leaves over (f, 2); free are start, a, friction.
-
-    `weights` (f, 2) are the reciprocals of what each number is uncertain by.
-    """
-    frames = len(found.z)
-    scheme = SCHEMES[match.scheme]
-    values = np.array([match.a, match.friction], dtype=np.longdouble)
-    free = [0] if match.friction == 0 else [0, 1]
-    start = found.z[0].copy()
-    numbers = np.arange(frames, dtype=np.float64) * match.stride
-
-    def powers(x: Extended) -> Extended:
-        grow = [np.full(frames, y) for y in (x[0], x[1], np.longdouble(match.log_mass))]
-        out = frame(scheme, grow[0], grow[1], grow[2], np.maximum(numbers, 1), found.size)
-        # frame scales by its own strides; here the velocity keeps the scale of one interval
-        up = np.maximum(numbers, 1) / match.stride
-        out[:, 0, 1] = out[:, 0, 1] * up
-        out[:, 1, 0] = out[:, 1, 0] / up
-        out[0] = np.eye(2)
-        return np.asarray(out)
-
-    missing = found.z
-    for _ in range(6):
-        maps = powers(values)
-        missing = found.z - maps @ start
-        columns = [maps[:, :, 0].ravel(), maps[:, :, 1].ravel()]
-        for i in free:
-            delta = np.zeros(2, dtype=np.longdouble)
-            delta[i] = 1e-7 * abs(values[0])
-            columns.append(
-                (((powers(values + delta) - powers(values - delta)) @ start) / (2 * delta[i])).ravel()
-            )
-        slopes = np.stack(columns, axis=1).astype(np.float64) * weights.reshape(-1, 1)
-        scale = np.sqrt(np.mean(slopes**2, axis=0))
-        right = missing.ravel().astype(np.float64) * weights.ravel()
-        change = np.linalg.lstsq(slopes / scale, right, rcond=None)[0] / scale
-        start = start + change[:2]
-        values[free] += change[2:]
-    return np.asarray(found.z - powers(values) @ start, dtype=np.float64)
+    return {True: STORED, False: "single", None: EITHER}[found.once]

@@ -9,8 +9,11 @@ import numpy as np
 
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.match import Terms
-from springcheck.identify.search import search
+from springcheck.identify.search import Joint, search
 from springcheck.model import Floats
+
+SHOWN = 4
+"""Schemes that a note names of those that would fit at a scale of their own."""
 
 
 def causes(maps: list[Map], terms: list[Terms], residual: float) -> list[str]:
@@ -56,15 +59,24 @@ def _other_units(maps: list[Map], terms: list[Terms]) -> list[str]:
     fitting = [x for x in search(maps, free, range(1, 4)) if x.accepted]
     if not fitting:
         return []
-    best = min(fitting, key=lambda x: x.plainness)
+    fitting.sort(key=lambda x: x.plainness)
     # a scale that is nearly 1 is no change of units but the misfit itself
-    if max(abs(part.log_mass) for part in best.parts) < 1e-3:
+    if max(abs(part.log_mass) for part in fitting[0].parts) < 1e-3:
         return []
-    factor = ", ".join(f"{math.exp(-part.log_mass):.3g}" for part in best.parts)
+    advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
+    if len(fitting) == 1:
+        return [f"{fitting[0]} would fit if velocities were {_scale(fitting[0])} times as large: {advice}"]
+    # symmetric schemes have the same map but for the scale, so each has one of its own
+    each = "; ".join(f"{x}: {_scale(x)}" for x in fitting[:SHOWN])
+    more = f"; and {len(fitting) - SHOWN} more" if len(fitting) > SHOWN else ""
     return [
-        f"{best} would fit if velocities were about {factor} times as large: "
-        "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
+        "several schemes would fit if velocities were some times as large, each at a factor of its own "
+        f"({each}{more}): {advice}"
     ]
+
+
+def _scale(joint: Joint) -> str:
+    return ", ".join(f"{math.exp(-part.log_mass):.6g}" for part in joint.parts)
 
 
 def _left(columns: Floats, missing: Floats) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from springcheck.errors import StoreError
 from springcheck.identify.report import identify
 from springcheck.identify.result import Identification
 from springcheck.model import Floats, Integers
+from springcheck.schemes import SCHEMES
 
 MOST_FRAMES = 20_000
 """Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""
@@ -36,6 +37,8 @@ class States:
     v: Floats | None
     mass: Floats | None
     notes: tuple[str, ...]
+    adaptive: str = ""
+    """The title of the adaptive solver that one of our own stores says made them."""
 
 
 def read(path: Path, label: str | None = None) -> list[States]:
@@ -44,31 +47,33 @@ def read(path: Path, label: str | None = None) -> list[States]:
     Raises StoreError where the file cannot be read, holds no velocities, or has no such trajectory.
     """
     try:
-        own = [run.label for run in store.summary(path).runs]
+        own = store.summary(path).runs
     except StoreError:
-        own = []
+        own = ()
     found = list(_ours(path, own, label) if own else _foreign(path, label))
     if not found:
-        names = own or list(store.read_foreign(path, 2))
+        names = [run.label for run in own] or list(store.read_foreign(path, 2))
         raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
     return found
 
 
-def _ours(path: Path, labels: list[str], wanted: str | None) -> Iterator[States]:
+def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[States]:
     m = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)").m
-    for label in labels:
-        if wanted in (None, label):
-            piece = next(store.windows(path, label, MOST_FRAMES))
-            chosen, notes = _chosen(piece.q, piece.p, _frames(len(piece.t), label, path))
+    for run in runs:
+        if wanted in (None, run.label):
+            piece = next(store.windows(path, run.label, MOST_FRAMES))
+            kept = len(piece.t)
+            notes = [f"the first {kept} of {run.frames} frames were looked at"] if kept < run.frames else []
+            chosen, remarks = _chosen(piece.q, piece.p, notes)
             yield States(
-                label=label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None, mass=m[chosen],
-                notes=notes,
+                label=run.label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None,
+                mass=m[chosen], notes=remarks, adaptive=_adaptive(run),
             )  # fmt: skip
 
 
-def _frames(kept: int, label: str, path: Path) -> list[str]:
-    whole = next(run.frames for run in store.summary(path).runs if run.label == label)
-    return [f"the first {kept} of {whole} frames were looked at"] if kept < whole else []
+def _adaptive(run: store.Run) -> str:
+    scheme = SCHEMES.get(str(run.parameters.get("scheme", "")))
+    return scheme.title if scheme is not None and not (scheme.one_step or scheme.flow) else ""
 
 
 def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
@@ -119,4 +124,7 @@ def identify_states(
     """Identify what a file holds; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
     found = identify(states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, step=step)
+    if states.adaptive and found.verdict == "none":
+        why = f"made by {states.adaptive}: an adaptive solver has no fixed scheme to find"
+        return replace(found, verdict="adaptive", notes=(*states.notes, why))
     return replace(found, notes=(*states.notes, *found.notes))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from springcheck.identify.orbit import orbit, repeats
 from springcheck.identify.record import Record
 from springcheck.model import Extended, Floats
 
@@ -33,6 +34,11 @@ class Map:
     """Weight (f - 1,) of each pair of states."""
     conditioned: bool
     """Whether the states span the plane beyond their noise."""
+    whole: bool = False
+    """Whether entries and covariance are those of the orbit of all states, not of pairs."""
+    once: bool | None = None
+    """Whether the states were rounded once, as they were written, and never in the motion; None where that
+    does not show."""
 
     @property
     def unscaled(self) -> Extended:
@@ -115,9 +121,7 @@ def fit(record: Record, j: int) -> Map:
     conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
     inverse = np.asarray(np.linalg.pinv(gram), dtype=np.float64)
     covariance: Floats = np.kron(np.diag(variance), inverse).astype(np.float64)
-    if {record.q_storage.name, record.v_storage.name} != {"double"}:
-        covariance = covariance + _storage_covariance(z, x.T, quanta, weight, inverse)
-    return Map(
+    found = Map(
         entries=x.T,
         covariance=covariance,
         residual=np.sqrt(rss.astype(np.float64) / pairs),
@@ -126,6 +130,33 @@ def fit(record: Record, j: int) -> Map:
         z=z,
         weight=weight,
         conditioned=conditioned,
+    )
+    if record.fine or not conditioned:
+        return found
+    return _seen_through_storage(found, quanta, inverse, text=record.text)
+
+
+def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: bool) -> Map:
+    """The map with what its states' storage, to within `quanta` (f, 2), says of it.
+
+    Where all states are one orbit, rounded once, that orbit knows the map best.  Text does not show
+    whether the arithmetic was coarser than it, so there it is enough that an orbit explains it.
+    """
+    storage = _storage_covariance(found.z, found.entries, quanta, found.weight, inverse)
+    pairs = replace(found, covariance=(found.covariance + storage) * repeats(found.z))
+    whole = orbit(found.z, quanta, found.entries, constant=bool(np.any(found.centre != 0)))
+    if whole is None:
+        return pairs
+    if not (whole.within if text else whole.once):
+        return replace(pairs, once=whole.once)
+    return replace(
+        found,
+        entries=whole.entries,
+        covariance=whole.covariance,
+        z=found.z - whole.centre,
+        centre=found.centre + whole.centre * found.size,
+        whole=True,
+        once=whole.once,
     )
 
 

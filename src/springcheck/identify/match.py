@@ -19,6 +19,12 @@ CHANCE = 1e-7
 STRIDES = 12, 100
 """Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
 
+WHOLE = 2
+"""Roundings of a step that act on a whole state and not on what a step adds to it."""
+
+HOPELESS = 1e4
+"""Chi-squared that is not refined any further after the first few steps: a hundred standard errors."""
+
 NEAR = 0.02
 """Distance of entries, of size 1, within which a first guess is worth refining."""
 
@@ -223,7 +229,6 @@ def _refine(
 ) -> list[Match]:
     """Gauss-Newton on the four entries, weighted by their covariance; all first guesses at once."""
     observed = found.entries.reshape(4)
-    weights = _weights(scheme, found, terms, s)
 
     def log_masses(values: Extended, strides: Floats) -> Extended:
         if terms.log_stiffness is None:
@@ -235,21 +240,26 @@ def _refine(
         return frame(scheme, values[:, 0], values[:, 1], masses, strides, found.size).reshape(-1, 4)
 
     values = np.stack(unknowns, axis=1)
-    kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
+    with np.errstate(all="ignore"):
+        entries = entries_at(values, s)
+    if not terms.damped and not terms.mass_unknown:
+        # a first guess from the phase is good to 1e-3 where the scheme is right
+        off = np.max(np.abs(np.asarray(observed - entries, dtype=np.float64)), axis=1)
+        near = off <= NEAR * max(1.0, float(np.max(np.abs(observed))))
+        near |= off <= 10 * np.sqrt(found.covariance.max())
+        near[np.argmin(off)] = True
+        values, entries, s, turns = values[near], entries[near], s[near], turns[near]
+    weights = _weights(scheme, found, terms, s, values[:, 0], values[:, 1])
+    kept = values.copy()
     chi2, errors, stalled = np.full(len(s), np.inf), np.zeros(len(s)), np.zeros(len(s), dtype=int)
     alive = np.arange(len(s))
+    # Newton's steps double the digits of a phase known to 1e-3, and what has not come close by then will not
+    hopeless = 4 if len(free) == 1 else 10
     with np.errstate(all="ignore"):
         for turn in range(20):
             now_s, now_weights, now_values = s[alive], weights[alive], values[alive]
             predicted = entries_at(now_values, now_s)
             miss = np.asarray(observed - predicted, dtype=np.float64)
-            if turn == 0 and not terms.damped and not terms.mass_unknown:
-                # a first guess from the phase is good to 1e-3 where the scheme is right
-                near = np.max(np.abs(miss), axis=1) <= NEAR * max(1.0, float(np.max(np.abs(observed))))
-                keep = near | (np.max(np.abs(miss), axis=1) <= 10 * np.sqrt(found.covariance.max()))
-                keep[np.argmin(np.max(np.abs(miss), axis=1))] = True
-                alive, predicted, miss = alive[keep], predicted[keep], miss[keep]
-                now_s, now_weights, now_values = now_s[keep], now_weights[keep], now_values[keep]
             now = np.einsum("ci,cij,cj->c", miss, now_weights, miss)
             slopes = np.empty((len(alive), 4, len(free)))
             for column, i in enumerate(free):
@@ -271,7 +281,8 @@ def _refine(
             limit = 0.5 * np.abs(now_values[:, 0].astype(np.float64))
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
             values[alive[:, None], free] += change
-            alive = alive[(stalled[alive] < 2) & (np.abs(change[:, 0]) > 1e-17 * np.abs(now_values[:, 0]))]
+            going = (stalled[alive] < 2) & (np.abs(change[:, 0]) > 1e-17 * np.abs(now_values[:, 0]))
+            alive = alive[going & ((turn < hopeless) | (chi2[alive] < HOPELESS))]
             if not len(alive):
                 break
     masses = log_masses(kept, s)
@@ -295,22 +306,27 @@ def _refine(
 
 def _inverse(normal: Floats) -> Floats:
     """Inverses of positive matrices (c, i, i) whose diagonals differ by many powers of ten."""
+    if normal.shape[-1] == 1:
+        return np.where(normal > 0, 1 / np.where(normal > 0, normal, 1), 0.0)
     scale = np.sqrt(np.einsum("caa->ca", normal))
     scale = np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)
     even = np.nan_to_num(normal / scale[:, :, None] / scale[:, None, :], posinf=0, neginf=0)
     return np.asarray(np.linalg.pinv(even, hermitian=True) / scale[:, :, None] / scale[:, None, :])
 
 
-def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats) -> Floats:
+def _weights(scheme: Scheme, found: Map, terms: Terms, s: Floats, a: Extended, friction: Extended) -> Floats:
     """Inverse covariances (c, 4, 4): of the fit, of coefficients rounded once, of the interval.
 
     The rounding of h k or h/m is the same in every step, so no number of pairs averages it away: an entry
-    of the map over s steps is uncertain by the roundings of its path times s, whatever the fit says.
+    of the map over s steps is uncertain by the roundings of its path times what s steps add to a state,
+    s h w of it and no more than s, whatever the fit says.  A factor near 1, of friction or of a velocity
+    that is rebuilt over the step, is rounded as well, and acts on the whole state in each of s steps.
     """
     b = np.abs(found.entries.astype(np.float64))
     largest = max(1.0, float(np.max(b)))
     path = 1 if scheme.flow else roundings(scheme)
-    coherent = terms.rounding * path * s * largest
+    added = np.minimum(np.sqrt(np.abs(a)) + np.abs(friction), 1).astype(np.float64)
+    coherent = terms.rounding * (path * added + WHOLE) * s * largest
     clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
     bias = np.diag(np.repeat(terms.bias * found.residual, 2) ** 2)
     total = found.covariance + clock + bias + coherent[:, None, None] ** 2 * np.eye(4)

@@ -13,6 +13,9 @@ from springcheck.model import Extended, Floats
 FEWEST = 5
 """Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
 
+LEAST = 2.0**-102
+"""Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
+
 SAMPLE = 500
 """Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
 
@@ -60,6 +63,16 @@ class Record:
     mass: Floats | None
     momenta: bool
 
+    @property
+    def fine(self) -> bool:
+        """Whether all numbers have the digits of double precision."""
+        return self.q_storage.name == self.v_storage.name == "double"
+
+    @property
+    def text(self) -> bool:
+        """Whether some numbers were written as decimal text of few digits."""
+        return any(x.name.startswith("text") for x in (self.q_storage, self.v_storage))
+
 
 def storage(x: Floats) -> Storage:
     """How x was written down, from the numbers themselves."""
@@ -87,8 +100,10 @@ def storage(x: Floats) -> Storage:
     binary = Storage(name="single" if single else "double").quantum(values)
     found = [text for text in found if np.all(text.quantum(values) >= 2 * binary)]
     if found:
-        # both can hold the numbers; the coarser of the two leaves less to chance
-        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(values)))))
+        # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
+        # neighbours below it ten times as close as those above
+        below = values * (1 - 2.0**-40)
+        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
     return Storage(name="single") if single else Storage()
 
 
@@ -125,6 +140,16 @@ def _states(x: ArrayLike, name: str, frames: int) -> Floats:
         frame = int(np.argmin(np.all(np.isfinite(out), axis=1)))
         raise IdentificationError(f"{name} is not finite in frame {frame}; give the part before it")
     return out
+
+
+def _alive(positions: Floats, moving: Floats) -> int:
+    """Frames until a motion has died down so far that single precision keeps no relative precision of it.
+
+    From there on products underflow, and what is left is no scheme's step any more.
+    """
+    alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
+    last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
+    return last + 1 if last + 1 >= FEWEST else len(positions)
 
 
 def _masses(mass: ArrayLike | None, n: int) -> Floats | None:
@@ -180,14 +205,16 @@ def read(
         quantum = v_storage.quantum(moving / masses)
     else:
         quantum = v_storage.quantum(moving) / unit.astype(np.float64)
+    finely = q_storage.name == v_storage.name == "double"
+    kept = slice(None if finely else _alive(positions, moving))
     return Record(
         interval=interval,
         jitter=jitter,
         clock=clock,
-        q=positions.astype(np.longdouble),
-        v=moving.astype(np.longdouble) / unit,
-        q_quantum=q_storage.quantum(positions),
-        v_quantum=quantum,
+        q=positions[kept].astype(np.longdouble),
+        v=moving[kept].astype(np.longdouble) / unit,
+        q_quantum=q_storage.quantum(positions[kept]),
+        v_quantum=quantum[kept],
         q_storage=q_storage,
         v_storage=v_storage,
         mass=masses,

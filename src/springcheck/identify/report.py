@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,18 +17,22 @@ from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.fit import ROUNDING, Map, fit
 from springcheck.identify.match import Terms
 from springcheck.identify.record import Record, read
-from springcheck.identify.result import NONE, Identification
+from springcheck.identify.result import Candidate, Identification
 from springcheck.identify.search import (
     Joint,
     aliases,
     difference,
     disagreements,
     find,
+    frictionless,
     numbers,
     search,
+    separation,
     visible,
 )
 from springcheck.model import Floats
+
+T = TypeVar("T")
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
@@ -38,8 +44,15 @@ VELOCITY_OFFSET = {
 COARSE = ("fixed-point force", "mixed", "single")
 """Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
 
-SHOWN = 3
-"""Schemes that a note names of those that are not told apart; all are in the candidates."""
+APART = 10.0
+"""Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
+may take five away."""
+
+MOST_DIGITS = 9
+"""More digits than single precision has short of double: what needs more, digits do not tell."""
+
+UNTOLD = "cannot tell"
+"""Arithmetic where the candidates' are several."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -123,24 +136,20 @@ def identify(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
             "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
         )
-    found_all, chosen, terms = find(record, maps, base, stride)
-    if chosen is not None and stated is not None:
-        agreeing = [x for x in found_all if not disagreements(record, moving, x, stated)]
-        found_all = agreeing or found_all
-        chosen = found_all[0]
-    if (
-        chosen is None
-        or stride == -1
-        or (stride is not None and chosen.stride != stride and chosen.scheme != "exact")
-    ):
-        if stride is not None and stride > 0:
-            notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
-        stated_fits = stride is None
+    joints, fitting, terms = find(record, maps, base, stride)
+    if fitting and stated is not None:
+        joints = [x for x in joints if not disagreements(record, moving, x, stated)] or joints
+    if fitting and stride is not None and stride > 0:
+        # a step that divides the interval leaves the flow, which has none, and schemes of that stride
+        agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
+        joints, stated_fits = agreeing or joints, bool(agreeing)
     else:
-        stated_fits = True
-    if chosen is None:
-        return _unknown(record, moving, maps, base, found_all, notes)
-    return _known(record, moving, maps, found_all, chosen, terms, stated, stated_fits, notes)
+        stated_fits = stride is None
+    if stride is not None and stride > 0 and not stated_fits:
+        notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
+    if not fitting:
+        return _unknown(record, moving, maps, base, joints, notes)
+    return _known(record, moving, maps, joints, terms, stated, stated_fits, notes)
 
 
 def _terms(record: Record, j: int, stated: Floats | None) -> Terms:
@@ -161,89 +170,169 @@ def _known(
     moving: list[int],
     maps: list[Map],
     accepted: list[Joint],
-    chosen: Joint,
     terms: list[Terms],
     stated: Floats | None,
     stated_fits: bool,
     notes: list[str],
 ) -> Identification:
-    defects: list[arithmetic.Defect] = []
-    for joint in dict.fromkeys([chosen, *accepted]):
+    explained: dict[Joint, list[arithmetic.Defect]] = {}
+    for joint in accepted:
         defects = [
             arithmetic.defect(record, j, x, part, visible=visible(x, what, joint, accepted))
             for j, x, part, what in zip(moving, maps, joint.parts, terms, strict=True)
         ]
         if all(d.precision for d in defects):
-            chosen = joint
-            break
-    else:
-        return _unknown(record, moving, maps, terms, accepted, notes)
-    worst = max(defects, key=lambda d: (d.precision != "double", d.ulp))
-    notes = [*notes, *dict.fromkeys(d.note for d in defects if d.note)]
-    omega, found_stiffness, friction = numbers(record, moving, chosen)
-    determinant, symplectic = _determinants(maps, chosen.stride)
-    h = float(record.interval) / chosen.stride
+            explained[joint] = defects
+    if not explained:
+        # what the states do not exclude is equally near; the plainest stands for all
+        return _unknown(record, moving, maps, terms, accepted[:1], notes)
+    joints = list(explained)
+    plainest = joints[0]
+    worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
+    notes = [*notes, *dict.fromkeys(d.note for d in explained[plainest] if d.note)]
     if stated is not None:
-        against = disagreements(record, moving, chosen, stated)
+        against = disagreements(record, moving, plainest, stated)
         single = stated.astype(np.float32).astype(np.float64)
         if (
             against
-            and worst.precision in COARSE
-            and not disagreements(record, moving, chosen, single, QUANTUM)
+            and worst[0].precision in COARSE
+            and not disagreements(record, moving, plainest, single, QUANTUM)
         ):
             against = []
             notes.append("the stiffness is the stated one in single precision, as GPU-type platforms keep it")
         stated_fits = stated_fits and not against
         notes += against
-    notes += _remarks(accepted, chosen, friction)
-    first = chosen.parts[0]
+    candidates = tuple(_candidate(record, moving, joint) for joint in joints)
+    scheme = _common([x.scheme for x in candidates])
+    stride = _common([x.stride for x in candidates])
+    determinant, symplectic = _determinants(maps, stride or 1)
+    unknown = tuple(math.nan for _ in moving)
+    offset = _common([VELOCITY_OFFSET.get(x.scheme, 0.0) for x in candidates])
+    alone = len(joints) == 1
     return Identification(
-        scheme=chosen.scheme,
-        aliases=(*aliases(chosen.scheme), *([LEAPFROG[chosen.scheme]] if chosen.scheme in LEAPFROG else [])),
-        candidates=tuple(str(x) for x in accepted),
-        step=h,
-        stride=chosen.stride,
-        omega=omega,
-        stiffness=found_stiffness,
-        friction=friction,
-        velocity_offset=VELOCITY_OFFSET.get(chosen.scheme, 0.0),
-        determinant=determinant,
+        verdict="named" if scheme else "not told apart",
+        scheme=scheme,
+        aliases=_other_names(scheme, damped=_damped(joints)) if scheme else (),
+        candidates=candidates,
+        step=float(record.interval) / stride if stride else math.nan,
+        stride=stride,
+        omega=candidates[0].omega if alone else unknown,
+        stiffness=candidates[0].stiffness if alone else None,
+        friction=candidates[0].friction if alone or not _damped(joints) else unknown,
+        velocity_offset=math.nan if offset is None else offset,
+        determinant=determinant if stride else unknown,
         symplectic_defect=symplectic,
-        defect_ulp=max(d.ulp for d in defects),
-        precision=worst.precision,
+        defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()),
+        precision=_common([d.precision for d in worst]) or UNTOLD,
         fits=stated_fits,
-        nearest=chosen.scheme,
-        difference=difference(maps[0], first),
-        notes=tuple(notes),
+        nearest=scheme,
+        difference=difference(maps[0], plainest.parts[0]) if alone else (math.nan,) * 4,
+        notes=(*notes, *_remarks(record, maps, joints, candidates, stated is not None)),
     )
 
 
-def _remarks(accepted: list[Joint], chosen: Joint, friction: tuple[float, ...]) -> list[str]:
+def _other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
+    leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
+    still = [] if damped else [f"{name} without friction" for name in frictionless(scheme)]
+    return (*aliases(scheme), *leapfrog, *still)
+
+
+def _hidden_friction(record: Record, found: Map) -> float:
+    """Largest rate c/m [1/T] that the map's determinant leaves room for: five standard errors of it."""
+    gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
+    error = math.sqrt(float(gradient @ found.covariance @ gradient))
+    loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
+    return (loss + 5 * error) / abs(float(record.interval))
+
+
+def _common(values: Sequence[T]) -> T | None:
+    """The value that all are, or None."""
+    return values[0] if len(set(values)) == 1 else None
+
+
+def _damped(joints: list[Joint]) -> bool:
+    return any(part.friction for joint in joints for part in joint.parts)
+
+
+def _candidate(record: Record, moving: list[int], joint: Joint) -> Candidate:
+    omega, stiffness, friction = numbers(record, moving, joint)
+    return Candidate(
+        scheme=joint.scheme,
+        aliases=_other_names(joint.scheme, damped=_damped([joint])),
+        stride=joint.stride,
+        step=float(record.interval) / joint.stride,
+        turns=max(part.turns for part in joint.parts),
+        omega=omega,
+        stiffness=stiffness,
+        friction=friction,
+    )
+
+
+def _remarks(
+    record: Record,
+    maps: list[Map],
+    joints: list[Joint],
+    candidates: tuple[Candidate, ...],
+    stiffness_stated: bool,
+) -> list[str]:
     out = []
-    if chosen.scheme in LEAPFROG:
-        out.append(f"the same map is {LEAPFROG[chosen.scheme]}: states alone do not tell the two apart")
-    if any(part.friction for part in chosen.parts):
-        out.append(f"the motion is damped at a rate c/m of {', '.join(f'{x:.6g}' for x in friction)}")
-    if max(part.turns for part in chosen.parts):
+    scheme = _common([x.scheme for x in candidates])
+    if scheme in LEAPFROG:
+        out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
+    if _damped(joints):
+        rates = [candidates[0].friction, *([] if len(joints) == 1 else [candidates[-1].friction])]
+        shown = " or ".join(dict.fromkeys(", ".join(f"{x:.6g}" for x in rate) for rate in rates))
+        out.append(f"the motion is damped at a rate c/m of {shown}")
+    elif not record.fine:
+        most = max(_hidden_friction(record, found) for found in maps)
+        with_it = {name: frictionless(name) for name in dict.fromkeys(x.scheme for x in candidates)}
+        same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
+        if same:
+            out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
+    if any(x.turns for x in candidates):
+        might = "makes" if all(x.turns for x in candidates) else "may make"
         out.append(
-            "the motion makes whole turns between two frames: the frequency is not the one that they show"
+            f"the motion {might} whole turns between two frames: the frequency is not the one that they show"
         )
-    if any(part.a < 0 for part in chosen.parts):
+    if any(part.a < 0 for part in joints[0].parts):
         out.append("the spring is inverted: its stiffness is negative")
-    others = [f"{x}{_apart(x, chosen)}" for x in accepted if x is not chosen]
-    if others:
-        shown = "; ".join(others[:SHOWN]) + (
-            f"; and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+    return out + _untold(record, maps, joints, stiffness_stated=stiffness_stated) if len(joints) > 1 else out
+
+
+def _untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_stated: bool) -> list[str]:
+    """Why several schemes or numbers of steps are left, and what more the states would have to show."""
+    plainest = joints[0]
+    if plainest.scheme == "exact":
+        why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
+        told = ["more digits", "a larger step"]
+    else:
+        least, nearest = min(
+            ((separation(maps, plainest, x), x) for x in joints[1:]), key=lambda pair: pair[0]
         )
-        lead = "no error of a step is visible, so " if chosen.scheme == "exact" else ""
-        out.append(f"{lead}not told apart at this precision: {shown}; named is the plainest")
-    return out
+        digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
+        pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
+        if digits > MOST_DIGITS:
+            other = "mass" if record.momenta else "stiffness"
+            why, told = f"{pair} are the same, on springs of different {other}", []
+        else:
+            why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
+            told = [f"about {digits} more digit{'s' * (digits > 1)}", "a larger step"] if digits > 0 else []
+            told += ["more frames"] if digits <= 2 else []
+    if record.momenta:
+        told.append("the mass")
+    elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
+        told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
+    listed = " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return [why, *([f"what would tell them apart: {listed}"] if told else [])]
 
 
-def _apart(other: Joint, chosen: Joint) -> str:
-    """How much stiffer the spring is if it is the other scheme, where that shows."""
-    off = other.parts[0].a * other.stride**2 / (chosen.parts[0].a * chosen.stride**2) - 1
-    return f" (stiffness {off:+.1e})" if abs(off) > 1e-12 else ""
+def _stiffer(one: Joint, other: Joint) -> bool:
+    """Whether a spring differs in stiffness between two schemes by more than six standard errors."""
+    return any(
+        abs(a.a * one.stride**2 - b.a * other.stride**2)
+        > 6 * (a.a_error * one.stride**2 + b.a_error * other.stride**2)
+        for a, b in zip(one.parts, other.parts, strict=True)
+    )
 
 
 def _unknown(
@@ -262,7 +351,7 @@ def _unknown(
     if not tried:
         tried = search(maps, [replace(what, damped=False) for what in terms], range(1, 2))
     determinant, symplectic = _determinants(maps, 1)
-    nearest = ""
+    nearest: str | None = None
     off: tuple[float, ...] = (math.nan,) * 4
     omega: tuple[float, ...] = tuple(math.nan for _ in moving)
     stiffness = None
@@ -279,11 +368,12 @@ def _unknown(
     residual = max(float(np.max(found.residual)) for found in maps)
     notes = [*notes, *causes(maps, terms, residual)]
     return Identification(
-        scheme=NONE,
+        verdict="none",
+        scheme=None,
         aliases=(),
         candidates=(),
         step=math.nan,
-        stride=0,
+        stride=None,
         omega=omega,
         stiffness=stiffness,
         friction=tuple(math.nan for _ in moving),

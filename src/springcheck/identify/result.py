@@ -4,28 +4,52 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
-NONE = "none (adaptive or unknown)"
+Verdict: TypeAlias = Literal["named", "not told apart", "none", "adaptive"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """A scheme that the states do not exclude, and what they would mean if it made them.
+
+    Rows of numbers hold one for each oscillator that moves, as in `Identification`.
+    """
+
+    scheme: str
+    aliases: tuple[str, ...]
+    stride: int
+    step: float
+    turns: int
+    """Whole turns between two frames, which the frames do not show."""
+    omega: tuple[float, ...]
+    stiffness: tuple[float, ...] | None
+    friction: tuple[float, ...]
+
+    def __str__(self) -> str:
+        return self.scheme if self.stride == 1 else f"{self.scheme}, {self.stride} steps a frame"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identification:
     """What the states say.  Rows of numbers hold one for each oscillator that moves.
 
-    `fits` is true where a known scheme explains every step to the rounding of a known arithmetic, and what
-    was stated (mass, stiffness, step) agrees with it.
+    A scheme is named only where the states exclude every other.  Where several explain them equally well
+    the verdict is "not told apart", `scheme` is None, `candidates` are all of them, and a number is given
+    only if it is the same for all.  Where none does it is "none": an adaptive solver, or something unknown;
+    and "adaptive" where one of our own stores says so, and there was nothing to find.
     """
 
-    scheme: str
+    verdict: Verdict
+    scheme: str | None
     aliases: tuple[str, ...]
     """Other names of the same map: on a spring nothing can tell them apart."""
-    candidates: tuple[str, ...]
-    """Schemes that this trajectory does not exclude, "name" or "name, s steps a frame"."""
+    candidates: tuple[Candidate, ...]
+    """What the states do not exclude, the plainest first; one where stride and scheme are certain."""
     step: float
-    """[T]; negative where time runs backwards."""
-    stride: int
-    """Steps from frame to frame."""
+    """[T]; negative where time runs backwards, NaN where candidates differ."""
+    stride: int | None
+    """Steps from frame to frame; None where candidates differ."""
     omega: tuple[float, ...]
     """True angular frequency sqrt(k/m), not that of the discrete motion; NaN for an inverted spring [1/T]."""
     stiffness: tuple[float, ...] | None
@@ -39,25 +63,49 @@ class Identification:
     symplectic_defect: float
     """Largest |M^T J M - J| of the measured map between frames."""
     defect_ulp: float
-    """Largest departure of one recorded step from the scheme's, in units of 2**-52 of the terms' sizes."""
+    """Largest departure of one recorded step from the scheme's, in units of 2**-52 of the terms' sizes; of
+    several schemes, the closest's."""
     precision: str
     fits: bool
-    nearest: str
-    """The scheme itself, or where none fits the one whose entries are closest."""
+    """Whether a known scheme explains every step to the rounding of a known arithmetic, and what was stated
+    (mass, stiffness, step) agrees with it."""
+    nearest: str | None
+    """The scheme itself, or where none fits the one whose entries are closest; None where several fit."""
     difference: tuple[float, ...]
     """Measured less predicted entries M11, M12, M21, M22 on (q, v T) between frames; first oscillator."""
     notes: tuple[str, ...]
 
+    @property
+    def choice(self) -> list[str]:
+        """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
+        strides: dict[str, list[int]] = {}
+        for x in self.candidates:
+            strides.setdefault(x.scheme, []).append(x.stride)
+        return [
+            name if found == [1] else f"{name}, {_ranges(sorted(found))} steps a frame"
+            for name, found in strides.items()
+        ]
+
     def document(self) -> dict[str, Any]:
         """For JSON: numbers for one oscillator, lists for several, null for what is not known."""
+        return dict(_plain(asdict(self)))
 
-        def plain(x: Any) -> Any:
-            if isinstance(x, float):
-                return x if math.isfinite(x) else None
-            return [plain(y) for y in x] if isinstance(x, tuple) else x
 
-        out = {name: plain(x) for name, x in asdict(self).items()}
-        for name in ("omega", "stiffness", "friction", "determinant"):
-            if out[name] is not None and len(out[name]) == 1:
-                out[name] = out[name][0]
-        return out
+def _ranges(strides: list[int]) -> str:
+    starts = [s for s in strides if s - 1 not in strides]
+    ends = [s for s in strides if s + 1 not in strides]
+    return ", ".join(f"{a}" if a == b else f"{a} to {b}" for a, b in zip(starts, ends, strict=True))
+
+
+SCALARS = ("omega", "stiffness", "friction", "determinant")
+"""Rows that a document gives as one number where one oscillator moves."""
+
+
+def _plain(x: Any, name: str = "") -> Any:
+    if isinstance(x, dict):
+        return {key: _plain(value, key) for key, value in x.items()}
+    if isinstance(x, float):
+        return x if math.isfinite(x) else None
+    if isinstance(x, tuple | list):
+        return _plain(x[0]) if name in SCALARS and len(x) == 1 else [_plain(y) for y in x]
+    return x

@@ -18,8 +18,14 @@ BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
 last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
 
+SINGLE = 2.0**-24
+"""Unit roundoff of single precision."""
+
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
+
+EXCLUDED = 25.0
+"""By which chi-squared exceeds that of the best where a scheme is excluded: five standard errors."""
 
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
@@ -69,6 +75,18 @@ def aliases(name: str) -> tuple[str, ...]:
 
 
 @cache
+def frictionless(name: str) -> tuple[str, ...]:
+    """Schemes with a friction of their own whose map is this one's where there is none."""
+    a, none = np.array([0.3, 1.1, 2.9], dtype=np.longdouble), np.zeros(3, dtype=np.longdouble)
+    own = unit_matrix(SCHEMES[name], a, none)
+    return tuple(
+        scheme.name
+        for scheme in OWN_FRICTION
+        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, none) - own)) < 1e-15
+    )
+
+
+@cache
 def distinct() -> tuple[str, ...]:
     """One name of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
     out: list[str] = []
@@ -107,39 +125,103 @@ def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
     ]
 
 
+FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Room:
+    """What is allowed for beside the numbers' own uncertainty, and the strides looked at, in turn."""
+
+    damped: bool = False
+    rounding: float = ROUNDING
+    bias: float = 0.0
+    strides: tuple[range, ...] = (FEW,)
+
+
 def find(
     record: Record, maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], Joint | None, list[Terms]]:
-    """All accepted schemes, and the plainest; without friction first, and with it where nothing fits.
+) -> tuple[list[Joint], bool, list[Terms]]:
+    """All schemes that the states do not exclude, the plainest first, and True; or all tried, and False.
 
-    Coefficients are taken as rounded in double precision first.  Where the states are coarser than that
-    the arithmetic may have been so too: a second round allows coefficients of single precision to numbers
-    of single precision, and a last one a bias of the size of what single steps leave over.
+    What is plainer comes first, and ends the search where it fits.
     """
     residual = max(float(np.max(found.residual)) for found in maps)
-    finely = record.q_storage.name == record.v_storage.name == "double"
-    rounds = [(ROUNDING, 0.0)]
-    if residual > 2.0**-40 and not finely:
-        rounds.append((2.0**-24, 0.0))
-    if residual > COARSE:
-        rounds.append((ROUNDING, BIAS))
+    whole = all(found.whole for found in maps)
+    first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
     tried: list[Joint] = []
-    first = [range(stride, stride + 1)] if stride is not None and stride > 0 else []
-    few, many = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
-    for damped, ranges in ((False, [*first, few]), (True, [*first, few]), (False, [many])):
-        # what is coarse hides many strides at once, so that none of them could be named
-        for rounding, bias in rounds if many not in ranges else [x for x in rounds if not x[1]]:
-            terms = [replace(what, damped=damped, rounding=rounding, bias=bias) for what in base]
-            for strides in ranges:
+    for rooms in _plan(fine=record.fine, text=record.text, whole=whole, residual=residual):
+        accepted: list[Joint] = []
+        for room in rooms:
+            terms = [
+                replace(what, damped=room.damped, rounding=room.rounding, bias=room.bias) for what in base
+            ]
+            for strides in (*first, *room.strides):
                 joints = search(maps, terms, strides)
-                accepted = sorted((x for x in joints if x.accepted), key=lambda x: x.plainness)
-                if accepted:
-                    # what is 25 worse in chi-squared than the best, five standard errors, is excluded too
-                    best = min(x.chi2 for x in accepted)
-                    accepted = [x for x in accepted if x.chi2 <= best + 25]
-                    return accepted, accepted[0], terms
-                tried += joints if not damped and strides is not many else []
-    return tried, None, base
+                fitting = [x for x in joints if x.accepted]
+                if fitting:
+                    further = strides is FEW and (MANY in room.strides or not room.bias)
+                    accepted += fitting
+                    accepted += _further(maps, terms, fitting, coarse=not record.fine) if further else []
+                    break
+                tried += joints if not room.damped and strides is not MANY else []
+        if accepted:
+            return _likely(accepted), True, terms
+    return tried, False, base
+
+
+def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[Room]]:
+    """What is allowed for, the plainest first; what stands together is equally plain.
+
+    Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
+    unless the states show that the arithmetic was coarser, or are too few to show that it was not; text
+    does not show it, so there single precision is as plain as friction.  A bias of the size of what single
+    steps leave over comes last: what is one orbit, rounded once, has none.  Coarse numbers make room for
+    other schemes' few steps, so there many are tried before a wider room; with a bias many hide at once, so
+    that none could be named.
+    """
+    biased = [BIAS] if residual > COARSE and not whole else []
+    if fine:
+        rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
+        return [*rooms, [Room(strides=(MANY,))]]
+    near = (FEW, MANY)
+    double, double_damped, single, single_damped = (
+        Room(damped=damped, rounding=rounding, strides=near)
+        for rounding in (ROUNDING, SINGLE)
+        for damped in (False, True)
+    )
+    coarse = residual > 2.0**-40
+    out: list[list[Room]] = []
+    if whole or not coarse:
+        out += [[double], [double_damped, single] if text and coarse else [double_damped]]
+    if coarse:
+        out += [[single], [single_damped]]
+    return out + [
+        [Room(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
+    ]
+
+
+def _further(maps: list[Map], terms: list[Terms], accepted: list[Joint], *, coarse: bool) -> list[Joint]:
+    """What the states do not exclude either, beside what was accepted of few steps to a frame.
+
+    More of them may fit as well: the error of a step falls with their number, and where the exact flow
+    fits, so does any scheme from some number on.  In double precision that is looked at only where few
+    steps leave a choice.  Friction that is hardly needed may still be there.
+    """
+    out: list[Joint] = []
+    open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
+    if open_ended or (coarse and not terms[0].damped):
+        out += [x for x in search(maps, terms, MANY) if x.accepted]
+    if not terms[0].damped and min(x.chi2 for x in accepted) > EXCLUDED:
+        friction = [replace(what, damped=True) for what in terms]
+        out += [x for x in search(maps, friction, FEW) if x.accepted]
+    return out
+
+
+def _likely(accepted: list[Joint]) -> list[Joint]:
+    """Those of which the best is not five standard errors better, each once, the plainest first."""
+    best = min(x.chi2 for x in accepted)
+    each = {(x.scheme, x.stride): x for x in sorted(accepted, key=lambda x: -x.chi2)}
+    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
 
 
 def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> bool:
@@ -177,13 +259,15 @@ def disagreements(
 ) -> list[str]:
     """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
 
-    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.
+    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  Text does
+    not show whether h k and h/m were rounded to single precision, and the state with them.
     """
     _, stiffness, _ = numbers(record, moving, joint)
     path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        error += 8 * SINGLE if record.text else 0.0
         pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
         error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
         off = k / float(stated[j]) - 1 if stated[j] else math.inf
@@ -193,6 +277,17 @@ def disagreements(
                 f"(relative difference {off:+.2e}, known to {error:.0e})"
             )
     return out
+
+
+def separation(maps: list[Map], one: Joint, other: Joint) -> float:
+    """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
+    total = 0.0
+    for found, a, b in zip(maps, one.parts, other.parts, strict=True):
+        off = np.array(a.predicted) - np.array(b.predicted)
+        error = np.sqrt(np.diag(found.covariance))
+        even = found.covariance / error[:, None] / error[None, :]
+        total += float((off / error) @ np.linalg.pinv(even, hermitian=True) @ (off / error))
+    return math.sqrt(max(total, 0.0))
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:

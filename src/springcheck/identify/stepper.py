@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify.report import identify
-from springcheck.identify.result import NONE, Identification
+from springcheck.identify.result import Identification
 from springcheck.model import Floats
 from springcheck.schemes import SCHEMES
 
@@ -127,7 +127,7 @@ def identify_stepper(step: Stepper) -> Identification:
         notes.append(f"the stepper looks like different schemes on different springs: {named}")
     if not fits:
         notes += _mass_use(step)
-    backward = _backwards(step, found) if found.scheme != NONE else ""
+    backward = _backwards(step, found) if found.scheme else ""
     fits = fits and not backward
     notes += [backward] if backward else []
     slope, deviation = _order(step)
