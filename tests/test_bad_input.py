@@ -50,7 +50,20 @@ SCENES = {
     "a tolerance of zero": (("tolerance = 1e-12", "tolerance = 0.0"), ("time.tolerance", "0.0")),
     "1e12 frames": (("steps = 200", "steps = 1_000_000_000_000"), ("GB", "free")),
     "a record that misses the end": (("steps = 200", "steps = 200\nevery = 7"), ("every", "7", "200")),
-    "an unknown unit": (('units = "reduced"', 'units = "parsec"'), ("units", "parsec")),
+    "an unknown unit": (('units = "reduced"', 'units = "parsec"'), ("units", "parsec", "reduced, md, si")),
+    "a unit that is no word": (('units = "reduced"', "units = 3"), ("units = 3", "reduced, md, si")),
+    "an unknown quantity": (
+        ("steps = 200", 'steps = 200\n[record]\nquantities = ["q", "v"]'),
+        ("record.quantities[1]", "'v'", "q, p, energy"),
+    ),
+    "quantities that are no list": (
+        ("steps = 200", 'steps = 200\n[record]\nquantities = "q"'),
+        ("record.quantities", "array"),
+    ),
+    "more steps than numbers": (
+        ("steps = 200", f"steps = {10**23}\nevery = {10**23}"),
+        ("time.steps", "2**53"),
+    ),
     "broken TOML": (("[time]", "[time"), ("TOML", "line")),
     "a huge integer": (("steps = 200", "steps = " + "9" * 400), ("time.steps", "finite")),
 }
@@ -85,6 +98,21 @@ def test_a_method_that_is_not_there_is_named_with_those_that_are(
 ) -> None:
     refused(capsys, ["run", "spring", "--method", method], *words)
     assert not list(Path().glob("*.h5"))
+
+
+def test_a_method_that_a_scene_names_wrongly_is_looked_for_in_the_scene(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("mine.toml").write_text(SPRING + '\n[methods]\ninclude = ["own:eular"]\n')
+    refused(capsys, ["run", "mine.toml"], "methods.include", "mine", "own:eular", "own:euler")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_force_puts_no_store_in_the_place_of_a_device_or_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo("pipe.h5")
+    refused(capsys, ["run", "spring", "--method", "own:euler", "--force", "-o", "pipe.h5"], "pipe.h5")
+    assert Path("pipe.h5").is_fifo()
+    assert [path.name for path in Path().iterdir()] == ["pipe.h5"]
 
 
 def test_a_scene_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
@@ -122,6 +150,8 @@ def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     refused(capsys, ["run", "spring", "--method", "own:euler", "-o", "no/where.h5"], "no folder")
     Path("file").write_text("")
     refused(capsys, ["run", "spring", "--method", "own:euler", "-o", "file/x.h5"], "file")
+    main(["run", "spring", "--method", "own:euler", "--quiet"])
+    refused(capsys, ["export", "spring.h5", "own:euler", "no/where.h5md"], "no folder")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

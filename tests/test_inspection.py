@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -14,12 +15,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import springcheck
 from springcheck import engines, exact, inspection, scenes, session, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.figures import trajectories
+from springcheck.figures.style import save
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.stability import limits
 
@@ -232,3 +235,81 @@ def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
             low, high = axes.get_ylim()
             y = np.concatenate([np.asarray(line.get_ydata(), float) for line in lines])
             assert np.mean((low <= y) & (y <= high)) > 0.9, name
+
+
+def drawn(tmp_path: Path, name: str, *methods: str) -> dict[str, Any]:
+    scene, path = scenes.load_scene(name), tmp_path / f"{name}.h5"
+    session.run(scene, path, methods=methods)
+    found = inspection.drawable(path, store.summary(path))
+    return trajectories.pictures(scene, found.runs, found.followed)
+
+
+def test_a_line_that_leaves_the_picture_leaves_it_towards_the_next_state(tmp_path: Path) -> None:
+    axes = drawn(tmp_path, "two-scales", "own:euler", "own:implicit-euler")["phase-portrait"].axes[0]
+    (line,) = (line for line in axes.lines if line.get_label() == "explicit Euler")
+    q, p = line.get_data()
+    run = store.read_one(tmp_path / "two-scales.h5", "own:euler")
+    true = np.arctan2(run.p[1, 0] - run.p[0, 0], run.q[1, 0] - run.q[0, 0])
+    assert np.arctan2(p[1] - p[0], q[1] - q[0]) == pytest.approx(true, abs=1e-5)
+    # from then on every state lies so far outside that no line between two of them is drawn
+    assert np.isnan(q[2::2]).all()
+    assert np.isnan(p[2::2]).all()
+
+
+def test_a_state_brought_nearer_keeps_its_direction_at_any_size() -> None:
+    q, p = np.array([0.3, 3e300, -0.2]), np.array([-0.4, 4e300, 0.1])
+    near_q, near_p = trajectories._nearer(q, p, 1e-200, 1e-200)
+    assert np.isnan(near_q).sum() == 2
+    kept_q, kept_p = near_q[~np.isnan(near_q)], near_p[~np.isnan(near_p)]
+    np.testing.assert_allclose(kept_p * q, kept_q * p, rtol=1e-15)
+    assert np.max(np.abs([kept_q, kept_p])) == pytest.approx(1e-194)
+    np.testing.assert_array_equal(trajectories._nearer(q, p, 1e301, 1e301), (q, p))
+
+
+def test_with_friction_energies_are_drawn_beside_that_of_the_true_motion(tmp_path: Path) -> None:
+    upper, lower = drawn(tmp_path, "rlc-circuit", "own:euler", "sundials:adams")["energy"].axes
+    truth = upper.lines[0]
+    assert truth.get_label() == "true motion"
+    # R/L = 22 Ohm / 3.3 mH: amplitudes fall with exp(-R t/2L), energies with exp(-R t/L) on average
+    t, energy = truth.get_data()
+    rate = np.polyfit(t, np.log(np.asarray(energy, float)), 1)[0]
+    assert rate == pytest.approx(-22 / 3.3e-3, rel=0.02)
+    (adams,) = (line for line in lower.lines if str(line.get_label()).startswith("CVODE"))
+    assert np.max(adams.get_ydata()) < 1e-8
+    assert lower.get_ylabel() == "|energy - true| / start"
+
+
+def test_without_friction_energies_are_drawn_beside_the_start_s(tmp_path: Path) -> None:
+    upper, lower = drawn(tmp_path, "spring-uneven", "own:euler")["energy"].axes
+    assert upper.lines[0].get_label() == "true motion"
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), 1.0)
+    assert lower.get_ylabel() == "|energy - start| / start"
+
+
+def test_drawing_says_nothing_beside_the_names_of_its_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    text = scenes.load_scene("spring").text.replace("Mass on a spring", "\\u8cea\\u91cf")
+    (tmp_path / "mass.toml").write_text(text)
+    path = str(tmp_path / "mass.h5")
+    assert main(["run", str(tmp_path / "mass.toml"), "--method", "own:*", "--quiet", "-o", path]) == 0
+    assert main(["plot", path, "-o", str(tmp_path / "figures")]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 6
+    assert caplog.records == []
+
+
+def test_a_figure_that_cannot_be_written_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = Figure()
+    (png, _) = save(figure, tmp_path, "picture")
+    before = png.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StoreError, match="No space left"):
+        save(figure, tmp_path, "picture")
+    assert png.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"picture.png", "picture.svg"}

@@ -88,7 +88,8 @@ class Drawable:
 def drawable(path: Path, summary: store.Summary) -> Drawable:
     """Scene and trajectories of a store to draw.  SpringcheckError where it has none."""
     if not summary.runs:
-        raise SpringcheckError(f"{path}: holds no trajectory and no study to draw")
+        rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
+        raise SpringcheckError(f"{path}: holds no trajectory and no study to draw{rest}")
     runs: dict[str, Trajectory] = {}
     notes = []
     fast = False

@@ -15,6 +15,7 @@ import numpy as np
 from springcheck import checks, compare, engines, exact, mechanics, scenes, simulate, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Comparison, Floats, Label, Scene, Timing, Trajectory, Verdict
+from springcheck.studies.pieces import command
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
@@ -82,7 +83,13 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
     named = tuple(patterns) or scene.include
     chosen: list[Label] = []
     left: list[LeftOut] = []
-    for label in engines.match(named):
+    try:
+        matched = engines.match(named)
+    except MethodError as error:
+        if patterns:
+            raise
+        raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
+    for label in matched:
         reason = engines.refusal(scene, label) or engines.absence(label.engine)
         if reason is None:
             chosen.append(label)
@@ -117,8 +124,7 @@ def run(
     """
     path = Path(path)
     labels, left = choose(scene, methods)
-    command = "\n".join(["run", *map(str, labels), scene.text])
-    with store.open_new(path, command, force=force) as journal:
+    with store.open_new(path, command("run", labels, scene.text), force=force) as journal:
         resumed = journal.finished()
         store.room(path, store.size(scene) * (len(labels) - len(resumed)))
         for label in tuple(labels):

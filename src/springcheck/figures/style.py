@@ -6,8 +6,10 @@ marker change with the colour, so that a grey print can be read too.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from springcheck.errors import StoreError
+from springcheck.store import files
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
@@ -28,6 +31,8 @@ _RC: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    # times of 1e-4 s as a factor beside the axis: as they are their numbers run into each other
+    "axes.formatter.limits": (-3, 5),
     "grid.color": "#dddddd",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.3,
@@ -60,7 +65,12 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for ending in ("png", "svg"):
             path = folder / f"{name}.{ending}"
-            figure.savefig(path, metadata={"Date": None} if ending == "svg" else None)
+            drawn = BytesIO()
+            with warnings.catch_warnings():
+                # a title may be in any script: what the font has not is drawn as boxes
+                warnings.filterwarnings("ignore", message="Glyph .* missing from")
+                figure.savefig(drawn, format=ending, metadata={"Date": None} if ending == "svg" else None)
+            files.put_bytes(drawn.getvalue(), path)
             written.append(path)
     except OSError as error:
         raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 
 from springcheck import exact, mechanics
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.model import Floats, Scene, Trajectory
+from springcheck.model import Floats, Reals, Scene, Trajectory
 from springcheck.schemes import SCHEMES
 
 UNITS = {
@@ -28,6 +29,9 @@ ROOM = 5.0
 
 ENERGY_ROOM = 1e3
 """The same for energies."""
+
+FAR = 1e6
+"""How many times the room outside a line is drawn to: far enough to leave the picture in its direction."""
 
 DECADES = 100.0
 """Ratio of largest to smallest energy from which the scale is logarithmic."""
@@ -72,7 +76,8 @@ def _groups(runs: Mapping[str, Trajectory]) -> list[Group]:
     found: dict[str, list[Trajectory]] = {}
     for run in runs.values():
         found.setdefault(run.scheme, []).append(run)
-    return [(SCHEMES[name].title, members) for name, members in found.items()]
+    # what follows a colon tells how the scheme goes, too long for a legend
+    return [(SCHEMES[name].title.partition(":")[0], members) for name, members in found.items()]
 
 
 def _all(groups: Sequence[Group]) -> list[Trajectory]:
@@ -127,12 +132,35 @@ def _room(groups: Sequence[Group], pick: Any, truth: Floats | None) -> float:
 
 def _within(x: Floats, room: float) -> Floats:
     """Values far outside of the picture brought nearer, for what draws them overflows."""
-    return np.clip(x, -10 * room, 10 * room) if room > 0 else x
+    return np.clip(x, -FAR * room, FAR * room) if room > 0 else x
 
 
-def _fit(limits: tuple[float, float], room: float) -> tuple[float, float]:
+def _nearer(q: Floats, p: Floats, q_room: float, p_room: float) -> tuple[Floats, Floats]:
+    """The same for states: along the ray from the middle, so that lines leave the picture where they do.
+
+    Two that lie so far outside are not joined (NaN between them): brought nearer, their line would cross the
+    picture where that of the states does not.
+    """
+    if not (q_room > 0 and p_room > 0):
+        return _within(q, q_room), _within(p, p_room)
+    # in extended precision: 1e300 over a room of 1e-200 overflows
+    x, y = (np.asarray(one, np.longdouble) / room for one, room in ((q, q_room), (p, p_room)))
+    scale = np.maximum(1, np.maximum(np.abs(x), np.abs(y)) / FAR)
+    far = scale > 1
+    breaks = 1 + np.flatnonzero(far[1:] & far[:-1])
+    near_q, near_p = (np.insert(np.asarray(one / scale, np.float64), breaks, np.nan) for one in (q, p))
+    return near_q, near_p
+
+
+def _title(axes: Axes, text: str) -> None:
+    # the legend stands beside the axes, at the height of the title
+    axes.set_title(textwrap.fill(text, 56))
+
+
+def _fit(limits: Sequence[float] | Floats, room: float) -> tuple[float, float]:
     """Limits of an axis, those beyond the room drawn in."""
-    return (max(limits[0], -room), min(limits[1], room)) if room > 0 else limits
+    low, high = map(float, limits)
+    return (max(low, -room), min(high, room)) if room > 0 else (low, high)
 
 
 def _overlay(axes: Axes, groups: Sequence[Group], pick: Any) -> None:
@@ -155,13 +183,14 @@ def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
         )
     q_room = _room(groups, lambda run: run.q[:, 0], None if truth is None else truth[1][:, 0])
     p_room = _room(groups, lambda run: run.p[:, 0], None if truth is None else truth[2][:, 0])
-    _overlay(axes, groups, lambda run: (_within(run.q[:, 0], q_room), _within(run.p[:, 0], p_room)))
-    axes.set_xlim(_fit(axes.get_xlim(), q_room))
-    axes.set_ylim(_fit(axes.get_ylim(), p_room))
+    _overlay(axes, groups, lambda run: _nearer(run.q[:, 0], run.p[:, 0], q_room, p_room))
+    # of the data, not of the axes: equal scales widen limits that are free, and warn of those that are set
+    axes.dataLim.intervalx = np.asarray(_fit(axes.dataLim.intervalx, q_room))
+    axes.dataLim.intervaly = np.asarray(_fit(axes.dataLim.intervaly, p_room))
     axes.plot(*[[float(x[0])] for x in (scene.q, scene.p)], "k+", markersize=10, label="start")
     axes.set_xlabel(f"{_q(scene)}{q_unit}")
     axes.set_ylabel(f"{_p(scene)}{p_unit}")
-    axes.set_title(f"{scene.title}: phase portrait{_which(scene)}")
+    _title(axes, f"{scene.title}: phase portrait{_which(scene)}")
     if scene.units == "reduced":
         axes.set_aspect("equal", adjustable="datalim")
     _legend(figure, axes)
@@ -181,43 +210,64 @@ def _position(scene: Scene, groups: Sequence[Group]) -> Figure:
     axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_xlabel(f"time t{t_unit}")
     axes.set_ylabel(f"{_q(scene)}{q_unit}")
-    axes.set_title(f"{scene.title}: {_q(scene).split()[0]}{_which(scene)}")
+    _title(axes, f"{scene.title}: {_q(scene).split()[0]}{_which(scene)}")
     _legend(figure, axes)
     return figure
 
 
 def _energy(scene: Scene, groups: Sequence[Group]) -> Figure:
-    """Energy over time, and below it how far it is from the start's on a logarithmic scale."""
+    """Energy over time, and below it how far it is from that of the true motion on a logarithmic scale.
+
+    Without friction that is the start's; where friction acts and no closed form is known, the start's too,
+    and the axis says so.
+    """
     _, _, t_unit, e_unit = _units(scene)
     figure = Figure(figsize=(7.6, 6.2), layout="constrained")
     upper, lower = figure.subplots(2, sharex=True)
     start = float(mechanics.energy(scene, scene.q, scene.p))
     unit = abs(start) or 1.0
 
-    def energies(run: Trajectory) -> Floats:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(mechanics.energy(scene, run.q, run.p), np.float64)
+    damped = mechanics.is_damped(scene)
+    truth = true_motion(scene, _all(groups)) if damped else None
 
-    upper.axhline(start / unit, color="#999999", linewidth=4, alpha=0.6, label="true motion")
-    _overlay(upper, groups, lambda run: (run.t, _within(energies(run) / unit, ENERGY_ROOM)))
-    shown = np.concatenate([energies(run) / unit for run in _all(groups)])
+    def energies(q: Reals, p: Reals) -> Floats:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(mechanics.energy(scene, q, p), np.float64)
+
+    def right(run: Trajectory) -> Floats | float:
+        if truth is None:
+            return start
+        return energies(*exact.true_motion(scene, np.rint(run.t / run.step).astype(np.int64), run.step))
+
+    look: dict[str, Any] = {"color": "#999999", "linewidth": 4, "alpha": 0.6, "label": "true motion"}
+    if truth is not None:
+        upper.plot(truth[0], energies(*truth[1:]) / unit, **look)
+    elif not damped:
+        upper.axhline(start / unit, **look)
+    _overlay(upper, groups, lambda run: (run.t, _within(energies(run.q, run.p) / unit, ENERGY_ROOM)))
+    # below one unit in the last place of the start there is nothing to see
+    floor = 2.0**-53
+    shown = np.concatenate([energies(run.q, run.p) / unit for run in _all(groups)])
+    low, high = _fit(upper.get_ylim(), ENERGY_ROOM)
     if np.min(shown) > 0 and np.max(shown) > DECADES * np.min(shown):
         upper.set_yscale("log")
-    upper.set_ylim(_fit(upper.get_ylim(), ENERGY_ROOM))
+        low, high = _fit(upper.get_ylim(), ENERGY_ROOM)
+        low = max(low, floor)
+    upper.set_ylim(low, high)
     upper.set_ylabel("energy / energy of the start" if start else f"energy{e_unit}")
-    upper.set_title(f"{scene.title}: energy")
-
-    # below one unit in the last place there is nothing to see: such points stand on the lower edge
-    floor = 2.0**-53
+    _title(upper, f"{scene.title}: energy")
 
     def apart(run: Trajectory) -> Floats:
-        return _within(np.maximum(np.abs(energies(run) - start) / unit, floor), ENERGY_ROOM)
+        # what differs by less than the floor stands on the lower edge
+        off = np.abs(energies(run.q, run.p) - right(run)) / unit
+        return _within(np.maximum(off, floor), ENERGY_ROOM)
 
     _overlay(lower, groups, lambda run: (run.t, apart(run)))
     lower.set_yscale("log")
     lower.set_ylim(_fit(lower.get_ylim(), ENERGY_ROOM))
     lower.set_xlabel(f"time t{t_unit}")
-    lower.set_ylabel("|energy - start| / start" if start else f"|energy - start|{e_unit}")
+    known = "start" if truth is None else "true"
+    lower.set_ylabel(f"|energy - {known}|" + (" / start" if start else e_unit))
     _legend(figure, upper)
     return figure
 

@@ -97,8 +97,12 @@ def _explain(message: str, data: Any) -> str:
             found = found[int(part)] if part.isdigit() else found[part]
         except (KeyError, IndexError, TypeError):
             found = None
-    what = what[0].lower() + what[1:]
-    if "unknown field" in what or "missing required field" in what:
+    what = (what[0].lower() + what[1:]).replace("missing required field", "lacks the field")
+    what = what.replace("contains unknown field", "has the unknown field")
+    accepted = tables.CHOICES.get(re.sub(r"\[\d+\]$", "[]", field))
+    if accepted:
+        return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
+    if "unknown field" in what or "lacks the field" in what:
         table = tables.FIELDS.get(re.sub(r"\[.*", "", field))
         known = f"; its fields are {', '.join(table.__struct_encode_fields__)}" if table else ""
         return f"{field or 'the scene'}: {what.replace('object', 'it')}{known}"

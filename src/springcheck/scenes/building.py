@@ -28,11 +28,19 @@ class _Bodies:
     name: str
 
 
+MOST_STEPS = 2**53
+"""Numbers of steps up to which each is a double of its own."""
+
+
 def scene(table: Any, *, name: str, text: str) -> Scene:
     """The scene of a `tables.SceneTable`.  Raises MistakeError."""
     time = table.time
     if time.step == 0:
         raise MistakeError("time.step = 0: a step forwards (> 0) or backwards (< 0) is needed")
+    if time.steps > MOST_STEPS:
+        raise MistakeError(
+            f"time.steps = {time.steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h"
+        )
     if time.every is not None and table.record.every is not None:
         raise MistakeError("record.every and time.every are both given; keep record.every")
     every = table.record.every or time.every or 1

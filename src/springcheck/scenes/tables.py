@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeAlias, cast, get_args
 
 import msgspec
 
@@ -12,6 +12,7 @@ from springcheck.model import Kind, Units
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=1)]
 End = int | Literal["wall"]
+Quantity: TypeAlias = Literal["q", "p", "energy"]
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -114,7 +115,7 @@ class RecordTable(Table, frozen=True):
     """Every how many steps a frame is kept, and what of it."""
 
     every: Count | None = None
-    quantities: tuple[Literal["q", "p", "energy"], ...] = ("q", "p", "energy")
+    quantities: tuple[Quantity, ...] = ("q", "p", "energy")
 
 
 class SceneBase(Table, frozen=True):
@@ -161,6 +162,13 @@ SceneTable = msgspec.defstruct(
     rename=lambda name: name.replace("_", "-"),
 )
 """A whole scene file."""
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "units": get_args(Units),
+    "kind": get_args(Kind),
+    "record.quantities[]": get_args(Quantity),
+}
+"""What a field of a few words accepts, for messages; of a list, what each of its entries does."""
 
 FIELDS: dict[str, type[Table]] = {
     "": cast(type[Table], SceneTable),

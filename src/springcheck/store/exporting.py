@@ -20,6 +20,9 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
     path, out = Path(path), Path(out)
     if out.exists():
         raise StoreError(f"{out} exists: remove it or name another file")
+    folder = out.absolute().parent
+    if not folder.is_dir():
+        raise StoreError(f"cannot write {out}: there is no folder {folder}")
     if out.suffix != ".h5md":
         raise StoreError(f"{out}: the name must end in .h5md, readers go by it")
     source = reading.source_of(path, label)

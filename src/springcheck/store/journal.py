@@ -44,6 +44,9 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         raise StoreError(f"cannot write {path}: there is no folder {folder}")
     if path.is_dir():
         raise StoreError(f"cannot write {path}: it is a folder")
+    if path.exists() and not path.is_file():
+        # --force would put a file in the place of /dev/null
+        raise StoreError(f"cannot write {path}: it is a device or a pipe, a store is a file")
     if path.suffix == ".toml":
         # a slip of the hand with --force would cost the scene
         raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")

@@ -78,10 +78,10 @@ def origin(labels: Iterable[Label]) -> dict[str, str]:
 
 
 def command(study: str, labels: Sequence[Label], *options: str) -> str:
-    """All that decides a study's numbers, by which its journal is recognised.
+    """All that decides the numbers of a study or a run, by which its journal is recognised.
 
     The machine and the versions are part of it: times of two machines, limits of two releases of an
-    engine, do not belong into one study.
+    engine, do not belong into one file.
     """
     versions = [f"{name} {version}" for name, version in origin(labels).items()]
     return "\n".join([study, *map(str, labels), *versions, *options])
