@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import scenes, store
+from springcheck import cli, report, scenes, store
 from springcheck.cli import main
 
 OWN = ["--method", "own:*"]
@@ -197,6 +198,43 @@ def test_a_stored_run_is_repeated_bit_for_bit(
     assert repeat["equal"] is False
     assert 1e-16 < repeat["difference"] < 1e-11
     assert {path.name for path in Path().iterdir()} == {"spring-uneven.h5"}
+
+
+def test_a_store_in_a_folder_that_is_read_only_is_run_again(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["run", "spring", "--method", "own:euler", "--quiet"]) == 0
+    made: list[str | None] = []
+    folder = tempfile.TemporaryDirectory
+
+    def noted(dir: str | None = None, prefix: str | None = None) -> tempfile.TemporaryDirectory[str]:
+        made.append(dir and str(dir))
+        return folder(prefix=prefix)
+
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", noted)
+    assert main(["run", "--from", "spring.h5"]) == 0
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert main(["run", "--from", "spring.h5"]) == 0
+    assert made == [str(Path.cwd()), None]
+    assert capsys.readouterr().out == "own:euler: equal bit for bit\n" * 2
+
+
+def test_a_narrow_terminal_cuts_no_number_and_breaks_sentences(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers, sentences = report.grid(), report.grid()
+    words = [f"{i / 7:.15f} us" for i in range(6)]
+    for _ in words:
+        numbers.add_column("", no_wrap=True)
+        sentences.add_column("")
+    numbers.add_row(*words)
+    sentences.add_row(*["half a kick too early"] * 6)
+    monkeypatch.setenv("TERM", "dumb")  # 80 columns, no colours
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    cli._show([numbers])
+    assert capsys.readouterr().out.split() == " ".join(words).split()
+    cli._show([sentences])
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 
 
 def test_force_never_overwrites_a_scene(capsys: pytest.CaptureFixture[str]) -> None:

@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
-        "2 bad input, or nothing was measured.",
+        f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
@@ -186,13 +186,31 @@ def _show(lines: Sequence[RenderableType], *, quiet: bool = False) -> None:
     console = _console(quiet)
     if quiet or sys.stdout.isatty():
         for line in lines:
-            console.print(line)
+            wide = None if quiet else _wider(line, console)
+            (wide or console).print(line)
         return
     with console.capture() as captured:
         for line in lines:
             console.print(line)
     # a table's last column is padded, which a file or a diff need not keep
     print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
+def _wider(line: RenderableType, console: Console) -> Console | None:
+    """A console for a table of unbroken words that is wider than the terminal, which may fold its rows.
+
+    Drawn in to the terminal's width, its numbers would lose digits and units.
+    """
+    from rich.console import Console
+    from rich.measure import Measurement
+    from rich.table import Table
+
+    if not isinstance(line, Table) or not all(column.no_wrap for column in line.columns):
+        return None
+    needed = Measurement.get(console, console.options.update(max_width=1000), line).maximum
+    if needed <= console.width:
+        return None
+    return Console(highlight=False, width=needed, height=console.height)
 
 
 def _document(data: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -288,7 +289,10 @@ def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None =
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(stored)}")
     scene = stored_scene(path)
     found = []
-    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=".springcheck-") as folder:
+    beside = path.absolute().parent
+    # where there was room for the store there is room for its repetition, unless it is kept read-only
+    place = beside if os.access(beside, os.W_OK) else None
+    with tempfile.TemporaryDirectory(dir=place, prefix=".springcheck-") as folder:
         again = Path(folder) / "again.h5"
         with store.open_new(again, "repeat") as journal:
             for name in chosen:
