@@ -401,3 +401,11 @@ def test_the_cheapest_way_is_the_fastest_that_is_good_enough() -> None:
     assert fits.cheapest(points, 1e-1) is points[0]
     assert fits.cheapest(points, 1e-2) is points[3]
     assert fits.cheapest(points, 1e-6) is None
+
+
+def test_a_scene_whose_coarsest_run_would_never_end_is_told(tmp_path: Path) -> None:
+    scene = replace(scenes.load_scene("spring-uneven"), step=1e300)
+    labels = [engines.parse("own:euler"), engines.parse("own:implicit-euler")]
+    found = precision.record(scene, labels, tmp_path / "study.h5", budget=0.5)
+    assert [point.outcome for point in found.points] == ["cannot run"] * 2
+    assert all("its coarsest run takes" in point.message for point in found.points)

@@ -489,3 +489,9 @@ def test_a_new_file_in_the_folder_is_a_scene_with_no_other_edit(
     assert found["scene"] == "harder"
     assert all(v["passed"] is not False for v in found["verdicts"])
     assert (tmp_path / "harder.h5").is_file()
+
+
+def test_the_heaviest_mass_has_its_energy() -> None:
+    text = (scenes.folder() / "spring.toml").read_text()
+    scene = scenes.parse(text.replace("mass = 1.0", "mass = 1.6e308"), name="heavy")
+    assert float(mechanics.kinetic_energy(scene, np.array([3e10]))) == 9e20 / 1.6e308 / 2

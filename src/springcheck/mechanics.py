@@ -220,7 +220,8 @@ def steepest(scene: Scene, q: Reals) -> Floats:
 
 def kinetic_energy(scene: Scene, p: Reals) -> Reals:
     """Sum of p**2 / 2m of states p (..., n) -> (...) [M L2/T2]."""
-    return np.asarray(np.sum(p * p / (2 * scene.m), axis=-1))
+    # 2 m would overflow from half the largest number on
+    return np.asarray(np.sum(0.5 * (p * p) / scene.m, axis=-1))
 
 
 def energy(scene: Scene, q: Reals, p: Reals) -> Reals:

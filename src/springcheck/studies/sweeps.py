@@ -64,6 +64,10 @@ class Sweep:
         return [point for point in self.points if point.complete]
 
 
+MOST_STEPS = 2**31
+"""Steps from which on no point is measured: seconds of the fastest method here, days of the slowest."""
+
+
 def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     """A sweep at its coarsest point, or at its end where the method cannot run."""
     method = engines.method(label)
@@ -81,7 +85,10 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
         try:
             sweep.arithmetic = engines.load(label.engine).arithmetic(label)
             sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
-            sweep.scene = next(sweep.scenes)
+            sweep.scene = next(sweep.scenes, None)
+            if sweep.scene is None:
+                needed = coarsest(known, limit)
+                raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
             began = perf_counter()
             simulate.bare(sweep.scene, label, planned=PLANNED)
             sweep.first_start = perf_counter() - began
@@ -121,7 +128,7 @@ def coarsest(known: Truth, limit: float) -> int:
 def by_step(scene: Scene, limit: float, known: Truth) -> Iterator[Scene]:
     """The scene in ever more steps, read at the same instants from some 4096 steps on."""
     steps, every = coarsest(known, limit), 1
-    while steps < 2**31:
+    while steps < MOST_STEPS:
         yield replace(scene, step=known.duration / steps, steps=steps, every=every)
         steps *= 2
         every = every * 2 if steps // every > FRAMES else every
