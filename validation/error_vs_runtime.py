@@ -44,6 +44,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from arguments import arguments
 from springcheck import engines, report, scenes, session
 from springcheck.figures import precision as figure
 from springcheck.schemes import SCHEMES
@@ -67,10 +68,10 @@ def failures(study: PrecisionStudy) -> list[str]:
     return out
 
 
-def main(arguments: list[str]) -> int:
+def main() -> int:
     """Study every scene, print tables, draw figures."""
-    folder = Path(arguments[0] if arguments else "figures")
-    budget = float(arguments[1]) if len(arguments) > 1 else precision.BUDGET
+    given = arguments(__doc__, folder=Path("figures"), budget=precision.BUDGET)
+    folder, budget = given.folder, given.budget
     console = Console(width=100, highlight=False)
     wrong = []
     for name in SCENES:
@@ -88,4 +89,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -12,17 +12,17 @@ for all that is tried.
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 
+from arguments import arguments
 from springcheck.figures import extremes as figures
 from springcheck.studies import extremes
 
 
 def main() -> int:
     """Print counts, reasons and windows, and draw the atlas; 1 where a cell is silently wrong."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "figures")
+    folder = arguments(__doc__, folder=Path("figures")).folder
     began = time.perf_counter()
     atlas = extremes.measure()
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")

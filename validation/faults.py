@@ -17,6 +17,7 @@ Expected (smallest relative size that any check sees on one spring, h w = 0.09, 
 
 import sys
 
+from arguments import arguments
 from springcheck import engines, simulate
 from springcheck.faults import ENGINES, FaultReport, study
 
@@ -34,6 +35,7 @@ def table(found: FaultReport) -> list[str]:
 
 def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
+    arguments(__doc__)
     labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
     found = study(simulate.run, labels, workers=2)
     for line in table(found):

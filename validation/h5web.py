@@ -36,6 +36,8 @@ from selenium.webdriver import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
+from arguments import arguments
+
 STORES = {
     "spring": ("run", "spring"),
     "spring-uneven": ("run", "spring-uneven", "--method", "own:euler"),
@@ -158,7 +160,7 @@ def _asked(where: str, node: Any) -> list[tuple[str, Any]]:
 
 def main() -> int:
     """Make the stores, serve them, look at them."""
-    pictures = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    pictures = arguments(__doc__, folder=Path).folder
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     address = f"http://127.0.0.1:{port}"

@@ -24,11 +24,11 @@ Command: python validation/identify_census.py [double|single|text|computed-singl
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 
 import numpy as np
 
+from arguments import arguments
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.search import aliases
@@ -103,9 +103,8 @@ def judged(name: str, stride: int, found: Identification) -> tuple[str, bool]:
 
 def main() -> None:
     """Print, scheme by scheme, what the springs were taken for."""
-    form = sys.argv[1] if len(sys.argv) > 1 else "double"
-    count = int(sys.argv[2]) if len(sys.argv) > 2 else 200
-    chosen = sys.argv[3:]
+    given = arguments(__doc__, form="double", count=200, schemes=[])
+    form, count, chosen = given.form, given.count, given.schemes
     if form not in FORMS:
         raise SystemExit(f"form {form!r}: one of {', '.join(FORMS)}")
     width = np.float32 if form.startswith("computed") else np.float64

@@ -44,6 +44,7 @@ from time import perf_counter
 
 import numpy as np
 
+from arguments import arguments
 from springcheck.engines.own import simulation
 from springcheck.model import Floats, Scene, Term
 from springcheck.terms import Spring, WallSpring
@@ -303,6 +304,7 @@ def short_run() -> bool:
 
 def main() -> int:
     """Run every part; 1 where a ratio is too large."""
+    arguments(__doc__)
     with tempfile.TemporaryDirectory() as folder:
         plain = native = None
         if shutil.which("cc"):

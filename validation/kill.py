@@ -14,7 +14,7 @@ sizes, a read-only folder, a reader that holds the file open through a commit, a
 
 Kills show that no order of operations loses anything; that fsync reaches the disk is the system's word.
 
-Expected, in about four minutes on two cores: every line ends in "lost 0".
+Expected, in about eight minutes on two cores: every line ends in "lost 0".
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from pathlib import Path
 
 import numpy as np
 
+from arguments import arguments
 from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.model import Scene
@@ -225,18 +226,18 @@ def commands(folder: Path, kills: int) -> int:
     rng = random.Random(21)
     losses = 0
     own = ["--method", "own:*", "--quiet"]
-    for name, longest, arguments in (
+    for name, longest, words in (
         ("run", 0.25, ["run", "spring", *own]),
         ("precision", 0.8, ["precision", "spring-uneven", "--budget", "2", *own]),
         ("stability", 0.8, ["stability", "overdamped", *own]),
         ("extremes", 0.4, ["extremes", "--quick", *own]),
     ):
         path = folder / f"{name}.h5"
-        work = partial(command, [*arguments, "-o", str(path)])
+        work = partial(command, [*words, "-o", str(path)])
         killed, rounds, kept = 0, 0, 0
         known: dict[str, object] = {}
         # once through here, so that what is forked has imported and compiled everything
-        losses += cli.main([*arguments, "-o", str(path)])
+        losses += cli.main([*words, "-o", str(path)])
         path.unlink()
         while killed < kills // 4 or known:
             pid, pipe = child(work)
@@ -263,9 +264,9 @@ def commands(folder: Path, kills: int) -> int:
     return losses
 
 
-def command(arguments: list[str], say: Callable[[str], None]) -> None:
+def command(words: list[str], say: Callable[[str], None]) -> None:
     """One command line, and its exit status."""
-    say(f"ended {cli.main(arguments)}")
+    say(f"ended {cli.main(words)}")
 
 
 def finished(path: Path) -> dict[str, object]:
@@ -427,7 +428,7 @@ def main() -> int:
     if sys.argv[1:2] == ["--limited"]:
         limited(Path(sys.argv[2]), int(sys.argv[3]))
         return 0
-    kills = int(sys.argv[1]) if len(sys.argv) > 1 else 400
+    kills = arguments(__doc__, kills=400).kills
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o755)

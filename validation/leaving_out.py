@@ -23,6 +23,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from arguments import arguments
+
 REPEATS = 7
 
 LIBRARIES = ("openmm", "ase", "sksundae", "numba", "scipy", "matplotlib", "rich", "msgspec", "h5py", "numpy")
@@ -104,6 +106,7 @@ def measure(codes: dict[str, str]) -> list[Cost]:
 
 def main() -> int:
     """Print the costs; returns 1 where the smallest run misses its memory, or imports what it must not."""
+    arguments(__doc__)
     small = ["run", "spring", "--method", "own:*", "--quiet"]
     codes = {
         "import numpy, h5py": "import numpy, h5py",

@@ -29,6 +29,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from arguments import arguments
 from springcheck import store
 from springcheck.model import Floats, Scene
 
@@ -162,19 +163,19 @@ def compression() -> None:
         print(f"{name:17s} {share:5.2f} of the bytes, {to:5.0f} MB/s written, {back:5.0f} read")
 
 
-def commanded(arguments: list[str], folder: Path) -> tuple[float, float]:
+def commanded(words: list[str], folder: Path) -> tuple[float, float]:
     """Seconds and peak memory [MiB] of a command; its memory is that of a process of its own."""
     start = time.perf_counter()
     with (folder / "out").open("w") as out:
         pid = os.posix_spawn(
             sys.executable,
-            [sys.executable, "-m", "springcheck", *arguments],
+            [sys.executable, "-m", "springcheck", *words],
             os.environ,
             file_actions=[(os.POSIX_SPAWN_DUP2, out.fileno(), 1)],
         )
         _, status, used = os.wait4(pid, 0)
     if status:
-        raise SystemExit(f"springcheck {' '.join(arguments)}: status {os.waitstatus_to_exitcode(status)}")
+        raise SystemExit(f"springcheck {' '.join(words)}: status {os.waitstatus_to_exitcode(status)}")
     return time.perf_counter() - start, used.ru_maxrss / 1024
 
 
@@ -187,7 +188,7 @@ def commands(frames: int, bare: float) -> list[str]:
         for length, steps in (("short", 199), ("long", frames - 1)):
             toml, file = folder / f"{length}.toml", str(folder / f"{length}.h5")
             toml.write_text(SCENE.format(steps=steps, every=1))
-            for what, arguments in {
+            for what, words in {
                 "run": ["run", str(toml), "-o", file],
                 "inspect": ["inspect", file],
                 "inspect --trajectory": ["inspect", file, "--trajectory", "own:semi-implicit-euler"],
@@ -195,7 +196,7 @@ def commands(frames: int, bare: float) -> list[str]:
                 "identify": ["identify", file],
                 "check": ["check", file],
             }.items():
-                seconds, memory = commanded(arguments, folder)
+                seconds, memory = commanded(words, folder)
                 if length == "short":
                     base[what] = memory
                     continue
@@ -217,7 +218,7 @@ def main() -> int:
     if sys.argv[1:2] and sys.argv[1] in {"ours", "plain"}:
         alone(sys.argv[1], int(sys.argv[2]), float(sys.argv[3]))
         return 0
-    frames = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
+    frames = int(arguments(__doc__, frames=1e8).frames)
     failed, bare = [], 0.0
     for mass in MASSES:
         found = [(timed("plain", frames, mass)[0], *timed("ours", frames, mass)) for _ in range(3)]

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from arguments import arguments
 from springcheck import run
 from springcheck.checks import laws
 from springcheck.figures import style
@@ -50,7 +51,7 @@ def scene(h: float) -> Scene:
 
 def main() -> int:
     """Run, fit, draw; the exit status says whether the drift is the predicted one."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "validation-output")
+    folder = arguments(__doc__, folder=Path("validation-output")).folder
     good = True
     with style.style():
         figure = Figure(figsize=(7.2, 3.2), layout="constrained")

@@ -26,6 +26,7 @@ from ase import Atoms
 from ase.md.verlet import VelocityVerlet
 from sksundae.cvode import CVODE
 
+from arguments import arguments
 from springcheck import engines, load_scene
 from springcheck.engines.ase.simulation import Springs
 from springcheck.engines.sundials.simulation import MOST_STEPS, absolute_tolerance
@@ -153,7 +154,7 @@ def in_turn(repeats: int, *sides: Callable[[], float]) -> list[Floats]:
 
 def main() -> int:
     """Measure and print; the exit status says whether the claims hold."""
-    repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    repeats = arguments(__doc__, repeats=5).repeats
     scene = replace(load_scene("spring-uneven"), steps=FRAMES)
     good = True
 

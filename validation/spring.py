@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from arguments import arguments
 from springcheck import compare, load_scene, mechanics, run
 from springcheck.checks import judge
 from springcheck.figures import trajectories
@@ -42,7 +43,7 @@ PAIRS = [
 
 def main() -> int:
     """Run, compare, plot; the exit status says whether all of it came out."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "validation-output")
+    folder = arguments(__doc__, folder=Path("validation-output")).folder
     scene = load_scene("spring")
     runs = {label: run(scene, label) for label in METHODS}
     good = True

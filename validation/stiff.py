@@ -14,9 +14,9 @@ moves too fast by 1.2e-2 of the amplitude.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+from arguments import arguments
 from springcheck import scenes
 from springcheck.figures import stability as figures
 from springcheck.studies import stability
@@ -26,7 +26,7 @@ SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
 
 def main() -> int:
     """Print limits, regions, bands and costs, and draw them; 1 where something is not where theory has it."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "figures")
+    folder = arguments(__doc__, folder=Path("figures")).folder
     passed = True
     for name in SCENES:
         study = stability.measure(scenes.load_scene(name))

@@ -29,6 +29,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from arguments import arguments
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.model import Scene
@@ -148,7 +149,7 @@ def attempt(path: Path, kind: str, truth: bytes) -> list[str]:
 
 def main() -> int:
     """All files; the exit status says whether one was not told properly."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 2400
+    count = arguments(__doc__, files=2400).files
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         sources = originals(folder)

@@ -37,6 +37,7 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
+from arguments import arguments
 from springcheck import engines, scenes, simulate
 
 M, K, Q, P = 3.7, 2.9, 0.3, 0.7
@@ -137,6 +138,7 @@ BARE: dict[str, tuple[Run, int]] = {
 
 def main(repeats: int = 300) -> int:
     """Measure in turn, print a line for each method, compare."""
+    arguments(__doc__)
     scene = scenes.load_scene("spring-uneven")
     best: dict[str, list[float]] = {name: [np.inf, np.inf] for name in BARE}
     for _ in range(repeats):
