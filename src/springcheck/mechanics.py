@@ -310,10 +310,15 @@ class Norm:
 
     def __call__(self, dq: Reals, dp: Reals) -> Floats:
         """(..., n) and (..., n) -> (...).  At rest in equilibrium the unit is 0 and any error infinite."""
+        size = self.size(dq, dp)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            wide = np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble)
-            size = np.sqrt(_size(self.scene, self.groups, self.duration, *wide))
             return np.asarray(np.where(size == 0, 0, size / self.unit), dtype=np.float64)
+
+    def size(self, dq: Reals, dp: Reals) -> Extended:
+        """The same, not divided by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            wide = np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble)
+            return np.asarray(np.sqrt(_size(self.scene, self.groups, self.duration, *wide)), np.longdouble)
 
 
 def _size(scene: Scene, groups: tuple[Integers, ...], duration: float, dq: Reals, dp: Reals) -> Reals:

@@ -71,18 +71,35 @@ def step_defect(case: Case) -> Verdict:
             )
         why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
     seen = _defects(case)
+    value = float(np.max(seen))
+    run = case.trajectory
+    if value <= bound and 0 < np.max(_in_roundings(case, run.q[:-1], run.p[:-1])) <= bound:
+        return case.not_applicable("step-defect", f"{STILL} any step")
     why = _beyond_range(case, ~(seen <= bound)) or why
-    return case.verdict("step-defect", float(np.max(seen)), bound, "roundings", why)
+    return case.verdict("step-defect", value, bound, "roundings", why)
+
+
+STILL = "standing still would pass: rounding may be as large as"
+"""A check that an engine passes which does not move says nothing of one that does."""
 
 
 def _defects(case: Case) -> Reals:
     """How far each frame is from the scheme's own steps after the frame before (f-1,), in roundings."""
+    return _in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:])
+
+
+def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
+    """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
     q, p = case.next_states
-    dq, dp = np.abs(q - case.trajectory.q[1:]), np.abs(p - case.trajectory.p[1:])
+    dq, dp = np.abs(q - to_q), np.abs(p - to_p)
     of_q, of_p = case.allowance
     if case.trajectory.every == 1:
         return np.asarray(np.max(np.maximum(dq / of_q, dp / of_p), axis=1))
-    return case.norm(dq, dp) / np.max(case.norm(of_q, of_p))
+    # of both ends of each stretch, the far one where the scheme itself comes to, and of what lies before:
+    # a frame that is wrong must not enlarge what it is judged by
+    ends = case.allowance, case.allowance_at(q, p)
+    unit = np.maximum.accumulate(np.max([case.norm.size(*end) for end in ends], axis=0))
+    return np.asarray(case.norm.size(dq, dp) / unit)
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
@@ -147,16 +164,23 @@ def growth_bound(case: Case) -> tuple[Floats, Floats]:
 
     One rounding a step, enlarged by the map from the step where it arises, and all of one sign.
     """
+    bound, unit = _growth(case)
+    with np.errstate(divide="ignore", over="ignore"):
+        return bound, np.asarray(unit / case.norm.unit, np.float64)
+
+
+def _growth(case: Case) -> tuple[Floats, Extended]:
+    """The same with the unit as a root of an energy: see `mechanics.Norm.size`."""
     total, grown = schemes.amplification(case.matrices, case.w, case.steps)
-    size = case.norm(*case.allowance)
+    size = case.norm.size(*case.allowance)
     size = np.maximum.accumulate(np.concatenate([size[:1], size]))
     if case.steps[0] == 0:
         first = size[0]
     else:
         # a piece of a long run: what came before it is bounded by the envelope of the motion
-        first = max(case.norm(*case.allowance_at(*x)) for x in (case.envelope, (case.scene.q, case.scene.p)))
-    unit = np.maximum(size, np.asarray(first * grown, np.float64))
-    return np.asarray(case.roundings * total), np.asarray(unit)
+        before = case.envelope, (case.scene.q, case.scene.p)
+        first = np.max([case.norm.size(*case.allowance_at(*x)) for x in before])
+    return np.asarray(case.roundings * total), np.asarray(np.maximum(size, first * grown))
 
 
 def closed_form(case: Case) -> Verdict:
@@ -166,11 +190,15 @@ def closed_form(case: Case) -> Verdict:
         return case.not_applicable("closed-form", why_not)
     y, v = closed_states(case)
     q, p = case.modes.out_of(y + case.modes.centre(), v)
-    distance = case.norm(case.trajectory.q - q, case.trajectory.p - p)
-    bound, unit = growth_bound(case)
+    distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
+    moved = case.norm.size(q - case.scene.q, p - case.scene.p)
+    bound, unit = _growth(case)
     late = case.steps > 0
-    ratio = np.where(late, distance / unit / np.where(late, bound, 1), 0)
+    allowed = np.where(late, bound * unit, 1)
+    ratio = np.where(late, distance / allowed, 0)
     worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+    if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
+        return case.not_applicable("closed-form", f"{STILL} the motion")
     return case.verdict(
         "closed-form",
         float(distance[worst] / unit[worst]),
@@ -198,16 +226,20 @@ def shadow_energy(case: Case) -> Verdict:
     expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
-    _, unit = growth_bound(case)
-    size = np.maximum.accumulate(case.norm(run.q - _rest(case), run.p))
+    _, unit = _growth(case)
+    size = np.maximum.accumulate(case.norm.size(run.q - _rest(case), run.p))
     if case.steps[0] != 0:
-        size = np.maximum(size, case.norm(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
-    scale = 2 * shape * size * unit * np.longdouble(case.norm.unit) ** 2
+        size = np.maximum(size, case.norm.size(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
+    scale = 2 * shape * size * unit
     off = np.max(np.abs(stored - expected), axis=1)
     late = case.steps > 0
-    seen = np.where(late, off / np.where(scale > 0, scale, 1), 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = np.where(late & (off != 0), off / scale, 0)
     limit = np.where(late, case.roundings * np.maximum(case.steps, 1), 1)
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
+    energy = np.max(np.abs(expected), axis=1)
+    if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & (energy > limit * scale)):
+        return case.not_applicable("shadow-energy", "rounding may be as large as the energy")
     return case.verdict(
         "shadow-energy",
         float(seen[worst]),
@@ -249,13 +281,18 @@ def frequency(case: Case) -> Verdict:
     off = phase - expected
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
     off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
-    bound, unit = growth_bound(case)
+    bound, unit = _growth(case)
+    # where the mode ought to be: one that has come to nothing would excuse any phase
+    own_y, own_v = closed_states(case)
     # extended: a motion that spirals out is squared here, up to the end of double's range
-    mode = np.abs(np.hypot(case.w[j] * (y - case.modes.centre())[j], v[j]))
-    wide = np.longdouble(unit[-1]) * case.norm.unit * np.sqrt(np.longdouble(2))
+    mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
+    wide = unit[-1] * np.sqrt(np.longdouble(2))
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
     shape = schemes.condition(case.matrices, case.w)[j]
-    limit = float(bound[-1] * (wide / mode) * shape / abs(expected))
+    angle = bound[-1] * (wide / mode) * shape
+    if angle >= 1:
+        return case.not_applicable("frequency", "rounding may be as large as the mode, which has no phase then")
+    limit = float(angle / abs(expected))
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
         "frequency",
@@ -286,21 +323,28 @@ def momentum(case: Case) -> Verdict:
     if len(run.t) < 2:
         return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
-    off = np.abs(total - np.sum(case.scene.p.astype(np.longdouble)))
+    steps, first = case.steps, np.sum(case.scene.p.astype(np.longdouble))
     # at both ends of each stretch between frames, for a motion that grows along it
     _, of_p = case.allowance_at(run.q, run.p)
     unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
-    if case.steps[0] != 0:
+    if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
-    limit = case.roundings * case.steps[1:].astype(np.float64)
-    seen = np.asarray(off[1:] / unit, np.float64)
+    elif steps[0] != 0:
+        # nothing bounds the motion before this piece: it is judged from its own first frame on
+        steps, first = steps - steps[0], total[0]
+    off = np.abs(total - first)[1:]
+    limit = case.roundings * steps[1:].astype(np.float64)
+    seen = np.asarray(off / unit, np.float64)
     worst = int(np.argmax(seen / limit))
+    size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
+    if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(size > limit * unit):
+        return case.not_applicable("momentum", "rounding may be as large as all momenta together")
     return case.verdict(
         "momentum",
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"forces cancel in pairs; {case.steps[worst + 1]} steps, each rounded, all of one sign",
+        f"forces cancel in pairs; {steps[worst + 1]} steps, each rounded, all of one sign",
     )
 
 
@@ -312,6 +356,8 @@ def energies(case: Case) -> Verdict:
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         again = np.asarray(mechanics.energy(case.scene, run.q, run.p), np.float64)
     same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
+    # the energy of finite states may overflow; states that are no numbers have none
+    same &= np.isfinite(run.q).all(axis=1) & np.isfinite(run.p).all(axis=1)
     value = float(np.count_nonzero(~same))
     return case.verdict("energies", value, 0.0, "frames", "one formula, one order of operations")
 
@@ -325,10 +371,16 @@ def tolerance(case: Case) -> Verdict:
         return case.not_applicable("tolerance", "the true motion of this scene has no closed form")
     q, p = exact.true_motion(case.scene, case.steps, run.step)
     value = float(np.max(case.norm(run.q - q, run.p - p)))
+    # sizes of the true motion: those of one that explodes would excuse it
+    true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
+    bound = tolerance_bound(Case(trajectory=true, scene=case.scene))
+    moved = np.max(case.norm(q - case.scene.q, p - case.scene.p))
+    if value <= bound and 0 < moved <= bound:
+        return case.not_applicable("tolerance", "standing still would pass: it allows all of the motion")
     return case.verdict(
         "tolerance",
         value,
-        tolerance_bound(case),
+        bound,
         "of the start",
         f"{run.tolerance:g} a step of every component, at most {run.force_calls} internal steps",
     )
@@ -380,9 +432,12 @@ def arithmetic(case: Case) -> Verdict:
     if named.state <= plain.state and named.force <= plain.force and not named.quantum:
         return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
     seen = step_defect(case)
+    if seen.passed is None:
+        return case.not_applicable("arithmetic", seen.why)
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
-    coarseness = case.rounding / finer.rounding
-    if coarseness < 1 / FLOOR or len(case.trajectory.t) < ENOUGH:
+    coarser, fine = (float(np.max(x.norm.size(*x.allowance))) for x in (case, finer))
+    # at rest the only rounding is underflow, which is the same in both
+    if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
     why = _beyond_range(case, ~(_defects(case) <= seen.bound))
     return Verdict(

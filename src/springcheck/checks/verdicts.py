@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from springcheck.model import Verdict
 
 
 def within(method: str, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
-    """Passed only if the value is a number within the bound."""
+    """Passed only if the value is a number within the bound.  A bound that is infinite says nothing."""
+    if bound == np.inf and not np.isnan(value):
+        return not_applicable(method, check, "what rounding or the tolerance allows is beyond all numbers")
     return Verdict(
         method=method,
         check=check,
