@@ -72,7 +72,7 @@ def _telling(scene: Scene, trajectory: Trajectory) -> float:
     limit = allowed(scene, trajectory)
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.max(mechanics.norm(scene)(trajectory.q - scene.q, trajectory.p - scene.p))
-    return limit if limit <= 1e-3 * max(float(size), 1.0) else np.nan
+    return limit if np.isfinite(limit) and limit <= 1e-3 * max(float(size), 1.0) else np.nan
 
 
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:

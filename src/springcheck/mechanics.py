@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
-from springcheck.terms import LINEAR, Damping, Spring, WallSpring, apart, gather, particles
+from springcheck.terms import LINEAR, Damping, Spring, WallSpring, apart, gather, particles, scatter
 
 
 def acting(scene: Scene) -> dict[str, NDArray[np.bool_]]:
@@ -207,14 +207,13 @@ def own_stiffness(scene: Scene, q: Reals) -> Extended:
     return out
 
 
-def steepest(scene: Scene, q: Reals) -> Floats:
-    """Bound on the sum of |stiffness| in each particle's row, at all states q (..., n) -> (n,) [M/T2]."""
-    out = np.zeros(scene.n)
+def steepness(scene: Scene, q: Reals) -> Reals:
+    """Bound on the sum of |stiffness| in each particle's row, at states q (..., n) -> (..., n) [M/T2]."""
+    out = np.zeros_like(q)
     for term in scene.terms:
-        k = np.abs(term.curvature(q)).reshape(-1, len(term.rigidity))
-        k = np.maximum(np.max(k, axis=0, initial=0.0), term.rigidity)
+        k = np.maximum(np.abs(term.curvature(q)), term.rigidity)
         for end in particles(term):
-            np.add.at(out, end, k * term.bodies)
+            scatter(out, end, np.broadcast_to(k * term.bodies, (*q.shape[:-1], len(end))))
     return out
 
 

@@ -33,7 +33,7 @@ def plain(text: str = "", style: str = "") -> Text:
 def run_report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [headline(report), plain(), runs_table(report.runs)]
-    out.append(plain("error: farthest from the true motion; energy: (H - H0)/H0 where largest", "dim"))
+    out.append(plain("error: farthest from the true motion; energy: (H - H0)/|H0| where largest", "dim"))
     out += [
         plain(f"  {run.method}: {run.outcome} after step {run.step}: {run.message}")
         for run in report.runs

@@ -39,7 +39,7 @@ class Run:
     max_error: float
     """Largest distance from the true motion (`mechanics.Norm`); NaN where that is not known."""
     energy_drift: float
-    """(H - H0) / H0 where it is largest; absolute for H0 = 0."""
+    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
     timing: Timing
     force_calls: int
 
@@ -241,11 +241,13 @@ class _Tally:
         if self._known:
             steps = checks.Case(trajectory=piece, scene=scene).steps
             q, p = exact.true_motion(scene, steps, piece.step)
-            self.error = max(self.error, float(np.max(self._norm(piece.q - q, piece.p - p))))
+            # not max(), which leaves out what is no number
+            here = np.max(self._norm(piece.q - q, piece.p - p))
+            self.error = float(np.maximum(self.error, here))
         with np.errstate(over="ignore", invalid="ignore"):
             off: Floats = np.asarray(mechanics.energy(scene, piece.q, piece.p), np.float64) - self._start
         worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
-        if abs(worst) > abs(self.drift):
+        if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
 
 
@@ -330,7 +332,7 @@ def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
     for a, b in zip_longest(store.windows(one, label, rows), store.windows(other, label, rows)):
         if a is None or b is None or len(a.t) != len(b.t):
             return float("nan")
-        worst = max(worst, float(np.max(norm(a.q - b.q, a.p - b.p))))
+        worst = float(np.maximum(worst, np.max(norm(a.q - b.q, a.p - b.p))))
     return worst
 
 

@@ -10,7 +10,7 @@ from springcheck import mechanics, schemes
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.recorded import fastest
-from springcheck.model import Extended, Floats, Scene, Trajectory, Verdict
+from springcheck.model import Extended, Floats, Scene, Verdict
 
 
 def _no_matrix(bench: Bench) -> str | None:
@@ -32,6 +32,8 @@ def propagator(bench: Bench) -> Verdict:
     if why_not:
         return bench.not_applicable("propagator", why_not)
     case, _ = bench.copies
+    if len(case.trajectory.t) < 2:
+        return bench.verdict("propagator", float("inf"), float(case.roundings), "roundings", ENDED)
     q, p = case.next_states
     of_q, of_p = case.allowance
     off = np.maximum(np.abs(q - case.trajectory.q[1:]) / of_q, np.abs(p - case.trajectory.p[1:]) / of_p)
@@ -42,6 +44,9 @@ def propagator(bench: Bench) -> Verdict:
         "roundings",
         f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each",
     )
+
+
+ENDED = "the engine made no step that ends in finite numbers"
 
 
 def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
@@ -77,6 +82,8 @@ def determinant(bench: Bench) -> Verdict:
     why_not = _no_matrix(bench)
     if why_not:
         return bench.not_applicable("determinant", why_not)
+    if len(bench.copies[0].trajectory.t) < 2:
+        return bench.verdict("determinant", float("inf"), 0.0, "relative", ENDED)
     ideal, departure, allowed, _ = _matrices(bench)
     inverse = np.linalg.inv(ideal)
     relative = inverse @ departure
@@ -84,10 +91,13 @@ def determinant(bench: Bench) -> Verdict:
     change = float(np.trace(relative))
     if not float(np.max(np.abs(relative))) < 1e-8:
         change = float(np.linalg.det(np.eye(len(relative)) + relative)) - 1
+    limit = float(np.sum(np.abs(inverse).T * allowed))
+    if abs(change) <= limit and limit >= 1:
+        return bench.not_applicable("determinant", "rounding of the entries may be as large as all of the area")
     return bench.verdict(
         "determinant",
         abs(change),
-        float(np.sum(np.abs(inverse).T * allowed)),
+        limit,
         "relative",
         f"roundings of every entry, each of the sign that hurts; the scheme's own is "
         f"{float(np.linalg.det(ideal)):.6g}",
@@ -103,6 +113,8 @@ def symplecticity(bench: Bench) -> Verdict:
         return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
     if mechanics.is_damped(bench.scene):
         return bench.not_applicable("symplecticity", "friction contracts area")
+    if len(bench.copies[0].trajectory.t) < 2:
+        return bench.verdict("symplecticity", float("inf"), 0.0, "of an action", ENDED)
     ideal, departure, allowed, _ = _matrices(bench)
     n = bench.scene.n
     form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
@@ -112,6 +124,8 @@ def symplecticity(bench: Bench) -> Verdict:
     limit = half + half.T
     ratio = off / np.where(limit > 0, limit, 1)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
+    if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
+        return bench.not_applicable("symplecticity", "rounding of the entries may be as large as the form")
     return bench.verdict(
         "symplecticity",
         float(off[worst]),
@@ -167,27 +181,29 @@ def reversibility(bench: Bench) -> Verdict:
     if two_stage:
         state = _shifted(case.judged, scheme, state, -1)
     back = bench.run(replace(bench.scene, q=state[0], p=state[1], steps=steps, every=1), bench.label)
-    end = back.q[-1], back.p[-1]
-    if two_stage:
-        end = _shifted(case.judged, scheme, end, 1)
-    size = max(_rounding(bench.scene, out), _rounding(bench.scene, back))
     enlarged = _enlarged(case, 2 * steps + 2)
     if enlarged is None:
         return bench.not_applicable("reversibility", "the motion grows, and rounding with it")
-    off = float(case.norm(end[0] - bench.scene.q, end[1] + bench.scene.p))
+    bound = case.roundings * enlarged
+    if len(back.t) < len(out.t):
+        return bench.verdict("reversibility", float("inf"), bound, "roundings", "it ended early on its way back")
+    end = back.q[-1], back.p[-1]
+    if two_stage:
+        end = _shifted(case.judged, scheme, end, 1)
+    # of the way out alone: a way back that explodes must not enlarge what it is judged by
+    size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
+    off = case.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
+    # a motion that stood still after its turning point would end there, with the momenta flipped
+    moved = case.norm.size(out.q[-1] - bench.scene.q, bench.scene.p - out.p[-1])
+    if off <= bound * size and 0 < moved <= bound * size:
+        return bench.not_applicable("reversibility", "standing still on the way back would pass")
     return bench.verdict(
         "reversibility",
-        off / size,
-        case.roundings * enlarged,
+        float(off / size),
+        bound,
         "roundings",
         f"{steps} steps out and {steps} back, each rounded, all of one sign",
     )
-
-
-def _rounding(scene: Scene, run: Trajectory) -> float:
-    """The largest rounding along a run, in units of the scene's start."""
-    case = Case(trajectory=run, scene=scene)
-    return float(np.max(case.norm(*case.allowance)))
 
 
 def _enlarged(case: Case, steps: int) -> float | None:
@@ -210,6 +226,8 @@ def mirror(bench: Bench) -> Verdict:
     backwards = bench.run(replace(bench.scene, step=-bench.scene.step, steps=steps, every=1), bench.label)
     if len(flipped.t) != len(backwards.t):
         return bench.verdict("mirror", float("inf"), 0.0, "frames", "one of the two runs ended early")
+    if len(flipped.t) < 2:
+        return bench.not_applicable("mirror", ENDED)
     differ = np.any((flipped.q != backwards.q) | (flipped.p != -backwards.p), axis=1)
     return bench.verdict(
         "mirror",
@@ -226,6 +244,8 @@ def repeatability(bench: Bench) -> Verdict:
     again = bench.run(replace(bench.scene, every=1, steps=min(bench.scene.steps, 200)), bench.label)
     if first.q.shape != again.q.shape:
         return bench.verdict("repeatability", float("inf"), 0.0, "frames", "the runs differ in length")
+    if len(first.t) < 2:
+        return bench.not_applicable("repeatability", ENDED)
     same = (first.q.view(np.int64) == again.q.view(np.int64)) & (
         first.p.view(np.int64) == again.p.view(np.int64)
     )

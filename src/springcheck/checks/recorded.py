@@ -61,22 +61,27 @@ def step_defect(case: Case) -> Verdict:
             "step-defect", f"{run.every} steps lie between frames, and {_closed(case)}"
         )
     if run.every == 1:
-        bound = float(case.roundings)
+        bound = np.full(len(run.t) - 1, float(case.roundings))
         why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
     else:
         bound = case.roundings * _amplified(case, run.every)
-        if not bound * run.arithmetic.state < 1:
+        if not bound[0] * run.arithmetic.state < 1:
             return case.not_applicable(
                 "step-defect", "between two frames a rounding may grow to the whole motion"
             )
         why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
-    seen = _defects(case)
-    value = float(np.max(seen))
-    run = case.trajectory
-    if value <= bound and 0 < np.max(_in_roundings(case, run.q[:-1], run.p[:-1])) <= bound:
+    seen, told = _defects(case), bound * run.arithmetic.state < 1
+    if not np.all(told):
+        # a motion that has grown steeper since: what rounding can do there is no smaller than the motion
+        seen, bound = seen[told], bound[told]
+        why += f"; judged up to step {case.steps[len(seen)]}, beyond which it may grow to the whole motion"
+    off = ~(seen <= bound)
+    still = _in_roundings(case, run.q[:-1], run.p[:-1])[: len(seen)]
+    if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
         return case.not_applicable("step-defect", f"{STILL} any step")
-    why = _beyond_range(case, ~(seen <= bound)) or why
-    return case.verdict("step-defect", value, bound, "roundings", why)
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
+    why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why
+    return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why)
 
 
 STILL = "standing still would pass: rounding may be as large as"
@@ -114,20 +119,28 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
     )
 
 
-def _amplified(case: Case, steps: int) -> float:
-    """What the map can make of one rounding a step in so many steps."""
+def _amplified(case: Case, steps: int) -> Floats:
+    """What the map can make of one rounding a step in so many steps, from each frame but the last (f-1,)."""
     if case.linear:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
-        return float(total[0] * grown[0])
-    growth = 1 + abs(case.trajectory.step) * fastest(case)
+        return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
+    growth = abs(case.trajectory.step) * rates_met(case, case.trajectory.q[:-1], case.next_states[0])
     with np.errstate(over="ignore"):
-        return float((np.float64(growth) ** steps - 1) / (growth - 1)) if growth > 1 else float(steps)
+        return np.where(growth > 0, ((1 + growth) ** steps - 1) / np.where(growth > 0, growth, 1), steps)
+
+
+def rates_met(case: Case, *states: Reals) -> Floats:
+    """Upper bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T].
+
+    By Gershgorin's circles.
+    """
+    stiff = np.max([np.max(mechanics.steepness(case.judged, q.astype(np.longdouble)) / case.judged.m, axis=-1) for q in states], axis=0)
+    return np.asarray(np.maximum.accumulate(np.sqrt(stiff)) + float(np.max(mechanics.rates(case.judged))))
 
 
 def fastest(case: Case) -> float:
-    """Upper bound of the frequencies and rates met along the way [1/T], by Gershgorin's circles."""
-    stiff = mechanics.steepest(case.judged, case.trajectory.q) / case.judged.m
-    return float(np.sqrt(np.max(stiff))) + float(np.max(mechanics.rates(case.judged)))
+    """The same, of the whole trajectory."""
+    return float(rates_met(case, case.trajectory.q)[-1])
 
 
 def _closed(case: Case) -> str | None:
@@ -204,8 +217,17 @@ def closed_form(case: Case) -> Verdict:
         float(distance[worst] / unit[worst]),
         float(bound[worst]),
         "roundings",
-        f"one rounding of each of {case.steps[worst]} steps, carried on by the map, all of one sign",
+        f"one rounding of each of {case.steps[worst]} steps, carried on by the map, all of one sign"
+        + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
     )
+
+
+def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
+    """From where on a check says nothing any more because its bound is as large as what it looks at."""
+    late = np.flatnonzero(~drowned)
+    if not len(late) or late[-1] == len(drowned) - 1:
+        return ""
+    return f"; says nothing from step {case.steps[late[-1] + 1]} on, where that may be all of the {what}"
 
 
 def shadow_energy(case: Case) -> Verdict:
@@ -245,7 +267,8 @@ def shadow_energy(case: Case) -> Verdict:
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"{case.steps[worst]} steps, each rounded {case.roundings} times, all of one sign",
+        f"{case.steps[worst]} steps, each rounded {case.roundings} times, all of one sign"
+        + _untold(case, energy <= limit * scale, "energy"),
     )
 
 
@@ -292,6 +315,8 @@ def frequency(case: Case) -> Verdict:
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
         return case.not_applicable("frequency", "rounding may be as large as the mode, which has no phase then")
+    if angle >= abs(expected):
+        return case.not_applicable("frequency", f"{STILL} the whole turn")
     limit = float(angle / abs(expected))
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
@@ -308,6 +333,8 @@ _LOW_TWO_PI = 2 * (np.longdouble("3.14159265358979323846264338327950288") - np.l
 
 
 def _phase(form: Extended, u: np.longdouble, v: np.longdouble) -> np.longdouble:
+    if not (np.isfinite(u) and np.isfinite(v)):
+        return np.longdouble(np.nan)
     x = np.sqrt(np.abs(form[0] - form[1] ** 2 / (4 * form[2]))) * u
     y = np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
     return np.longdouble(np.arctan2(-y, x))
@@ -396,20 +423,28 @@ def tolerance_bound(case: Case) -> float:
     """
     run = case.trajectory
     duration = abs(float(run.t[-1]))
-    growth = 1.0
+    growth = np.longdouble(1)
+    states = run.q, run.p
     if not mechanics.is_linear(case.scene):
         growth += fastest(case) * duration / 2
     elif case.linear and np.any(case.modes.w2 < 0):
-        rate = float(np.sqrt(np.max(-case.modes.w2)))
-        growth = float(np.exp(min(rate * duration, 700.0))) * max(duration * rate, 1.0)
-    return float((run.tolerance or 0.0) * run.force_calls * _worst_local_error(case) * growth)
+        turn = np.sqrt(np.max(-case.modes.w2)) * duration
+        with np.errstate(over="ignore"):
+            growth = np.exp(turn) * max(turn, np.longdouble(1))
+        if mechanics.is_separate(case.scene):
+            # what a state has grown to, an error made there no longer grows: from the start, both together
+            states = case.scene.q[None], case.scene.p[None]
+    local = _worst_local_error(case, *states)
+    with np.errstate(over="ignore"):
+        return float((run.tolerance or 0.0) * run.force_calls * local * growth)
 
 
-def _worst_local_error(case: Case) -> float:
-    """The largest local error that passes, in tolerances and in units of the start."""
-    run, scene = case.trajectory, case.judged
-    of_q, of_p = mechanics.amplitudes(scene)
-    weight_q, weight_p = np.max(np.abs(run.q), axis=0) + of_q, np.max(np.abs(run.p), axis=0) + of_p
+def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
+    """The largest local error at states (f, n) that passes, in tolerances and in units of the start."""
+    scene = case.judged
+    # extended: the squares of large states leave the range of a double
+    of_q, of_p = (x.astype(np.longdouble) for x in mechanics.amplitudes(scene))
+    weight_q, weight_p = np.max(np.abs(q), axis=0) + of_q, np.max(np.abs(p), axis=0) + of_p
     # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `mechanics.Norm`
     stiff = np.zeros(scene.n)
     for term in scene.terms:
@@ -418,8 +453,10 @@ def _worst_local_error(case: Case) -> float:
     for group in case.norm.groups:
         stiff[group] += scene.m[group] / case.norm.duration**2
     largest = np.max(np.maximum(stiff * weight_q**2, weight_p**2 / scene.m)) / 2
+    if largest == 0:
+        return np.longdouble(0)
     with np.errstate(divide="ignore"):
-        return float(np.sqrt(2 * scene.n * largest) / case.norm.unit)
+        return np.longdouble(np.sqrt(2 * scene.n * largest) / case.norm.unit)
 
 
 def arithmetic(case: Case) -> Verdict:
@@ -439,7 +476,6 @@ def arithmetic(case: Case) -> Verdict:
     # at rest the only rounding is underflow, which is the same in both
     if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
-    why = _beyond_range(case, ~(_defects(case) <= seen.bound))
     return Verdict(
         method=seen.method,
         check="arithmetic",
@@ -447,8 +483,9 @@ def arithmetic(case: Case) -> Verdict:
         bound=seen.bound,
         unit=seen.unit,
         passed=bool(FLOOR <= seen.value <= seen.bound),
-        why=why
-        or f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
+        why=seen.why
+        if seen.passed is False
+        else f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
     )
 
 

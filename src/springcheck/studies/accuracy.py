@@ -146,9 +146,10 @@ class Errors:
                 own_q, own_p = self._rounding.at(steps)
                 rounded = float(np.max(known.norm(q - own_q, p - own_p)))
                 self._rounded = float(np.fmax(self._rounded, rounded))
-        self._largest = max(self._largest, float(np.max(error)))
+        # not max(), which leaves out what is no number
+        self._largest = float(np.maximum(self._largest, np.max(error)))
         self._end = float(error[-1])
-        self._energy = max(self._energy, float(np.max(off)))
+        self._energy = float(np.maximum(self._energy, np.max(off)))
         self._turn(q, p, true_q, true_p)
 
     @property
@@ -179,7 +180,7 @@ class Errors:
             ahead = np.unwrap(np.concatenate([self._last[None], ahead]), axis=0)
         self._last = ahead[-1]
         worst = ahead.flat[int(np.argmax(np.abs(ahead)))]
-        if abs(worst) > abs(self._phase):
+        if not abs(worst) <= abs(self._phase) and not np.isnan(self._phase):
             self._phase = float(worst)
 
 

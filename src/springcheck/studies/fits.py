@@ -40,7 +40,9 @@ def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
     """Index of the smallest of errors by ever finer steps, once `by` finer steps have not improved on it."""
     if not errors:
         return None
-    best = int(np.argmin(errors))
+    if np.all(np.isnan(errors)):
+        return None
+    best = int(np.nanargmin(errors))
     return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
 
 
@@ -51,7 +53,7 @@ def order(points: Sequence[Point]) -> Fit | None:
     chosen = [
         point
         for point in points[: None if best is None else best]
-        if point.error <= ASYMPTOTIC
+        if 0 < point.error <= ASYMPTOTIC
         and (
             point.error >= ABOVE_FLOOR * floor
             if point.rounding is None
@@ -148,7 +150,8 @@ def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: 
 def front(points: Sequence[Point]) -> list[Point]:
     """The points that no other beats in both error and time, from the fastest to the most accurate."""
     best: list[Point] = []
-    for point in sorted(points, key=lambda point: (point.seconds, point.error)):
+    known = [point for point in points if not np.isnan(point.error) and not np.isnan(point.seconds)]
+    for point in sorted(known, key=lambda point: (point.seconds, point.error)):
         if not best or point.error < best[-1].error:
             best.append(point)
     return best
@@ -156,5 +159,5 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
     """The fastest point whose error is within the target, or None."""
-    reaching = [point for point in points if point.error <= target]
+    reaching = [point for point in points if point.error <= target and not np.isnan(point.seconds)]
     return min(reaching, key=lambda point: point.seconds) if reaching else None

@@ -28,7 +28,7 @@ def solve(label: Label, spec: Spec) -> Cell:
     """One cell by an adaptive solver, judged at its end."""
     scene = grid.scene([spec], label, frozenset())
     driver: Any = engines.load(label.engine)
-    said, value, bound, whole = "", np.nan, np.nan, False
+    said, value, bound, whole, untold = "", np.nan, np.nan, False, ""
     with np.errstate(all="ignore"):
         try:
             done = driver.internal_steps(scene, engines.method(label), most=MOST)
@@ -38,10 +38,12 @@ def solve(label: Label, spec: Spec) -> Cell:
             whole = abs(done.t) >= abs(scene.step * scene.steps)
             said = "" if whole else f"; {MOST} internal steps end at t = {done.t:.3g}"
             if whole:
-                value, bound = _distance(label, scene, done)
+                value, bound, untold = _distance(label, scene, done)
         reason = _reason(scene, spec)
     if whole and value <= bound:
         return _cell(label, spec, "right", "", value, bound)
+    if untold:
+        return _cell(label, spec, "not measured", untold, value, bound)
     if reason or not whole:
         return _cell(label, spec, "engine's limit", (reason or "it gives up") + said, value, bound)
     return _cell(
@@ -49,17 +51,17 @@ def solve(label: Label, spec: Spec) -> Cell:
     )
 
 
-def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float]:
-    """Global error at the end and its bound, both in units of the start."""
+def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]:
+    """Global error at the end and its bound, both in units of the start, and why there are none."""
     q, p = np.stack([scene.q, done.q]), np.stack([scene.p, done.p])
     if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.terms[0].k)):  # type: ignore[attr-defined]
         # nothing moves, and nothing may
-        return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0]))
+        return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0])), ""
     ends = replace(scene, every=scene.steps)
     run = judging.as_trajectory(label, ends, q, p, engines.load(label.engine).arithmetic(label))
     run = replace(run, tolerance=scene.tolerance, force_calls=done.force_calls)
     found = recorded.tolerance(checks.Case(trajectory=run, scene=ends))
-    return found.value, found.bound
+    return found.value, found.bound, found.why if found.passed is None else ""
 
 
 def _reason(scene: Scene, spec: Spec) -> str | None:
@@ -119,7 +121,10 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
             reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"
             if not (unstable and (left or gone)):
                 outcome, reason = "silently wrong", f"{run.outcome.status}: {run.outcome.message}"
-        if outcome != "silently wrong" and len(case.trajectory.t) > 1 and not value <= bound:
+        judged = outcome != "silently wrong" and len(case.trajectory.t) > 1
+        if judged and verdict.passed is None:
+            outcome, reason = "not measured", verdict.why
+        elif judged and not value <= bound:
             outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
         found.append(_cell(label, spec, outcome, reason, value, bound))
     return found
