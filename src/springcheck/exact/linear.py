@@ -285,13 +285,22 @@ class _Law:
 
 
 def _undamped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    """Hyperbolic for w2 < 0: from |phase| = 1 on as two exponentials, of which one may be all there is."""
     w = np.sqrt(np.abs(law.w2))
     phase = t * w
     turning = law.w2 > 0
-    cosine = np.where(turning, np.cos(phase), np.cosh(np.where(turning, 0, phase)))
-    sine = np.where(turning, np.sin(phase), np.sinh(np.where(turning, 0, phase)))
+    apart = ~turning & (np.abs(phase) > 1)
+    near = np.where(turning | apart, 0, phase)
+    cosine = np.where(turning, np.cos(phase), np.cosh(near))
+    sine = np.where(turning, np.sin(phase), np.sinh(near))
     sign = np.where(turning, -1, 1)
-    return np.asarray(u * cosine + v / w * sine), np.asarray(v * cosine + sign * w * u * sine)
+    y, z = u * cosine + v / w * sine, v * cosine + sign * w * u * sine
+    if np.any(apart):
+        one, two = (u + v / w) / 2, (u - v / w) / 2
+        # what is not there does not grow, not even beyond all numbers
+        up, down = (np.where(x == 0, 0, x * np.exp(to)) for x, to in ((one, phase), (two, -phase)))
+        y, z = np.where(apart, up + down, y), np.where(apart, w * (up - down), z)
+    return np.asarray(y), np.asarray(z)
 
 
 def _damped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
@@ -333,6 +342,13 @@ def _free(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, E
 
 
 def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
-    final = law.pull / law.rate
-    gone = -np.expm1(-law.rate * t)
-    return u + final * t + (v - final) * gone / law.rate, v - (v - final) * gone
+    x = law.rate * t
+    gone = -np.expm1(-x) / law.rate
+    # (x - 1 + exp(-x)) / x**2, by its series where it would cancel
+    small = np.abs(x) < 1
+    near, far = np.where(small, x, 0), np.where(small, 1, x)
+    series, term = np.zeros_like(x), np.full_like(x, 0.5)
+    for k in range(3, 26):
+        series, term = series + term, -term * near / k
+    fallen = np.where(small, series, (far + np.expm1(-far)) / (far * far))
+    return u + v * gone + law.pull * t * t * fallen, v * np.exp(-x) + law.pull * gone

@@ -194,13 +194,17 @@ def _is_bond(scene: Scene) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bond:
-    """Relative motion of each bond: reduced mass, elongation, relative momentum, and E / depth - 1."""
+    """Relative motion of each bond: reduced mass, elongation, relative momentum, E / depth, and that less 1.
+
+    Near the bottom of the well the one is small, near dissociation the other: neither follows from the other.
+    """
 
     mass: Extended
     u: Extended
     p: Extended
     share: Extended
     """m_a / (m_a + m_b)."""
+    energy: Extended
     excess: Extended
 
 
@@ -210,8 +214,11 @@ def _bond(scene: Scene, term: Morse) -> _Bond:
     u: Extended = np.asarray(scene.q[term.b].astype(np.longdouble) - scene.q[term.a] - term.rest)
     p = (ma * scene.p[term.b] - mb * scene.p[term.a]) / total
     mass = ma * mb / total
-    x = np.exp(-term.steepness * u)
-    return _Bond(mass=mass, u=u, p=p, share=ma / total, excess=p * p / (2 * mass * term.depth) + x * (x - 2))
+    x, kinetic = np.exp(-term.steepness * u), p * p / (2 * mass * term.depth)
+    gap = np.expm1(-term.steepness * u)
+    return _Bond(
+        mass=mass, u=u, p=p, share=ma / total, energy=kinetic + gap * gap, excess=kinetic + x * (x - 2)
+    )
 
 
 def _morse(scene: Scene, t: Extended) -> States:
@@ -230,8 +237,8 @@ def _morse(scene: Scene, t: Extended) -> States:
         bound = bond.excess < 0
         z, dz = np.where(
             bound,
-            _inside(z0, dz0, w * w * (1 + bond.excess), rate, np.where(bound, rate, 0) * t),
-            _outside(z0, dz0, bond.excess, rate, np.where(bound, 0, rate) * t),
+            _inside(z0, dz0, w * w * bond.energy, rate, np.where(bound, rate, 0) * t),
+            _outside(dz0, bond, rate, np.where(bound, 0, rate) * t),
         )
         u, pull = np.log1p(z) / term.steepness, bond.mass * dz / (term.steepness * (1 + z))
         ma, mb = scene.m[term.a].astype(np.longdouble), scene.m[term.b].astype(np.longdouble)
@@ -254,13 +261,16 @@ def _inside(z0: Extended, dz0: Extended, pull: Extended, rate: Extended, phase: 
     return np.stack([z, slope * sine / rate + dz0 * np.cos(phase)])
 
 
-def _outside(z0: Extended, dz0: Extended, excess: Extended, rate: Extended, phase: Extended) -> Extended:
-    """s = (sqrt(1 + excess) cosh(phase + start) - 1) / excess: nothing cancels on the way in."""
-    root = np.sqrt(np.maximum(1 + excess, 0))
-    safe = np.where(root > 0, root, 1)
-    start = np.arcsinh(dz0 * excess / (rate * safe))
-    s = (root * np.cosh(phase + start) - 1) / excess
-    return np.stack([s - 1, root * rate * np.sinh(phase + start) / excess])
+def _outside(dz0: Extended, bond: _Bond, rate: Extended, phase: Extended) -> Extended:
+    """s = (root cosh(phase + start) - 1) / excess, root**2 = 1 + excess: nothing cancels on the way in.
+
+    Nor just above dissociation, with root - 1 = excess / (root + 1) and cosh x - 1 = 2 sinh(x/2)**2.
+    """
+    root, excess = np.sqrt(bond.energy), bond.excess
+    start = np.arcsinh(dz0 * excess / (rate * np.where(root > 0, root, 1)))
+    half = np.sinh((phase + start) / 2)
+    z = 2 * root * half * half / excess - root / (root + 1)
+    return np.stack([z, root * rate * np.sinh(phase + start) / excess])
 
 
 WELLS = (
