@@ -277,7 +277,8 @@ def free_groups(scene: Scene) -> tuple[Integers, ...]:
 def _lowest_joined(scene: Scene) -> Integers:
     """The lowest particle to which each is joined, through however many others (n,)."""
     lowest = np.arange(scene.n)
-    bonds = [particles(term) for term in scene.terms if term.bodies == 2]
+    # a bond without stiffness joins nothing
+    bonds = [[end[term.rigidity > 0] for end in particles(term)] for term in scene.terms if term.bodies == 2]
     while True:
         before = lowest.copy()
         for a, b in bonds:

@@ -69,10 +69,15 @@ def argument(sine: Extended, cosine: Extended, m: Extended, m1: Extended) -> Ext
     phi = np.arctan2(sine, cosine)
     edge = m1 == 0
     rounds = list(_means(np.where(edge, 0, m), np.where(edge, 1, m1)))
+    # sine and cosine go along by themselves: at a quarter turn, from where the way out of a separatrix is
+    # long, those of the rounded phi would be wrong
+    size = np.hypot(sine, cosine)
+    s, c = (x / np.where(size > 0, size, 1) for x in (sine, cosine))
     for a, b, _ in rounds[:-1]:
-        s, c = np.sin(phi), np.cos(phi)
         # 2 phi - (phi - atan(b/a tan phi)): the difference stays on the branch of phi
         phi = 2 * phi - np.arctan2((a - b) * s * c, a * c * c + b * s * s)
+        size = np.hypot(b * s, a * c)
+        s, c = (a + b) * s * c / np.where(size > 0, size, 1), (a * c * c - b * s * s) / np.where(size > 0, size, 1)
     mean = rounds[-1][0] * np.longdouble(2) ** (len(rounds) - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         endless = np.arcsinh(np.where(edge, sine, 0) / np.where(edge, cosine, 1))

@@ -98,15 +98,15 @@ def modes(scene: Scene) -> Modes:
 
 
 def _drag(scene: Scene, force: Extended) -> Extended:
-    """The part of a force (n,) that moves free groups as a whole, per root of mass.
+    """The part of a force (n,) that moves free groups as a whole, and all of it elsewhere, per root of mass.
 
     Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
     """
-    out = np.zeros(scene.n, dtype=np.longdouble)
+    out: Extended = np.asarray(force / np.sqrt(scene.m.astype(np.longdouble)))
     for group in mechanics.free_groups(scene):
         m, total = scene.m[group].astype(np.longdouble), np.sum(force[group])
-        if abs(total) > len(group) * EPS * np.sum(np.abs(force[group])):
-            out[group] = np.sqrt(m) * total / np.sum(m)
+        moves = abs(total) > len(group) * EPS * np.sum(np.abs(force[group]))
+        out[group] = np.sqrt(m) * total / np.sum(m) if moves else 0
     return out
 
 

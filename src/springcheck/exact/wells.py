@@ -113,10 +113,12 @@ def _dn(well: _Duffing, t: Extended) -> States:
     m, m1 = 2 * well.root / well.minus, -well.plus / well.minus
     amplitude, w = np.copysign(np.sqrt(well.minus / well.b), well.u), np.sqrt(well.minus / 2)
     # of twice am(phase) sine and cosine are rational in the start
-    double = np.arctan2(
-        -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.k + well.b * well.u**2
-    )
-    at = jacobi(t * w + argument(np.sin(double / 2), np.cos(double / 2), m, m1), m, m1)
+    y, x = -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.k + well.b * well.u**2
+    # half of that angle, without the angle: what is small of the two follows from the other
+    large = np.sqrt((well.root + np.abs(x)) / 2)
+    small = np.abs(y) / (2 * np.where(large > 0, large, 1))
+    sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)
+    at = jacobi(t * w + argument(np.copysign(sine, y), cosine, m, m1), m, m1)
     return np.asarray(amplitude * at.dn), np.asarray(-amplitude * w * m * at.sn * at.cn)
 
 
