@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from springcheck import exact, mechanics, scenes
-from springcheck.model import Scene
-from springcheck.terms import Spring, WallSpring
+from springcheck.model import Scene, Term
+from springcheck.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
 
 
 def spring(m: float, k: float, q: float, p: float, h: float) -> Scene:
@@ -106,3 +106,118 @@ def test_particles_of_equal_frequency_that_are_joined_keep_their_modes_apart() -
     energy = mechanics.energy(scene, q, p)
     assert abs(energy[1] / energy[0] - 1) < 1e-15
     assert np.sum(p[1]) == pytest.approx(0.4, abs=1e-15)
+
+
+def worked_out(scene: Scene, t: float) -> tuple[list[mpmath.mpf], list[mpmath.mpf]]:
+    """q and p at time t of a linear scene, by the exponential of its equations in 80 digits."""
+    n = scene.n
+    with mpmath.workdps(80):
+        a = mpmath.zeros(2 * n + 1, 2 * n + 1)
+        zero = np.zeros(n, dtype=np.longdouble)
+        k, pull = mechanics.stiffness(scene, zero), mechanics.force(scene.terms)(zero, zero)
+        rate = mechanics.rates(scene)
+        for i in range(n):
+            a[i, n + i] = 1 / mpmath.mpf(float(scene.m[i]))
+            a[n + i, n + i] = -wide(rate[i])
+            a[n + i, 2 * n] = wide(pull[i])
+            for j in range(n):
+                a[n + i, j] = -wide(k[i, j])
+        start = mpmath.matrix([float(x) for x in (*scene.q, *scene.p, 1.0)])
+        end = mpmath.expm(a * mpmath.mpf(t)) * start
+        return list(end[:n]), list(end[n : 2 * n])
+
+
+def wide(x: np.longdouble) -> mpmath.mpf:
+    """An extended number, to its last bit."""
+    return mpmath.mpf(float(x)) + mpmath.mpf(float(x - np.longdouble(float(x))))
+
+
+def made(m: list[float], terms: tuple[Term, ...], q: list[float], p: list[float], t: float) -> Scene:
+    return Scene(
+        name="made", title="", source="", m=np.array(m), q=np.array(q), p=np.array(p), terms=terms,
+        step=t, steps=1,
+    )  # fmt: skip
+
+
+def held(k: list[float], at: list[float]) -> WallSpring:
+    """Springs from particle 0 to walls."""
+    return WallSpring(i=np.zeros(len(k), np.int64), k=np.array(k), at=np.array(at))
+
+
+def friction(c: float, m: float) -> Damping:
+    return Damping(i=np.array([0]), c=np.array([c]), m=np.array([m]))
+
+
+BOND = Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.5]), rest=np.array([0.0]))
+LINEAR = {
+    "towards the top of a barrier": made([1.0], (held([-1.0], [0.0]),), [1.0], [-1.0], 50.0),
+    "the same, backwards": made([1.0], (held([-1.0], [0.0]),), [1.0], [1.0], -50.0),
+    "down a barrier": made([1.7], (held([-2.3], [0.4]),), [0.3], [0.1], 7.0),
+    "a constant force against slow friction": made(
+        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(1e-10, 1.3)), [0.3], [0.1], 1.0
+    ),
+    "a constant force against friction": made(
+        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(0.9, 1.3)), [0.3], [0.1], 9.0
+    ),
+    "friction to the end": made([1.3], (friction(0.7, 1.3),), [0.3], [0.1], 60.0),
+    "a constant force on a pair": made(
+        [1.0, 2.0], (BOND, held([1.0, -1.0], [0.3, 0.9])), [0.3, -0.2], [0.1, 0.7], 7.0
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_linear_motions_that_cancel_keep_their_digits(name: str) -> None:
+    scene = LINEAR[name]
+    found = exact.true_motion(scene, np.array([1]), scene.step)
+    with mpmath.workdps(40):
+        for states, wanted in zip(found, worked_out(scene, scene.step), strict=True):
+            for x, y in zip(states[0], wanted, strict=True):
+                assert abs(wide(x) / y - 1) < 100 * exact.EPS
+
+
+@pytest.mark.parametrize(
+    ("u", "energy"), [(1e-4, None), (1e-8, None), (1e-12, None), (0.3, 1e-6), (0.3, 1e-10), (0.3, 1e-14)]
+)
+def test_a_bond_keeps_its_digits_at_the_bottom_and_just_above_dissociation(
+    u: float, energy: float | None
+) -> None:
+    """s = exp(a u) of s'' = w2 (e s + 1), e = E/D - 1, in 60 digits."""
+    depth, a, t, m = 2.0, 1.3, 5.0, np.array([1.5, 2.5])
+    with mpmath.workdps(60):
+        mass, gap = mpmath.mpf(15) / 16, 1 - mpmath.exp(-mpmath.mpf(a) * u)
+        p = 0.0 if energy is None else float(mpmath.sqrt(2 * mass * depth * (1 + energy - gap**2)))
+        e = mpmath.mpf(p) ** 2 / (2 * mass * depth) + gap**2 - 1
+        rate = mpmath.sqrt(mpmath.mpc(e)) * a * mpmath.sqrt(2 * depth / mass)
+        s0 = mpmath.exp(mpmath.mpf(a) * u)
+        off, slope = s0 + 1 / e, a * mpmath.mpf(p) / mass * s0 / rate
+        s = mpmath.re(off * mpmath.cosh(rate * t) + slope * mpmath.sinh(rate * t) - 1 / e)
+        ds = mpmath.re(rate * (off * mpmath.sinh(rate * t) + slope * mpmath.cosh(rate * t)))
+        wanted_u, wanted_p = mpmath.log(s) / a, mass * ds / (a * s)
+        ends = np.zeros(1, np.int64), np.ones(1, np.int64)
+        bond = Morse(a=ends[0], b=ends[1], depth=np.array([depth]), steepness=np.array([a]), rest=np.zeros(1))
+        scene = made(m.tolist(), (bond,), [0.0, u], [-p, p], t)
+        found_q, found_p = exact.true_motion(scene, np.array([1]), t)
+        off = wide(found_q[0, 1]) - wide(found_q[0, 0]) - wanted_u
+        assert abs(off) < 100 * exact.EPS * max(u, wanted_u)
+        assert abs(wide(found_p[0, 1]) / wanted_p - 1) < 100 * exact.EPS
+
+
+def test_a_motion_that_begins_near_the_top_of_a_barrier_keeps_its_digits() -> None:
+    """By Taylor series in 50 digits, two step lengths agreeing to 25 (`validation/references.py`)."""
+    quartic = Quartic(i=np.array([0]), b=np.array([0.9]), at=np.zeros(1))
+    scene = made([1.7], (held([-2.3], [0.0]), quartic), [1e-9], [0.0], 20.0)
+    q, p = exact.true_motion(scene, np.array([1]), 20.0)
+    with mpmath.workdps(30):
+        assert abs(wide(q[0, 0]) / mpmath.mpf("2.137558718281220123988265") - 1) < 100 * exact.EPS
+        assert abs(wide(p[0, 0]) / mpmath.mpf("-1.376353269405502283902635") - 1) < 100 * exact.EPS
+
+
+def test_a_pendulum_that_begins_near_its_top_keeps_its_digits() -> None:
+    """The same: the start is 3.6e-9 from the top."""
+    swing = Cosine(i=np.array([0]), depth=np.array([2.3]), wave=np.ones(1), at=np.zeros(1))
+    scene = made([1.7], (swing,), [3.14159265], [0.0], 20.0)
+    q, p = exact.true_motion(scene, np.array([1]), 20.0)
+    with mpmath.workdps(30):
+        assert abs(wide(q[0, 0]) / mpmath.mpf("-2.445627449351431161618859") - 1) < 100 * exact.EPS
+        assert abs(wide(p[0, 0]) / mpmath.mpf("-1.348575697690617284844982") - 1) < 100 * exact.EPS

@@ -53,7 +53,9 @@ class Case:
         """The number of steps behind each frame."""
         first = float(self.trajectory.t[0]) / self.trajectory.step
         # a time that is no number is for the check of the times: the frames are then counted from the start
-        return (round(first) if abs(first) < 2.0**62 else 0) + np.arange(len(self.trajectory.t)) * self.trajectory.every
+        return (round(first) if abs(first) < 2.0**62 else 0) + np.arange(
+            len(self.trajectory.t)
+        ) * self.trajectory.every
 
     @cached_property
     def linear(self) -> bool:

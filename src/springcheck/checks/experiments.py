@@ -93,7 +93,9 @@ def determinant(bench: Bench) -> Verdict:
         change = float(np.linalg.det(np.eye(len(relative)) + relative)) - 1
     limit = float(np.sum(np.abs(inverse).T * allowed))
     if abs(change) <= limit and limit >= 1:
-        return bench.not_applicable("determinant", "rounding of the entries may be as large as all of the area")
+        return bench.not_applicable(
+            "determinant", "rounding of the entries may be as large as all of the area"
+        )
     return bench.verdict(
         "determinant",
         abs(change),
@@ -186,7 +188,9 @@ def reversibility(bench: Bench) -> Verdict:
         return bench.not_applicable("reversibility", "the motion grows, and rounding with it")
     bound = case.roundings * enlarged
     if len(back.t) < len(out.t):
-        return bench.verdict("reversibility", float("inf"), bound, "roundings", "it ended early on its way back")
+        return bench.verdict(
+            "reversibility", float("inf"), bound, "roundings", "it ended early on its way back"
+        )
     end = back.q[-1], back.p[-1]
     if two_stage:
         end = _shifted(case.judged, scheme, end, 1)

@@ -102,9 +102,10 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
         return np.asarray(np.max(np.maximum(dq / of_q, dp / of_p), axis=1))
     # of both ends of each stretch, the far one where the scheme itself comes to, and of what lies before:
     # a frame that is wrong must not enlarge what it is judged by
-    ends = case.allowance, case.allowance_at(q, p)
-    unit = np.maximum.accumulate(np.max([case.norm.size(*end) for end in ends], axis=0))
-    return np.asarray(case.norm.size(dq, dp) / unit)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ends = case.allowance, case.allowance_at(q, p)
+        unit = np.maximum.accumulate(np.max([case.norm.size(*end) for end in ends], axis=0))
+        return np.asarray(case.norm.size(dq, dp) / unit)
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
@@ -124,8 +125,8 @@ def _amplified(case: Case, steps: int) -> Floats:
     if case.linear:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
         return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
-    growth = abs(case.trajectory.step) * rates_met(case, case.trajectory.q[:-1], case.next_states[0])
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        growth = abs(case.trajectory.step) * rates_met(case, case.trajectory.q[:-1], case.next_states[0])
         return np.where(growth > 0, ((1 + growth) ** steps - 1) / np.where(growth > 0, growth, 1), steps)
 
 
@@ -134,8 +135,9 @@ def rates_met(case: Case, *states: Reals) -> Floats:
 
     By Gershgorin's circles.
     """
-    stiff = np.max([np.max(mechanics.steepness(case.judged, q.astype(np.longdouble)) / case.judged.m, axis=-1) for q in states], axis=0)
-    return np.asarray(np.maximum.accumulate(np.sqrt(stiff)) + float(np.max(mechanics.rates(case.judged))))
+    rows = [mechanics.steepness(case.judged, q.astype(np.longdouble)) / case.judged.m for q in states]
+    steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
+    return np.asarray(np.sqrt(steepest) + np.max(mechanics.rates(case.judged)), np.float64)
 
 
 def fastest(case: Case) -> float:
@@ -314,7 +316,9 @@ def frequency(case: Case) -> Verdict:
     shape = schemes.condition(case.matrices, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
-        return case.not_applicable("frequency", "rounding may be as large as the mode, which has no phase then")
+        return case.not_applicable(
+            "frequency", "rounding may be as large as the mode, which has no phase then"
+        )
     if angle >= abs(expected):
         return case.not_applicable("frequency", f"{STILL} the whole turn")
     limit = float(angle / abs(expected))

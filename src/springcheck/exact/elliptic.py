@@ -77,7 +77,8 @@ def argument(sine: Extended, cosine: Extended, m: Extended, m1: Extended) -> Ext
         # 2 phi - (phi - atan(b/a tan phi)): the difference stays on the branch of phi
         phi = 2 * phi - np.arctan2((a - b) * s * c, a * c * c + b * s * s)
         size = np.hypot(b * s, a * c)
-        s, c = (a + b) * s * c / np.where(size > 0, size, 1), (a * c * c - b * s * s) / np.where(size > 0, size, 1)
+        safe = np.where(size > 0, size, 1)
+        s, c = (a + b) * s * c / safe, (a * c * c - b * s * s) / safe
     mean = rounds[-1][0] * np.longdouble(2) ** (len(rounds) - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         endless = np.arcsinh(np.where(edge, sine, 0) / np.where(edge, cosine, 1))
