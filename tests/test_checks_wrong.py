@@ -203,6 +203,39 @@ def test_momenta_that_rounding_could_make_up_are_not_judged() -> None:
     assert one(scene, plain(scene), recorded.momentum).passed is True
 
 
+@pytest.mark.parametrize("name", ["semi-implicit-euler", "velocity-verlet", "position-verlet", "forest-ruth"])
+def test_a_right_engine_is_passed_while_its_motion_explodes(name: str) -> None:
+    """The last force of such a step dwarfs the first, and so do its roundings."""
+    scene = well(step=1.9, steps=20)
+    with np.errstate(all="ignore"):
+        run = plain(scene, name)
+        assert np.max(np.abs(run.q)) > 1e30
+        found = checks.judge(scene, run)
+        assert [v for v in found if v.passed is False] == []
+        assert one(scene, run, recorded.step_defect).passed is True
+        wrong = changed(scene, run, run.q, row(run.p, -1, float(run.p[-1, 0]) * (1 + 1e-12)))
+        assert one(scene, wrong, recorded.step_defect).passed is False
+
+
+def test_the_momentum_of_an_exploding_bond_raises_no_false_alarm() -> None:
+    bond = Morse(
+        a=np.array([0]), b=np.array([1]), depth=np.array([1.7]), steepness=np.array([1.0]), rest=np.zeros(1)
+    )
+    q, p = np.array([0.0, 1.3]), np.array([0.4, -0.3])
+    judged = 0
+    for h in np.linspace(0.7, 2.5, 30):
+        scene = clean.scene(np.array([1.0, 1.9]), (bond,), q, p, step=h, steps=40)
+        with np.errstate(all="ignore"):
+            run = plain(scene, "forest-ruth")
+            found = one(scene, run, recorded.momentum)
+            assert found.passed is not False
+            judged += bool(found.passed)
+            if found.passed:
+                bad = replace(run, q=row(run.q, -1, NAN))
+                assert one(scene, bad, recorded.momentum).passed is False
+    assert judged
+
+
 def adaptive(scene: Scene, q: Floats, p: Floats, tolerance: float, calls: int = 200) -> Trajectory:
     return steppers.trajectory(scene, schemes.SCHEMES["adams"], q, p, tolerance=tolerance, calls=calls)
 

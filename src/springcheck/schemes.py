@@ -14,6 +14,7 @@ the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -435,17 +436,20 @@ def magnitude_step(
     stiffness: Reals | None = None,
     rate: Reals | None = None,
     parts: tuple[Force, Force] | None = None,
+    kicks: Sequence[Force] = (),
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `mechanics.magnitude`.  An implicit scheme's is carried through the
-    solution of its equation.
+    `magnitude` and `parts` are made by `mechanics.magnitude`; `kicks` are one for each kick of a splitting,
+    near where it takes place, and stand for `magnitude` where they are given.  An implicit scheme's is
+    carried through the solution of its equation.
     """
     direction = np.sign(h)
     # in extended precision: the square of a step may leave the range of a double
     q, p, size = np.abs(q), np.abs(p), np.abs(np.longdouble(h))
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
+        each = iter(kicks)
         for kind, c in stages:
             if kind == "drift":
                 q = q + c * size * p / m
@@ -455,7 +459,7 @@ def magnitude_step(
                 x = np.zeros_like(m) if rate is None else -c * direction * size * rate
                 p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
             else:
-                p = p + c * size * _acting(kind, magnitude, parts)(q, p)
+                p = p + c * size * next(each, _acting(kind, magnitude, parts))(q, p)
         return q, p
     rows = [[abs(float(c)) * size for c in row] for row in scheme.a]
     forces: list[Reals] = []

@@ -121,14 +121,15 @@ class Case:
         """
         run, scene = self.trajectory, self.judged
         rounding = run.arithmetic
-        near = q.astype(np.longdouble)
-        q, p = np.abs(near), np.abs(p).astype(np.longdouble)
+        near, momenta = q.astype(np.longdouble), p.astype(np.longdouble)
+        q, p = np.abs(near), np.abs(momenta)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
         sizes = mechanics.magnitude(scene.terms, near)
         slow, fast = mechanics.split(scene.terms)
         parts = mechanics.magnitude(slow, near), mechanics.magnitude(fast, near)
+        kicks = self._kicks(near, momenta) if self.scheme.reach == 2 else []
         size_q, size_p = schemes.magnitude_step(
-            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, **self.law
+            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, kicks=kicks, **self.law
         )
         # an engine may count positions from where the springs rest, and so round those
         size_q = size_q + np.abs(self.rest_positions)
@@ -148,8 +149,31 @@ class Case:
         # feels is larger than the force itself
         reach = self.scheme.reach
         shift = h / m * (extra if reach else smallest * (1 + m)) + smallest
-        felt = h * (sizes(q + shift, p) - sizes(q, p)) if reach == 2 else 0
+        later = kicks[-1] if kicks else sizes
+        felt = h * (later(q + shift, p) - later(q, p)) if reach == 2 else 0
         return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
+
+    def _kicks(self, q: Extended, p: Extended) -> list[Force]:
+        """The magnitude of each kick of a splitting, near where the scheme from (q, p) takes it.
+
+        In a motion that explodes the last force of a step dwarfs the first.  Empty where no law bends, and
+        for a scheme with more than kicks and drifts.
+        """
+        scene, stages = self.judged, self.scheme.stages
+        if mechanics.is_linear(scene) or not {kind for kind, _ in stages} <= {"kick", "drift"}:
+            return []
+        found: list[Force] = []
+        m, h = scene.m.astype(np.longdouble), np.longdouble(self.trajectory.step)
+        force = mechanics.force(scene.terms)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for kind, c in stages:
+                ch = schemes.number(c, np.longdouble) * h
+                if kind == "drift":
+                    q = np.asarray(q + ch * (p / m), np.longdouble)
+                else:
+                    found.append(mechanics.magnitude(scene.terms, q))
+                    p = np.asarray(p + ch * force(q, p), np.longdouble)
+        return found
 
     @cached_property
     def strongest(self) -> Reals:

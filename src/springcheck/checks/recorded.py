@@ -356,7 +356,8 @@ def momentum(case: Case) -> Verdict:
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     steps, first = case.steps, np.sum(case.scene.p.astype(np.longdouble))
     # at both ends of each stretch between frames, for a motion that grows along it
-    _, of_p = case.allowance_at(run.q, run.p)
+    with np.errstate(over="ignore", invalid="ignore"):
+        _, of_p = case.allowance_at(run.q, run.p)
     unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
     if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
@@ -365,10 +366,13 @@ def momentum(case: Case) -> Verdict:
         steps, first = steps - steps[0], total[0]
     off = np.abs(total - first)[1:]
     limit = case.roundings * steps[1:].astype(np.float64)
-    seen = np.asarray(off / unit, np.float64)
+    # a step from a state near the end of all numbers may leave even the range of its own bound
+    finite = np.all(np.isfinite(run.q) & np.isfinite(run.p), axis=1)
+    beyond = np.asarray(finite)[1:] & ~np.isfinite(unit)
+    seen = np.asarray(off / np.where(beyond, np.inf, unit), np.float64)
     worst = int(np.argmax(seen / limit))
     size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
-    if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(size > limit * unit):
+    if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(~beyond & (size > limit * unit)):
         return case.not_applicable("momentum", "rounding may be as large as all momenta together")
     return case.verdict(
         "momentum",
