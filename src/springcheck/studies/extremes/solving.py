@@ -42,10 +42,10 @@ def solve(label: Label, spec: Spec) -> Cell:
         reason = _reason(scene, spec)
     if whole and value <= bound:
         return _cell(label, spec, "right", "", value, bound)
-    if untold:
-        return _cell(label, spec, "not measured", untold, value, bound)
     if reason or not whole:
         return _cell(label, spec, "engine's limit", (reason or "it gives up") + said, value, bound)
+    if untold:
+        return _cell(label, spec, "not measured", untold, value, bound)
     return _cell(
         label, spec, "silently wrong", f"off by {value:.3g} where {bound:.3g} is allowed", value, bound
     )
