@@ -280,3 +280,26 @@ def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("springcheck: ")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("step = 0.1", "step = 1e300"),
+        ("mass = 1.0", "mass = 1e-308"),
+        ("mass = 1.0", "mass = 9e307"),
+        ("momentum = 1.0", "momentum = 0.0"),
+        ("stiffness = 1.0", "stiffness = 1e300"),
+    ],
+)
+def test_extreme_numbers_make_a_report_and_no_warnings(
+    old: str, new: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (scenes.folder() / "spring.toml").read_text()
+    assert old in text
+    Path("extreme.toml").write_text(text.replace(old, new))
+    # a warning is an error here
+    assert main(["run", "extreme.toml", "--json"]) in (0, 1, 2)
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert json.loads(captured.out)["runs"]

@@ -59,7 +59,8 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     if case.linear:
         bound, unit = checks.growth_bound(case)
         # before the first step there is nothing to round
-        return float(np.max((bound * unit)[case.steps > 0], initial=0.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.max((bound * unit)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
     steps = float(case.steps[-1])
     return (

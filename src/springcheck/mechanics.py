@@ -355,7 +355,9 @@ def amplitudes(scene: Scene) -> tuple[Floats, Floats]:
     for term in scene.terms:
         for end in particles(term):
             np.add.at(k, end, np.maximum(np.abs(term.curvature(scene.q)), term.rigidity))
-    p = np.sqrt(2 * scene.m) * unit
     held = k > 0
     duration = abs(scene.step) * scene.steps
-    return np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / scene.m * duration), p
+    with np.errstate(over="ignore"):
+        p = np.sqrt(2.0) * np.sqrt(scene.m) * unit
+        q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / scene.m * duration)
+    return q, p

@@ -7,15 +7,18 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from io import StringIO
+from typing import Any
 
 
 @contextmanager
 def caught(descriptor: int) -> Iterator[list[str]]:
-    """Catch what C or C++ code prints to standard output (1) or error (2) while this context is open.
+    """Catch what a library prints to standard output (1) or error (2) while this context is open.
 
-    The list that is handed out holds the text, as one string, once the context is left.  Where the
-    descriptor is closed nothing is caught.
+    What its C or C++ code prints, and what Python code prints to another stream in its place, as in a
+    notebook.  The list that is handed out holds the text, as one string, once the context is left.  Where
+    the descriptor is closed nothing is caught.
     """
     text: list[str] = []
     try:
@@ -26,10 +29,12 @@ def caught(descriptor: int) -> Iterator[list[str]]:
     stream = sys.stdout if descriptor == 1 else sys.stderr
     if stream is not None:
         stream.flush()
-    with tempfile.TemporaryFile() as file:
+    redirected: Any = redirect_stdout if descriptor == 1 else redirect_stderr
+    with tempfile.TemporaryFile() as file, StringIO() as printed:
         os.dup2(file.fileno(), descriptor)
         try:
-            yield text
+            with redirected(printed):
+                yield text
         finally:
             # what C++ has printed may still stand in the C library's buffer
             if os.name == "posix":
@@ -37,4 +42,4 @@ def caught(descriptor: int) -> Iterator[list[str]]:
             os.dup2(saved, descriptor)
             os.close(saved)
             file.seek(0)
-            text.append(file.read().decode(errors="replace").strip())
+            text.append((printed.getvalue() + file.read().decode(errors="replace")).strip())

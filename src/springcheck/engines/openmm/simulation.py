@@ -176,7 +176,8 @@ def _largest_w2(scene: Scene) -> float:
         elif isinstance(term, Spring):
             np.add.at(row, term.a, 2 * np.abs(term.k))
             np.add.at(row, term.b, 2 * np.abs(term.k))
-    return float(np.max(row / scene.m))
+    with np.errstate(over="ignore"):
+        return float(np.max(row / scene.m))
 
 
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
