@@ -310,3 +310,13 @@ def test_the_claim_of_a_journal_that_cannot_be_read_is_told(tmp_path: Path) -> N
     claim.write_bytes(b"{")
     with pytest.raises(StoreError, match="cannot read"):
         store.open_new(path, "run")
+
+
+def test_a_link_stays_a_link_and_leads_to_the_store(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    link, s = tmp_path / "s.h5", scene()
+    link.symlink_to(tmp_path / "disk" / "real.h5")
+    made = written(link, s)
+    assert link.is_symlink()
+    assert list(store.read(tmp_path / "disk" / "real.h5")) == list(made) == list(store.read(link))
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["disk", "s.h5"]

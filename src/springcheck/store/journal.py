@@ -39,6 +39,9 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     writing it, and when the folder is missing or cannot be written.
     """
     path = Path(path)
+    if path.is_symlink():
+        # the link stays, and what it leads to is written
+        path = path.resolve()
     folder = path.absolute().parent
     if not folder.is_dir():
         raise StoreError(f"cannot write {path}: there is no folder {folder}")
