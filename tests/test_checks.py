@@ -51,6 +51,14 @@ def test_no_check_rejects_an_engine_on_random_scenes(label: str, need: Need) -> 
         assert alarms(checks.judge(scene, springcheck.run(scene, label))) == [], seed
 
 
+def part_of(run: Trajectory, rows: slice) -> Trajectory:
+    """Some frames of a run, which say themselves where they end."""
+    assert run.energy is not None
+    end = round(float(run.t[rows][-1]) / run.step)
+    outcome = replace(run.outcome, step=end)
+    return replace(run, t=run.t[rows], q=run.q[rows], p=run.p[rows], energy=run.energy[rows], outcome=outcome)
+
+
 @pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-euler", "rk4"])
 def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
     for seed in range(8):
@@ -58,12 +66,23 @@ def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
         scene = clean.random_scene(rng)
         run = plain(scene, name)
         size = int(rng.integers(2, 30))
-        pieces = []
-        for first in range(0, len(run.t), size):
-            part = slice(first, first + size + 1)
-            piece = replace(run, t=run.t[part], q=run.q[part], p=run.p[part], energy=run.energy[part])
-            pieces.append(checks.judge(scene, piece))
+        pieces = [
+            checks.judge(scene, part_of(run, slice(first, first + size + 1)))
+            for first in range(0, len(run.t), size)
+        ]
         assert alarms(checks.worst(pieces)) == [], seed
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet"])
+def test_a_run_that_ends_early_and_says_complete_fails_its_times(name: str) -> None:
+    scene = scenes.load_scene("spring-uneven")
+    run = plain(scene, name)
+    assert run.energy is not None
+    short = replace(run, t=run.t[:-3], q=run.q[:-3], p=run.p[:-3], energy=run.energy[:-3])
+    verdicts = checks.judge(scene, short)
+    assert [v.check for v in verdicts if v.passed is False] == ["times"]
+    (times,) = (v for v in verdicts if v.check == "times")
+    assert times.value == pytest.approx(3 * scene.step)
 
 
 def test_a_slip_between_two_pieces_shows_in_the_closed_form_of_those_after_it() -> None:
@@ -128,8 +147,7 @@ def test_a_trajectory_of_one_frame_is_judged_without_an_exception() -> None:
     for name in ("spring", "chain"):
         scene = scenes.load_scene(name)
         run = plain(scene, "velocity-verlet")
-        first = replace(run, t=run.t[:1], q=run.q[:1], p=run.p[:1], energy=run.energy[:1])
-        verdicts = checks.judge(scene, first)
+        verdicts = checks.judge(scene, part_of(run, slice(1)))
         assert alarms(verdicts) == []
         assert next(v for v in verdicts if v.check == "step-defect").passed is None
 

@@ -206,7 +206,14 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
     (verdict,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
     assert verdict.passed is False
     assert f"overflows beyond 2**31, and step {step}, the first that is off" in verdict.why
-    before = replace(run, t=run.t[:step], q=run.q[:step], p=run.p[:step], energy=run.energy[:step])
+    before = replace(
+        run,
+        t=run.t[:step],
+        q=run.q[:step],
+        p=run.p[:step],
+        energy=run.energy[:step],
+        outcome=replace(run.outcome, step=step - 1),
+    )
     assert judged(scene, before) == []
 
 

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 from urllib.parse import unquote
@@ -256,7 +256,12 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
         frames = len(datasets["time"])
         starts = range(0, max(1, frames - 1), rows)
         for start in sorted({*starts[::stride], starts[-1]}):
-            yield _trajectory(label, known, _rows(datasets, slice(start, start + rows + 1)))
+            piece = _trajectory(label, known, _rows(datasets, slice(start, start + rows + 1)))
+            end = start + len(piece.t) - 1
+            # a piece ends where it ends; only the last one with what became of the run
+            if end < frames - 1:
+                piece = replace(piece, outcome=replace(piece.outcome, step=end * piece.every))
+            yield piece
 
 
 def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, int]:
