@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, report, scenes, store
+from springcheck import cli, report, scenes, session, store
 from springcheck.cli import main
 
 OWN = ["--method", "own:*"]
@@ -303,3 +303,18 @@ def test_extreme_numbers_make_a_report_and_no_warnings(
     captured = capsys.readouterr()
     assert captured.err == ""
     assert json.loads(captured.out)["runs"]
+
+
+# beyond four pieces of 16 steps: four of 4 steps, and the last, each with the frame before it
+@pytest.mark.parametrize(("steps", "judged"), [(64, 65), (65, 22), (1000, 25)])
+def test_of_a_long_run_some_pieces_are_judged_and_it_is_said(
+    steps: int, judged: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(session, "PIECE", 16)
+    monkeypatch.setattr(session, "LONG_PIECE", 4)
+    monkeypatch.setattr(session, "MOST_PIECES", 4)
+    text = (scenes.folder() / "spring-uneven.toml").read_text().replace("steps = 200", f"steps = {steps}")
+    Path("long.toml").write_text(text)
+    assert main(["run", "long.toml", "--method", "own:euler", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["judged_frames"] == judged

@@ -15,8 +15,8 @@
 
 Expected with the defaults, in four minutes: recording at most 1.5 times h5py, and no command more than
 300 MiB above a short run.  Seen on two cores and a shared ext4 disk, 3.6 and 4.4 GB: the store 1.06 and 1.02
-of h5py (single rounds 0.55 to 1.26), a real run 1.02 and 1.06, in 161 and 169 MiB.  `run` as a whole 15 s,
-2.25 of h5py, for judging 16 pieces of 65,536 frames takes 8 s of it, in 185 MiB; inspect 0.3 s, plot 1.9 s
+of h5py (single rounds 0.55 to 1.26), a real run 1.02 and 1.06, in 161 and 169 MiB.  `run` as a whole 10 s in
+167 MiB, of which importing, and judging 16 pieces of 16,384 frames, take 2 to 3 s; inspect 0.3 s, plot 1.9 s
 and 57 MiB, identify 0.6 s, check 4.9 s.  1e9 unrecorded steps 8.5 s.  Of the bytes of a trajectory shuffle +
 gzip 1 leaves 76 % and writes 91 MB/s where contiguous writes 3000: a quarter of the space for 30 times the
 time, so nothing is compressed, and the seal finds what gzip's checksum would.

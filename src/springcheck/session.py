@@ -22,9 +22,11 @@ PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
 
 MOST_PIECES = 16
-"""Pieces of a long run that are judged: the first, the last, and some between at equal distances.  Judging
-takes 8 us a frame, a hundred times as long as making it; a slip between two pieces shows in the closed form
-of every piece after it."""
+"""Pieces of a long run that are judged: the first, the last, and some between at equal distances."""
+
+LONG_PIECE = PIECE // 4
+"""Numbers per array in each of them.  Judging takes 8 us a frame, a hundred times as long as making it: two
+seconds in all.  A slip between two pieces shows in the closed form of every piece after it, however short."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,6 +177,8 @@ def judge(
 ) -> Report:
     """The report on stored trajectories, read in pieces of bounded size."""
     rows = max(2, PIECE // scene.n)
+    if scene.frames - 1 > MOST_PIECES * rows:
+        rows = max(2, LONG_PIECE // scene.n)
     pieces_in_all = -(-(scene.frames - 1) // rows)
     stride = max(1, -(-pieces_in_all // MOST_PIECES))
     judged_frames = 0
