@@ -153,6 +153,43 @@ class Case:
         felt = h * (later(q + shift, p) - later(q, p)) if reach == 2 else 0
         return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
 
+    @cached_property
+    def allowance_of_stretches(self) -> Extended:
+        """One rounding of what a step adds up on each stretch between frames (f-1,), as `Norm.size`.
+
+        Of both ends, the far one where the scheme itself comes to, and of what lies before: a frame that is
+        wrong must not enlarge what it is judged by.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            ends = self.allowance, self.allowance_at(*self.next_states)
+            return np.maximum.accumulate(np.max([self.norm.size(*end) for end in ends], axis=0))
+
+    @cached_property
+    def closed_states(self) -> tuple[Extended, Extended]:
+        """The scheme's closed-form motion at the frames: modes about their centres, (f, n) each."""
+        y, v = self.modes.into(self.scene.q, self.scene.p)
+        return schemes.propagate(
+            self.matrices, y - self.modes.centre(), v, self.steps, area_preserving=self.area_preserving
+        )
+
+    @cached_property
+    def growth(self) -> tuple[Floats, Extended]:
+        """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
+
+        One rounding a step, enlarged by the map from the step where it arises, and all of one sign.  The
+        unit is a root of an energy: see `mechanics.Norm.size`.
+        """
+        total, grown = schemes.amplification(self.matrices, self.w, self.steps)
+        size = self.norm.size(*self.allowance)
+        size = np.maximum.accumulate(np.concatenate([size[:1], size]))
+        if self.steps[0] == 0:
+            first = size[0]
+        else:
+            # a piece of a long run: what came before it is bounded by the envelope of the motion
+            before = self.envelope, (self.scene.q, self.scene.p)
+            first = np.max([self.norm.size(*self.allowance_at(*x)) for x in before])
+        return np.asarray(self.roundings * total), np.asarray(np.maximum(size, first * grown))
+
     def _kicks(self, q: Extended, p: Extended) -> list[Force]:
         """The magnitude of each kick of a splitting, near where the scheme from (q, p) takes it.
 

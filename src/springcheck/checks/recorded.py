@@ -58,10 +58,8 @@ def step_defect(case: Case) -> Verdict:
     if why_not:
         return case.not_applicable("step-defect", why_not)
     run = case.trajectory
-    if run.every > REPEATED and _closed(case):
-        return case.not_applicable(
-            "step-defect", f"{run.every} steps lie between frames, and {_closed(case)}"
-        )
+    if run.every > REPEATED and (no_leap := _closed(case)):
+        return case.not_applicable("step-defect", f"{run.every} steps lie between frames, and {no_leap}")
     if run.every == 1:
         bound = np.full(len(run.t) - 1, float(case.roundings))
         why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
@@ -99,15 +97,11 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
     """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
     q, p = case.next_states
     dq, dp = np.abs(q - to_q), np.abs(p - to_p)
-    of_q, of_p = case.allowance
     if case.trajectory.every == 1:
+        of_q, of_p = case.allowance
         return np.asarray(np.max(np.maximum(dq / of_q, dp / of_p), axis=1))
-    # of both ends of each stretch, the far one where the scheme itself comes to, and of what lies before:
-    # a frame that is wrong must not enlarge what it is judged by
     with np.errstate(over="ignore", invalid="ignore"):
-        ends = case.allowance, case.allowance_at(q, p)
-        unit = np.maximum.accumulate(np.max([case.norm.size(*end) for end in ends], axis=0))
-        return np.asarray(case.norm.size(dq, dp) / unit)
+        return np.asarray(case.norm.size(dq, dp) / case.allowance_of_stretches)
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
@@ -168,36 +162,14 @@ def _closed(case: Case) -> str | None:
     return None
 
 
-def closed_states(case: Case) -> tuple[Extended, Extended]:
-    """The scheme's closed-form motion at the frames: mode coordinates about their centres, (f, n) each."""
-    y, v = case.modes.into(case.scene.q, case.scene.p)
-    return schemes.propagate(
-        case.matrices, y - case.modes.centre(), v, case.steps, area_preserving=case.area_preserving
-    )
-
-
 def growth_bound(case: Case) -> tuple[Floats, Floats]:
     """Bound on the distance from the closed form at each frame, in units of one rounding, and that unit.
 
     One rounding a step, enlarged by the map from the step where it arises, and all of one sign.
     """
-    bound, unit = _growth(case)
+    bound, unit = case.growth
     with np.errstate(divide="ignore", over="ignore"):
         return bound, np.asarray(unit / case.norm.unit, np.float64)
-
-
-def _growth(case: Case) -> tuple[Floats, Extended]:
-    """The same with the unit as a root of an energy: see `mechanics.Norm.size`."""
-    total, grown = schemes.amplification(case.matrices, case.w, case.steps)
-    size = case.norm.size(*case.allowance)
-    size = np.maximum.accumulate(np.concatenate([size[:1], size]))
-    if case.steps[0] == 0:
-        first = size[0]
-    else:
-        # a piece of a long run: what came before it is bounded by the envelope of the motion
-        before = case.envelope, (case.scene.q, case.scene.p)
-        first = np.max([case.norm.size(*case.allowance_at(*x)) for x in before])
-    return np.asarray(case.roundings * total), np.asarray(np.maximum(size, first * grown))
 
 
 def closed_form(case: Case) -> Verdict:
@@ -205,11 +177,11 @@ def closed_form(case: Case) -> Verdict:
     why_not = _closed(case)
     if why_not:
         return case.not_applicable("closed-form", why_not)
-    y, v = closed_states(case)
+    y, v = case.closed_states
     q, p = case.modes.out_of(y + case.modes.centre(), v)
     distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
     moved = case.norm.size(q - case.scene.q, p - case.scene.p)
-    bound, unit = _growth(case)
+    bound, unit = case.growth
     late = case.steps > 0
     allowed = np.where(late, bound * unit, 1)
     ratio = np.where(late, distance / allowed, 0)
@@ -252,7 +224,7 @@ def shadow_energy(case: Case) -> Verdict:
     expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
-    _, unit = _growth(case)
+    _, unit = case.growth
     size = np.maximum.accumulate(case.norm.size(run.q - _rest(case), run.p))
     if case.steps[0] != 0:
         size = np.maximum(size, case.norm.size(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
@@ -308,9 +280,9 @@ def frequency(case: Case) -> Verdict:
     off = phase - expected
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
     off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
-    bound, unit = _growth(case)
+    bound, unit = case.growth
     # where the mode ought to be: one that has come to nothing would excuse any phase
-    own_y, own_v = closed_states(case)
+    own_y, own_v = case.closed_states
     # extended: a motion that spirals out is squared here, up to the end of double's range
     mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
     wide = unit[-1] * np.sqrt(np.longdouble(2))
