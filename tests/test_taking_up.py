@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, engines, scenes, session, store
+from springcheck import cli, engines, provenance, scenes, session, store
 from springcheck.errors import StoreError
 from springcheck.model import Label
-from springcheck.studies import extremes, pieces, precision, stability
+from springcheck.studies import extremes, precision, stability
 from springcheck.studies.outcome import of_points, to_points
 from springcheck.studies.stability import limits
 
@@ -226,7 +226,7 @@ def test_runs_of_another_version_are_not_taken_up(tmp_path: Path, monkeypatch: p
 
 def test_every_version_that_a_study_runs_on_is_in_its_command() -> None:
     labels = [engines.parse(name) for name in ("own:euler", "sundials:bdf")]
-    text = pieces.command("stability", labels, "a scene")
+    text = provenance.command("stability", labels, "a scene")
     assert text.splitlines()[0] == "stability"
     for line in ("own:euler", "sundials:bdf", f"numpy {np.__version__}", "a scene"):
         assert line in text.splitlines()

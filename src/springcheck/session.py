@@ -16,7 +16,7 @@ import numpy as np
 from springcheck import checks, compare, engines, exact, mechanics, scenes, simulate, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Comparison, Floats, Label, Scene, Timing, Trajectory, Verdict
-from springcheck.studies.pieces import command
+from springcheck.provenance import command
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""

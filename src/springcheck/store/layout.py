@@ -247,6 +247,7 @@ def _ours() -> str:
         return "unknown"
 
 
+@cache
 def machine() -> dict[str, Scalar]:
     """What ran, and on what."""
     return {

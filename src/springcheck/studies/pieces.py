@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import TypeVar
 
-from springcheck import engines, store
-from springcheck.model import Label
+from springcheck import store
 
 T = TypeVar("T")
 
@@ -65,23 +64,3 @@ class Pieces:
         found = measure()
         self.keep(to_table(found))
         return found
-
-
-def origin(labels: Iterable[Label]) -> dict[str, str]:
-    """The machine, and the versions of everything that these methods run on."""
-    found = {name: str(value) for name, value in store.machine().items()}
-    for name in sorted({label.engine for label in labels}):
-        distribution = engines.engine(name).distribution
-        if distribution and engines.absence(name) is None:
-            found[distribution] = engines.installed_version(name)
-    return found
-
-
-def command(study: str, labels: Sequence[Label], *options: str) -> str:
-    """All that decides the numbers of a study or a run, by which its journal is recognised.
-
-    The machine and the versions are part of it: times of two machines, limits of two releases of an
-    engine, do not belong into one file.
-    """
-    versions = [f"{name} {version}" for name, version in origin(labels).items()]
-    return "\n".join([study, *map(str, labels), *versions, *options])

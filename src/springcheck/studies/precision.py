@@ -22,6 +22,7 @@ import numpy as np
 
 from springcheck import mechanics, simulate, store
 from springcheck.model import Label, Scene, Stopped
+from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits
 from springcheck.studies.accuracy import Errors, Truth, truth
@@ -33,7 +34,7 @@ from springcheck.studies.outcome import (
     table_name,
     to_points,
 )
-from springcheck.studies.pieces import Pieces, command, origin
+from springcheck.studies.pieces import Pieces
 from springcheck.studies.points import Point
 from springcheck.studies.sweeps import (
     PLANNED,

@@ -20,9 +20,10 @@ import numpy as np
 from springcheck import engines, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label
+from springcheck.provenance import command
 from springcheck.studies.extremes import grid, keeping, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.pieces import Pieces, Progress, command
+from springcheck.studies.pieces import Pieces, Progress
 from springcheck.studies.stability import propagators
 
 __all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows", "stored"]

@@ -19,7 +19,8 @@ import numpy as np
 from springcheck import engines, mechanics, store
 from springcheck.errors import MethodError, StoreError
 from springcheck.model import Label, Scene
-from springcheck.studies.pieces import Pieces, Progress, command
+from springcheck.provenance import command
+from springcheck.studies.pieces import Pieces, Progress
 from springcheck.studies.stability import costs, keeping, limits, propagators, regions, resonance
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
