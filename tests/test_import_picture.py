@@ -15,9 +15,9 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "errors", "model", "terms", "mechanics", "exact", "schemes", "scenes", "store", "engines", "provenance", "simulate",
-    "checks", "compare", "identify", "faults", "studies", "figures", "session", "report", "inspection",
-    "catalogue", "cli", "__main__",
+    "errors", "model", "terms", "mechanics", "exact", "schemes", "scenes", "store", "engines", "provenance",
+    "simulate", "checks", "compare", "identify", "faults", "studies", "figures", "session", "report",
+    "inspection", "catalogue", "cli", "__main__",
 ]  # fmt: skip
 
 HOMES = {

@@ -280,7 +280,7 @@ def test_an_interrupted_study_keeps_every_finished_point() -> None:
     scene = scenes.load_scene("spring-uneven")
     told: list[str] = []
 
-    def interrupt(seconds: float, what: str) -> None:
+    def interrupt(seconds: float, budget: float, what: str) -> None:
         told.append(what)
         if len(told) == 12:
             raise KeyboardInterrupt

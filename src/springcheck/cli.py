@@ -268,26 +268,13 @@ def _faults(options: argparse.Namespace) -> int:
     labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
     with _progress(options) as started:
         found = study(
-            simulate.run, labels, workers=min(2, os.cpu_count() or 1), progress=_counting(started, "faults")
+            simulate.run, labels, workers=min(2, os.cpu_count() or 1), progress=_filling(started, "faults")
         )
     if options.json:
         _document(found.document())
     else:
         _show(report.fault_report(found), quiet=options.quiet)
     return 0 if found.sound else 1
-
-
-def _counting(started: Any, what: str) -> Callable[[int, int], None] | None:
-    """A progress bar of parts: called with the number done and that of all."""
-    if started is None:
-        return None
-    bars: list[Callable[[int], None]] = []
-
-    def counted(done: int, all_parts: int) -> None:
-        bars[:] = bars or [started(what, all_parts)]
-        bars[0](1)
-
-    return counted
 
 
 def _precision(options: argparse.Namespace) -> int:
@@ -302,7 +289,7 @@ def _precision(options: argparse.Namespace) -> int:
     path = Path(options.output or f"{scene.name}-precision.h5")
     with _progress(options) as started:
         found = precision.record(
-            scene, labels, path, budget=budget, force=options.force, progress=_spending(started, budget)
+            scene, labels, path, budget=budget, force=options.force, progress=_filling(started, "precision")
         )
     if options.json:
         _document(found.document())
@@ -323,7 +310,7 @@ def _stability(options: argparse.Namespace) -> int:
     path = Path(options.output or f"{scene.name}-stability.h5")
     with _progress(options) as started:
         found = stability.record(
-            scene, path, options.method, force=options.force, progress=_naming(started, "stability")
+            scene, path, options.method, force=options.force, progress=_filling(started, "stability")
         )
     if options.json:
         _document(stability.document(found))
@@ -346,7 +333,7 @@ def _extremes(options: argparse.Namespace) -> int:
             options.method,
             quick=options.quick,
             force=options.force,
-            progress=_naming(started, "extremes"),
+            progress=_filling(started, "extremes"),
         )
     if options.json:
         _document(extremes.document(found))
@@ -357,33 +344,20 @@ def _extremes(options: argparse.Namespace) -> int:
     return 0 if found.passed else 1
 
 
-def _naming(started: Any, study: str) -> Callable[[str, int, int], None] | None:
-    """A progress bar of pieces, with the name of the one that is measured."""
+def _filling(started: Any, title: str) -> Callable[..., None] | None:
+    """A progress bar that is told how much is done, of how much, and what comes next."""
     if started is None:
         return None
-    bars: list[Callable[..., None]] = []
+    bar: Callable[..., None] | None = None
+    shown = 0.0
 
-    def named(what: str, done: int, pieces: int) -> None:
-        bars[:] = bars or [started(study, pieces)]
-        bars[0](1 if done else 0, f"{study}: {what}")
+    def told(done: float, whole: float, what: str = "") -> None:
+        nonlocal bar, shown
+        bar = bar or started(title, whole)
+        bar(done - shown, f"{title}: {what}" if what else None)
+        shown = done
 
-    return named
-
-
-def _spending(started: Any, budget: float) -> Callable[[float, str], None] | None:
-    """A progress bar over a budget of seconds."""
-    if started is None:
-        return None
-    hundredths = started("error against run time", round(100 * budget))
-    shown = 0
-
-    def spent(seconds: float, what: str) -> None:
-        nonlocal shown
-        now = min(round(100 * seconds), round(100 * budget))
-        hundredths(now - shown)
-        shown = now
-
-    return spent
+    return told
 
 
 @contextmanager
@@ -406,8 +380,8 @@ def _progress(options: argparse.Namespace) -> Iterator[Any]:
         transient=True,
     )
 
-    def started(label: object, steps: int) -> Callable[..., None]:
-        task = bars.add_task(str(label), total=steps)
+    def started(label: object, whole: float) -> Callable[..., None]:
+        task = bars.add_task(str(label), total=whole)
         return lambda done, what=None: bars.update(task, advance=done, description=what)
 
     with bars:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TypeVar
 
 from springcheck import store
+from springcheck.model import Label
 
 T = TypeVar("T")
 
-Progress = Callable[[str, int, int], None]
-"""Told of the piece that is next, of how many are done and of how many there are."""
+Progress = Callable[[float, float, str], None]
+"""Told how much of a study is done, of how much (pieces, or seconds of a budget), and what comes next."""
 
 
 class Pieces:
@@ -55,7 +57,7 @@ class Pieces:
         `what` is its name for people.
         """
         if self._progress:
-            self._progress(what, len(self.names), self._expected)
+            self._progress(len(self.names), self._expected, what)
         self.names.append(name)
         table = self.finished(name)
         if table is not None:
@@ -64,3 +66,20 @@ class Pieces:
         found = measure()
         self.keep(to_table(found))
         return found
+
+    def each(
+        self,
+        labels: Iterable[Label],
+        beginning: str,
+        what: str,
+        measure: Callable[[Label], T],
+        to_table: Callable[[T], store.Table],
+        from_table: Callable[[store.Table], T],
+    ) -> tuple[T, ...]:
+        """One piece for each method; names begin with `beginning`, and `what` says them for people."""
+        return tuple(
+            self.piece(
+                f"{beginning}{label}", f"{what} {label}", partial(measure, label), to_table, from_table
+            )
+            for label in labels
+        )

@@ -34,7 +34,7 @@ from springcheck.studies.outcome import (
     table_name,
     to_points,
 )
-from springcheck.studies.pieces import Pieces
+from springcheck.studies.pieces import Pieces, Progress
 from springcheck.studies.points import Point
 from springcheck.studies.sweeps import (
     PLANNED,
@@ -72,9 +72,6 @@ CUT_OFF = "cut off"
 DOCUMENT = "precision"
 """Name of the study's document in a store."""
 
-Progress = Callable[[float, str], None]
-"""Told of the seconds spent and of what comes next."""
-
 
 def study(
     scene: Scene,
@@ -105,7 +102,7 @@ def study(
 
     def tell(what: str) -> None:
         if progress:
-            progress(perf_counter() - began, what)
+            progress(min(perf_counter() - began, budget), budget, what)
 
     try:
         while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):

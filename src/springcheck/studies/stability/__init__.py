@@ -98,62 +98,36 @@ def measure(
     damped = regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ()
     resonant = [label for label in usable if resonance.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
-    stiff = [
-        (label, partial(costs.measure, label, family))
-        for label in chosen
-        if family and costs.serves(label, family)
-    ]
+    stiff = [label for label in chosen if family and costs.serves(label, family)]
     pieces = pieces or Pieces()
     pieces.expect(len(usable) + len(damped) + len(resonant) + len(stiff), progress)
-    found_limits = [
-        pieces.piece(
-            f"{keeping.LIMITS}{label}",
-            f"limit of {label}",
-            partial(limits.measure, label),
-            keeping.of_limit,
-            keeping.to_limit,
-        )
-        for label in usable
-    ]
-    found_regions = [
-        pieces.piece(
-            f"{keeping.REGIONS}{label}",
-            f"region of {label}",
-            partial(regions.measure, label),
-            keeping.of_region,
-            keeping.to_region,
-        )
-        for label in damped
-    ]
-    found_resonances = [
-        pieces.piece(
-            f"{keeping.RESONANCES}{label}",
-            f"resonances of {label}",
-            partial(resonance.measure, scene, label),
-            keeping.of_resonance,
-            keeping.to_resonance,
-        )
-        for label in resonant
-    ]
-    rows = [
-        pieces.piece(
-            f"{keeping.COSTS}{label}",
-            f"stiffness, {label}",
-            cost,
-            partial(keeping.of_costs, str(label)),
-            keeping.to_costs,
-        )
-        for label, cost in stiff
-    ]
+    found_limits = pieces.each(
+        usable, keeping.LIMITS, "limit of", limits.measure, keeping.of_limit, keeping.to_limit
+    )
+    found_regions = pieces.each(
+        damped, keeping.REGIONS, "region of", regions.measure, keeping.of_region, keeping.to_region
+    )
+    found_resonances = pieces.each(
+        resonant,
+        keeping.RESONANCES,
+        "resonances of",
+        partial(resonance.measure, scene),
+        keeping.of_resonance,
+        keeping.to_resonance,
+    )
+    rows: tuple[tuple[Cost, ...], ...] = ()
+    if family:
+        cost = partial(costs.measure, family=family)
+        rows = pieces.each(stiff, keeping.COSTS, "stiffness,", cost, keeping.of_costs, keeping.to_costs)
     if not usable and not rows:
         raise MethodError(
             "none of these methods has a limit to measure: " + "; ".join(map(": ".join, left_out))
         )
     return Stability(
         scene=scene,
-        limits=tuple(found_limits),
-        regions=tuple(found_regions),
-        resonances=tuple(found_resonances),
+        limits=found_limits,
+        regions=found_regions,
+        resonances=found_resonances,
         costs=tuple(row for of_method in rows for row in of_method),
         left_out=tuple(left_out),
         taken_up=len(pieces.taken_up),

@@ -125,10 +125,10 @@ def to_resonance(table: Table) -> Resonance:
     )
 
 
-def of_costs(method: str, rows: Sequence[Cost]) -> Table:
-    """The runs of one method over the ratios of a family; none where it does not serve the family."""
+def of_costs(rows: Sequence[Cost]) -> Table:
+    """The runs of one method over the ratios of a family."""
     return Table(
-        name=f"{COSTS}{method}",
+        name=f"{COSTS}{rows[0].method}",
         columns={name: np.array([getattr(x, name) for x in rows], dtype=kind) for name, kind in _OF_COST},
     )
 
