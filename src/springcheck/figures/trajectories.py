@@ -61,14 +61,18 @@ def pictures(
     usable, parts = (
         _groups({label: run for label, run in found.items() if len(run.t) > 1}) for found in (runs, followed)
     )
+    truth = true_motion(scene, _all(parts))
     return {
-        "phase-portrait": _phase_portrait(scene, parts),
-        "position": _position(scene, parts),
+        "phase-portrait": _phase_portrait(scene, parts, truth),
+        "position": _position(scene, parts, truth),
         "energy": _energy(scene, usable),
     }
 
 
 Group = tuple[str, list[Trajectory]]
+
+Motion = tuple[Floats, Floats, Floats]
+"""t (f,) [T], q and p (f, n)."""
 
 
 def _groups(runs: Mapping[str, Trajectory]) -> list[Group]:
@@ -88,8 +92,8 @@ def _units(scene: Scene) -> tuple[str, str, str, str]:
     return CIRCUIT if scene.kind == "circuit" else UNITS[scene.units]
 
 
-def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> tuple[Floats, Floats, Floats] | None:
-    """A smooth true motion from the first frame of these runs to the last: t (f,) [T], q, p (f, n)."""
+def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> Motion | None:
+    """A smooth true motion from the first frame of these runs to the last."""
     if not exact.has_true_motion(scene):
         return None
     times = [np.abs(run.t[[0, -1]]) for run in runs]
@@ -172,11 +176,10 @@ def _overlay(axes: Axes, groups: Sequence[Group], pick: Any) -> None:
             _marks(axes, x, y, i, j, run.label)
 
 
-def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
+def _phase_portrait(scene: Scene, groups: Sequence[Group], truth: Motion | None) -> Figure:
     q_unit, p_unit, _, _ = _units(scene)
     figure = Figure(figsize=(7.6, 5.2), layout="constrained")
     axes = figure.add_subplot()
-    truth = true_motion(scene, _all(groups))
     if truth is not None:
         axes.plot(
             truth[1][:, 0], truth[2][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion"
@@ -197,11 +200,10 @@ def _phase_portrait(scene: Scene, groups: Sequence[Group]) -> Figure:
     return figure
 
 
-def _position(scene: Scene, groups: Sequence[Group]) -> Figure:
+def _position(scene: Scene, groups: Sequence[Group], truth: Motion | None) -> Figure:
     q_unit, _, t_unit, _ = _units(scene)
     figure = Figure(figsize=(7.6, 4.2), layout="constrained")
     axes = figure.add_subplot()
-    truth = true_motion(scene, _all(groups))
     if truth is not None:
         axes.plot(truth[0], truth[1][:, 0], color="#999999", linewidth=4, alpha=0.6, label="true motion")
     room = _room(groups, lambda run: run.q[:, 0], None if truth is None else truth[1][:, 0])

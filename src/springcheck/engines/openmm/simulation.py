@@ -147,7 +147,10 @@ def _origins(scene: Scene, method: Method) -> Floats:
     origins = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
-    hw = abs(scene.step) * float(np.sqrt(_largest_w2(scene)))
+    with np.errstate(over="ignore"):
+        # Gershgorin's bound of the squared frequencies
+        w2 = np.max(mechanics.steepness(replace(scene, terms=tuple(springs)), scene.q) / scene.m)
+    hw = abs(scene.step) * float(np.sqrt(w2))
     bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
@@ -165,19 +168,6 @@ def _origins(scene: Scene, method: Method) -> Floats:
             "the length of a bond that may turn over"
         )
     return rest
-
-
-def _largest_w2(scene: Scene) -> float:
-    """An upper bound of the squared frequencies of a linear scene, by Gershgorin's circles [1/T2]."""
-    row = np.zeros(scene.n)
-    for term in scene.terms:
-        if isinstance(term, WallSpring):
-            np.add.at(row, term.i, np.abs(term.k))
-        elif isinstance(term, Spring):
-            np.add.at(row, term.a, 2 * np.abs(term.k))
-            np.add.at(row, term.b, 2 * np.abs(term.k))
-    with np.errstate(over="ignore"):
-        return float(np.max(row / scene.m))
 
 
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
