@@ -18,7 +18,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import engines, exact, inspection, scenes, session, store
+from springcheck import cli, engines, exact, inspection, report, scenes, session, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.figures import trajectories
@@ -313,3 +313,32 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(
         save(figure, tmp_path, "picture")
     assert png.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"picture.png", "picture.svg"}
+
+
+def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points(
+    tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str]
+) -> None:
+    need("sundials:bdf")
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    labels = [engines.parse(name) for name in ("own:semi-implicit-euler", "sundials:bdf")]
+    fresh = precision.record(scene, labels, path, budget=1.5)
+    kept = precision.stored(path, scene)
+    assert kept.points == fresh.points
+    assert kept.methods == fresh.methods
+    assert kept.methods[0].order == pytest.approx(1, abs=0.01)
+    assert (kept.front, kept.cheapest) == (fresh.front, fresh.cheapest)
+    assert kept.document() == fresh.document()
+    for study in (fresh, kept):
+        cli._show(report.precision_report(study, points=True))
+    text = capsys.readouterr().out
+    assert text[: len(text) // 2] == text[len(text) // 2 :]
+    assert main(["inspect", str(path)]) == 0
+    assert "floor expected near" in capsys.readouterr().out
+
+
+def test_a_study_of_precision_that_lacks_a_table_is_refused(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    with store.open_new(path, "precision") as journal:
+        journal.commit(scene, documents={"precision": '{"methods": [{"method": "own:euler"}]}'})
+    with pytest.raises(StoreError, match="lacks 'precision/own:euler'"):
+        precision.stored(path, scene)

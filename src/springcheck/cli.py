@@ -437,7 +437,7 @@ def _plot(options: argparse.Namespace) -> int:
     studies = inspection.studied(path, summary)
     written: list[Path] = []
     if studies.precision is not None:
-        written += precision.draw(studies.precision, folder)
+        written += precision.draw(studies.precision.document(), folder)
     if studies.stability is not None:
         written += stability.draw(studies.stability, folder)
     if studies.extremes is not None:

@@ -16,6 +16,7 @@ from springcheck.errors import SpringcheckError, StoreError
 from springcheck.model import Comparison, Scene, Trajectory, Verdict
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.extremes import Atlas
+from springcheck.studies.outcome import PrecisionStudy
 from springcheck.studies.stability import Stability
 
 T = TypeVar("T")
@@ -48,8 +49,7 @@ class Found:
 class Studies:
     """The studies in a store; None for what it has not."""
 
-    precision: dict[str, Any] | None
-    """The document of a study of precision."""
+    precision: PrecisionStudy | None
     stability: Stability | None
     extremes: Atlas | None
 
@@ -120,7 +120,7 @@ def studied(path: Path, summary: store.Summary) -> Studies:
 
     try:
         return Studies(
-            precision=json.loads(store.document(path, precision.DOCUMENT))
+            precision=precision.stored(path, session.stored_scene(path))
             if kept(precision.DOCUMENT)
             else None,
             stability=stability.stored(path, session.stored_scene(path))
@@ -170,7 +170,7 @@ def lines(found: Found, *, verdicts: bool = False) -> report.Lines:
         ]
         out.append(_comparison(found.comparison))
     if found.studies.precision is not None:
-        out += [report.plain(), *report.precision_document(found.studies.precision)]
+        out += [report.plain(), *report.precision_report(found.studies.precision)]
     if found.studies.stability is not None:
         out += [report.plain(), *report.stability_report(found.studies.stability)]
     if found.studies.extremes is not None:
@@ -261,7 +261,7 @@ def document(found: Found) -> dict[str, Any]:
         "studies": {
             name: one
             for name, one in (
-                (precision.DOCUMENT, found.studies.precision),
+                (precision.DOCUMENT, _of(PrecisionStudy.document, found.studies.precision)),
                 (stability.DOCUMENT, _of(stability.document, found.studies.stability)),
                 (extremes.DOCUMENT, _of(extremes.document, found.studies.extremes)),
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.table import Table
@@ -355,43 +355,6 @@ def precision_report(study: PrecisionStudy, *, points: bool = False) -> Lines:
     if study.interrupted:
         out.append(plain("Interrupted: every point that was finished is here.", "bold red"))
     return out
-
-
-def precision_document(study: Mapping[str, Any]) -> Lines:
-    """What a stored study of precision says (`PrecisionStudy.document`)."""
-    table, cheapest = grid(), grid()
-    for name in ("method", "points", "order", "floor", "step", "start"):
-        table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
-    for m in study["methods"]:
-        complete = [p for p in study["points"] if p["method"] == m["method"] and p["max_error"] is not None]
-        table.add_row(
-            plain(m["method"]),
-            str(len(complete)),
-            "-" if m["order"] is None else f"{m['order']:.4f}({m['order_standard_error']:.0e})",
-            "-" if m["floor"] is None else f"{m['floor']:.1e}",
-            *("-" if m[x] is None else seconds(m[x]) for x in ("seconds_per_step", "start_seconds")),
-        )
-    for name in ("error", "method", "run", "force calls"):
-        cheapest.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
-    for answer in study["cheapest"]:
-        if answer["method"] is None:
-            cheapest.add_row(f"{answer['error']:.0e}", plain("none reaches it"), "", "")
-        else:
-            cheapest.add_row(
-                f"{answer['error']:.0e}",
-                plain(answer["method"]),
-                seconds(answer["run_seconds"]),
-                str(answer["force_calls"]),
-            )
-    return [
-        plain(f"{study['scene']}: error against run time", "bold"),
-        plain(f"  on {study['machine']['processor']}"),
-        plain(),
-        table,
-        plain(),
-        plain("The cheapest way to an error (largest, of the start):"),
-        cheapest,
-    ]
 
 
 def duration(value: float) -> str:

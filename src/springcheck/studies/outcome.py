@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -131,7 +131,7 @@ def _method(method: MethodSummary) -> dict[str, Any]:
         "order_points": method.order_points,
         "floor": method.floor,
         "floor_steps": method.floor_steps,
-        "floor_condition": {"name": how.name, "eps": how.eps, "why": how.why} if how else None,
+        "floor_condition": asdict(how) if how else None,
         "floor_expected": (
             {"steps": method.expected_floor[0], "error": method.expected_floor[1]}
             if method.expected_floor

@@ -17,10 +17,12 @@ from dataclasses import dataclass, field, replace
 from math import ceil
 from pathlib import Path
 from time import get_clock_info, perf_counter
+from typing import Any
 
 import numpy as np
 
-from springcheck import mechanics, simulate, store
+from springcheck import engines, mechanics, simulate, store
+from springcheck.errors import StoreError
 from springcheck.model import Label, Scene, Stopped
 from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
@@ -115,8 +117,17 @@ def study(
     why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
     for sweep in _open(sweeps):
         sweep.points.append(blank(sweep, CUT_OFF, why))
-    found = _put_together(scene, sweeps, known, budget, perf_counter() - began, interrupted)
-    return replace(found, taken_up=taken_up)
+    return _put_together(
+        scene,
+        [point for sweep in sweeps for point in sweep.points],
+        [_summary(scene, x.label, x.points, x.condition, x.first_start) for x in sweeps],
+        budget=budget,
+        seconds=perf_counter() - began,
+        interrupted=interrupted,
+        machine=origin([sweep.label for sweep in sweeps]),
+        tick=tick(),
+        taken_up=taken_up,
+    )
 
 
 def _take_up(sweep: Sweep, pieces: Pieces) -> float:
@@ -288,43 +299,76 @@ def _time(clocks: list[_Clock]) -> None:
                 clock.turn(number)
 
 
+def stored(path: str | Path, scene: Scene) -> PrecisionStudy:
+    """The study that `record` has kept, of this scene.  StoreError where the file holds none."""
+    known = json.loads(store.document(path, DOCUMENT))
+    tables = store.read_tables(path)
+    points: list[Point] = []
+    methods = []
+    try:
+        for one in known["methods"]:
+            own, _ = to_points(tables[table_name(one["method"])])
+            how = one["floor_condition"]
+            condition = fits.Condition(**how) if how else None
+            points += own
+            methods.append(
+                _summary(scene, engines.parse(one["method"]), own, condition, one["first_start_seconds"])
+            )
+        return _put_together(
+            scene,
+            points,
+            methods,
+            budget=known["budget_seconds"],
+            seconds=known["seconds"],
+            interrupted=known["interrupted"],
+            machine=known["machine"],
+            tick=known["clock_seconds"],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path}: its study of precision lacks {error}; measure it anew") from error
+
+
 def _put_together(
-    scene: Scene, sweeps: list[Sweep], known: Truth, budget: float, seconds: float, interrupted: bool
+    scene: Scene, points: Sequence[Point], methods: Sequence[MethodSummary], **rest: Any
 ) -> PrecisionStudy:
-    points = tuple(point for sweep in sweeps for point in sweep.points)
+    """The study, with what follows from its points."""
     timed = [point for point in points if point.complete and point.run_repeats]
     return PrecisionStudy(
         scene=scene,
-        budget=budget,
-        seconds=seconds,
-        interrupted=interrupted,
-        points=points,
-        methods=tuple(_summary(sweep, known) for sweep in sweeps),
+        points=tuple(points),
+        methods=tuple(methods),
         front=tuple(fits.front(timed)),
         cheapest=tuple(Answer(target=target, point=fits.cheapest(timed, target)) for target in TARGETS),
-        machine=origin([sweep.label for sweep in sweeps]),
-        tick=tick(),
+        **rest,
     )
 
 
-def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
-    points = sweep.complete
+def _summary(
+    scene: Scene,
+    label: Label,
+    points: Sequence[Point],
+    condition: fits.Condition | None,
+    first_start: float | None,
+) -> MethodSummary:
+    """What the points of a method come to."""
+    points = [point for point in points if point.complete]
     timed = [point for point in points if point.run_repeats]
-    fit = None if sweep.method.adaptive else fits.order(points)
+    adaptive = engines.method(label).adaptive
+    fit = None if adaptive else fits.order(points)
     # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
-    best = fits.turned([point.error for point in points], by=2 if sweep.method.adaptive else 1)
+    best = fits.turned([point.error for point in points], by=2 if adaptive else 1)
     expected = None
-    if best is None and fit and sweep.condition:
-        expected = fits.expected_floor(points, fit, sweep.condition, known.duration)
+    if best is None and fit and condition:
+        expected = fits.expected_floor(points, fit, condition, scene.step * scene.steps)
     return MethodSummary(
-        method=str(sweep.label),
+        method=str(label),
         order=fit.order if fit else None,
         order_standard_error=fit.standard_error if fit else None,
         order_points=fit.points if fit else 0,
         constant=fit.constant if fit else None,
         floor=points[best].error if best is not None else None,
         floor_steps=points[best].steps if best is not None else None,
-        condition=sweep.condition,
+        condition=condition,
         expected_floor=expected,
         # what a call costs beside its steps only adds to a short run, so that the minimum is the step's own
         seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
@@ -333,5 +377,5 @@ def _summary(sweep: Sweep, known: Truth) -> MethodSummary:
             (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None
         ),
         start_seconds=min((min(p.start_repeats) for p in timed if p.start_repeats), default=None),
-        first_start_seconds=sweep.first_start,
+        first_start_seconds=first_start,
     )
