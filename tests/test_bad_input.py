@@ -198,6 +198,14 @@ def test_an_exported_trajectory_is_not_called_damaged(capsys: pytest.CaptureFixt
     assert main(["identify", "out.h5md"]) == 0
 
 
+def test_a_file_where_the_journal_goes_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("mine.h5.parts").write_text("mine")
+    refused(
+        capsys, ["run", "spring", "-o", "mine.h5"], "cannot write mine.h5", "mine.h5.parts", "move it away"
+    )
+    assert Path("mine.h5.parts").read_text() == "mine"
+
+
 def test_figures_are_not_drawn_into_a_file(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine.toml").write_text(SPRING)
     assert main(["run", "mine.toml", "--method", "own:euler", "--quiet"]) == 0

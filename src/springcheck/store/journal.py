@@ -54,6 +54,8 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         # a slip of the hand with --force would cost the scene
         raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")
     parts = parts_folder(path)
+    if parts.exists() and not parts.is_dir():
+        raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
     if path.exists() and not force and not parts.is_dir():
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     with files.told(folder, "write into"):
