@@ -11,7 +11,7 @@ import pytest
 
 import springcheck
 from springcheck.cli import main
-from springcheck.scenes import folder
+from springcheck.physics.scenefile import folder
 
 SPRING = (folder() / "spring.toml").read_text()
 

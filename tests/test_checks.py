@@ -10,11 +10,15 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, mechanics, scenes, schemes
+from springcheck import checks, schemes
 from springcheck.checks import recorded
+from springcheck.engines.contract import Arithmetic
 from springcheck.faults import clean, steppers
-from springcheck.model import Arithmetic, Scene, Trajectory, Verdict
-from springcheck.terms import Spring, WallSpring
+from springcheck.physics import mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
+from springcheck.trajectory import Trajectory, Verdict
 
 Need = Callable[[str], None]
 

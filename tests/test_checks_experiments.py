@@ -9,11 +9,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from springcheck import checks, mechanics, scenes, schemes, simulate
+from springcheck import checks, schemes, simulate
 from springcheck.checks import experiments, laws
 from springcheck.errors import MethodError
 from springcheck.faults import clean, steppers
-from springcheck.model import Scene, Trajectory
+from springcheck.physics import mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

@@ -12,13 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import checks, compare, mechanics, scenes, schemes, session
+from springcheck import checks, compare, schemes, session
+from springcheck.arrays import Floats
 from springcheck.checks import experiments, laws, recorded, verdicts
+from springcheck.engines.contract import Arithmetic
 from springcheck.faults import clean, steppers
-from springcheck.model import Arithmetic, Floats, Scene, Trajectory, Verdict
+from springcheck.physics import mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
 from springcheck.studies import accuracy, fits
 from springcheck.studies.points import Point
-from springcheck.terms import Morse, Quartic, Spring, WallSpring
+from springcheck.trajectory import Trajectory, Verdict
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
 NAN = float("nan")

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, report, scenes, session, store
+from springcheck import cli, report, session, store
 from springcheck.cli import main
+from springcheck.physics import scenefile as scenes
 
 OWN = ["--method", "own:*"]
 

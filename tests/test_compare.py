@@ -9,7 +9,7 @@ import pytest
 
 import springcheck
 from springcheck import compare
-from springcheck.model import Scene
+from springcheck.physics.scene import Scene
 
 LABELS = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:leapfrog", "openmm:verlet")
 

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, engines, exact, mechanics, scenes, simulate
+from springcheck import checks, engines, simulate
 from springcheck.errors import MethodError
-from springcheck.model import Scene, Trajectory
-from springcheck.terms import Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
+from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

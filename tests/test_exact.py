@@ -6,9 +6,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from springcheck import exact, mechanics, scenes
-from springcheck.model import Scene, Term
-from springcheck.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
 
 
 def spring(m: float, k: float, q: float, p: float, h: float) -> Scene:

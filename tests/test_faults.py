@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 
 import springcheck
-from springcheck import checks, scenes, simulate
+from springcheck import checks, simulate
 from springcheck.faults import FAULTS, Fault, Result, examine, trial
 from springcheck.faults.seeded import stiffer
+from springcheck.physics import scenefile as scenes
 
 Need = Callable[[str], None]
 

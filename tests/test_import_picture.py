@@ -15,7 +15,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "errors", "model", "terms", "mechanics", "exact", "schemes", "scenes", "store", "engines", "provenance",
+    "errors", "arrays", "physics", "schemes", "engines", "trajectory", "store", "provenance",
     "simulate", "checks", "compare", "identify", "faults", "studies", "figures", "session", "report",
     "inspection", "catalogue", "cli", "__main__",
 ]  # fmt: skip
@@ -28,7 +28,7 @@ HOMES = {
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
     "rich": ("report.py", "inspection.py", "cli.py"),
-    "msgspec": ("scenes",),
+    "msgspec": ("physics/scenefile",),
 }
 
 

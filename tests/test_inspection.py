@@ -18,11 +18,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import cli, engines, exact, inspection, report, scenes, session, store
+from springcheck import cli, engines, inspection, report, session, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.figures import trajectories
 from springcheck.figures.style import save
+from springcheck.physics import exact
+from springcheck.physics import scenefile as scenes
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.stability import limits
 

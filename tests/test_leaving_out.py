@@ -13,11 +13,13 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import scenes, session, simulate
+from springcheck import session, simulate
+from springcheck.arrays import Reals
 from springcheck.engines.own import kernels
 from springcheck.engines.own import simulation as own
-from springcheck.model import Reals, Scene
-from springcheck.terms import Damping, Spring
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Spring
 
 Need = Callable[[str], None]
 

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Floats
 from springcheck.engines import parse
 from springcheck.engines.own import ENGINE, kernels, simulation
 from springcheck.errors import MethodError
-from springcheck.model import Floats, Scene, Term
-from springcheck.terms import Quartic, Spring, WallSpring
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Quartic, Spring, WallSpring
 
 METHODS = tuple(ENGINE.methods)
 LAYOUTS = {"one": kernels.ONE, "many": kernels.MANY, "joined": kernels.JOINED, "chain": kernels.CHAIN}
@@ -293,8 +295,8 @@ PROGRAM = """
 import sys
 import numpy as np
 from springcheck.engines.own import kernels, simulation
-from springcheck.terms import WallSpring
-from springcheck.model import Scene
+from springcheck.physics.terms import WallSpring
+from springcheck.physics.scene import Scene
 wall = WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.0]))
 scene = Scene(name="spring", title="", source="", m=np.array([3.7]), q=np.array([0.3]),
               p=np.array([0.7]), terms=(wall,), step=0.1, steps=int(sys.argv[1]))

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import engines, exact, scenes, simulate, store
+from springcheck import engines, simulate, store
 from springcheck.errors import SceneError, StoreError
 from springcheck.figures import precision as figure
-from springcheck.model import Scene
+from springcheck.physics import exact
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
 from springcheck.studies import accuracy, fits, precision, sweeps
 from springcheck.studies.accuracy import Accuracy

@@ -17,13 +17,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import catalogue, checks, engines, exact, mechanics, scenes, session, simulate
+from springcheck import catalogue, checks, engines, session, simulate
+from springcheck.arrays import Floats
 from springcheck.cli import main
 from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
-from springcheck.exact import linear
-from springcheck.model import Floats, Scene, Trajectory
-from springcheck.terms import Cosine, Morse, Quartic, Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.exact import linear
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring
+from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

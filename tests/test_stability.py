@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import engines, scenes, schemes
+from springcheck import engines, schemes
+from springcheck.arrays import Extended
 from springcheck.figures import stability as figures
-from springcheck.model import Extended
+from springcheck.physics import scenefile as scenes
 from springcheck.studies import stability
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
 from springcheck.studies.stability.propagators import Springs

@@ -16,10 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import checks, engines, exact, mechanics, scenes, schemes, simulate
+from springcheck import checks, engines, schemes, simulate
+from springcheck.arrays import Extended
 from springcheck.errors import MethodError, SceneError
-from springcheck.model import Extended, Scene
-from springcheck.terms import Spring
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "stiff"
 ROWS = [

@@ -16,9 +16,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from springcheck import store
+from springcheck.engines.contract import Arithmetic
 from springcheck.errors import StoreError
-from springcheck.model import Arithmetic, Comparison, Outcome, Scene, Timing, Trajectory, Verdict
+from springcheck.physics.scene import Scene
 from springcheck.store import draft, reading
+from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
 
 LABELS = ["own:euler", "openmm:verlet@OpenCL-mixed", "sundials:adams"]
 

@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 from h5grove.content import get_content_from_file
 
-from springcheck import engines, scenes, simulate, store
-from springcheck.model import Comparison
+from springcheck import engines, simulate, store
+from springcheck.physics import scenefile as scenes
 from springcheck.studies.stability import keeping, regions
+from springcheck.trajectory import Comparison
 from test_store import LABELS, scene, trajectory, written
 
 OPTIONS: dict[str, Any] = {"swmr": True, "locking": False}

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, engines, provenance, scenes, session, store
+from springcheck import cli, engines, provenance, session, store
+from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
-from springcheck.model import Label
+from springcheck.physics import scenefile as scenes
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.outcome import of_points, to_points
 from springcheck.studies.stability import limits

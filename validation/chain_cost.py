@@ -24,9 +24,10 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
-from springcheck import engines, scenes
+from springcheck import engines
 from springcheck.figures.style import MARKERS, look, save, style
-from springcheck.model import Scene
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 LABELS = {

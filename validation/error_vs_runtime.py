@@ -45,8 +45,9 @@ from pathlib import Path
 from rich.console import Console
 
 from arguments import arguments
-from springcheck import engines, report, scenes, session
+from springcheck import engines, report, session
 from springcheck.figures import precision as figure
+from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
 from springcheck.studies import precision
 from springcheck.studies.outcome import PrecisionStudy

@@ -29,10 +29,10 @@ from collections import Counter
 import numpy as np
 
 from arguments import arguments
+from springcheck.arrays import Floats, Reals
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.search import aliases
-from springcheck.model import Floats, Reals
 from springcheck.schemes import SCHEMES, step
 
 FRAMES = 101

@@ -45,9 +45,10 @@ from time import perf_counter
 import numpy as np
 
 from arguments import arguments
+from springcheck.arrays import Floats
 from springcheck.engines.own import simulation
-from springcheck.model import Floats, Scene, Term
-from springcheck.terms import Spring, WallSpring
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Spring, WallSpring
 
 METHODS = ("euler", "semi-implicit-euler", "implicit-euler")
 REPEATS = 7
@@ -277,8 +278,8 @@ import sys
 from time import perf_counter
 import numpy as np
 from springcheck.engines.own import simulation
-from springcheck.terms import WallSpring
-from springcheck.model import Scene
+from springcheck.physics.terms import WallSpring
+from springcheck.physics.scene import Scene
 spring = WallSpring(i=np.array([0]), k=np.array([1.0]), at=np.array([0.0]))
 scene = Scene(name="spring", title="", source="", m=np.array([1.0]), q=np.array([0.0]),
               p=np.array([1.0]), terms=(spring,), step=0.1, steps=200)

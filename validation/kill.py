@@ -38,7 +38,7 @@ import numpy as np
 from arguments import arguments
 from springcheck import cli, store
 from springcheck.errors import StoreError
-from springcheck.model import Scene
+from springcheck.physics.scene import Scene
 from springcheck.store import adopt, reading
 from springcheck.studies import outcome, precision
 

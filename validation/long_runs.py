@@ -38,8 +38,10 @@ import h5py
 import numpy as np
 
 from arguments import arguments
-from springcheck import engines, scenes, simulate, store
-from springcheck.model import Floats, Scene
+from springcheck import engines, simulate, store
+from springcheck.arrays import Floats
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 
 PIECE = 1 << 16
 

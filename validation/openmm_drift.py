@@ -22,10 +22,11 @@ from matplotlib.figure import Figure
 
 from arguments import arguments
 from springcheck import run
+from springcheck.arrays import Floats
 from springcheck.checks import laws
 from springcheck.figures import style
-from springcheck.model import Floats, Scene
-from springcheck.terms import WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
 
 STEPS = 300_000
 FRAMES = 300

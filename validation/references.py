@@ -218,7 +218,8 @@ def _text(values: list[Any]) -> list[str]:
 
 def error(name: str, found: dict[str, Any]) -> float:
     """Largest difference of springcheck's true motion, relative to the largest q and p of the scene."""
-    from springcheck import exact, scenes
+    from springcheck.physics import exact
+    from springcheck.physics import scenefile as scenes
 
     scene = scenes.load_scene(name)
     steps = np.array([row["steps"] for row in found["motion"]])

@@ -24,9 +24,10 @@ from pathlib import Path
 import numpy as np
 
 from arguments import arguments
-from springcheck import compare, load_scene, mechanics, run
+from springcheck import compare, load_scene, run
 from springcheck.checks import judge
 from springcheck.figures import trajectories
+from springcheck.physics import mechanics
 
 METHODS = [
     "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:euler", "openmm:leapfrog",

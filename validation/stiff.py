@@ -17,8 +17,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from arguments import arguments
-from springcheck import scenes
 from springcheck.figures import stability as figures
+from springcheck.physics import scenefile as scenes
 from springcheck.studies import stability
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")

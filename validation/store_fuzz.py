@@ -32,7 +32,7 @@ import numpy as np
 from arguments import arguments
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.model import Scene
+from springcheck.physics.scene import Scene
 from springcheck.store import seal, trust
 
 LABEL = "own:euler"

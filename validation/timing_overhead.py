@@ -38,7 +38,8 @@ from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
 from arguments import arguments
-from springcheck import engines, scenes, simulate
+from springcheck import engines, simulate
+from springcheck.physics import scenefile as scenes
 
 M, K, Q, P = 3.7, 2.9, 0.3, 0.7
 WITHIN = 0.05

@@ -7,7 +7,7 @@
 ((201,), (201, 1), (201, 1))
 
 `load_scene` reads a scene, `run` moves it by one method, `read` opens a store, `judge` gives verdicts.
-What they return is described in `springcheck.model`.  Each is imported when it is first used.
+What they return is described in `springcheck.trajectory`.  Each is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from springcheck.checks import judge
-    from springcheck.scenes import load_scene
+    from springcheck.physics.scenefile import load_scene
     from springcheck.session import read
     from springcheck.simulate import run
 
 __all__ = ["judge", "load_scene", "read", "run"]
 
-_HOMES = {"judge": "checks", "load_scene": "scenes", "read": "session", "run": "simulate"}
+_HOMES = {"judge": "checks", "load_scene": "physics.scenefile", "read": "session", "run": "simulate"}
 
 
 def __getattr__(name: str) -> Any:

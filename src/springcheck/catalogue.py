@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from springcheck import checks, engines, scenes, schemes
+from springcheck import checks, engines, schemes
+from springcheck.physics import scenefile as scenes
 
 
 def catalogue() -> dict[str, Any]:

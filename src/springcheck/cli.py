@@ -218,7 +218,8 @@ def _document(data: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from springcheck import scenes, session
+    from springcheck import session
+    from springcheck.physics import scenefile as scenes
 
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
@@ -278,7 +279,8 @@ def _faults(options: argparse.Namespace) -> int:
 
 
 def _precision(options: argparse.Namespace) -> int:
-    from springcheck import report, scenes, session
+    from springcheck import report, session
+    from springcheck.physics import scenefile as scenes
     from springcheck.studies import precision
 
     budget = precision.BUDGET if options.budget is None else options.budget
@@ -302,7 +304,8 @@ def _precision(options: argparse.Namespace) -> int:
 
 
 def _stability(options: argparse.Namespace) -> int:
-    from springcheck import report, scenes
+    from springcheck import report
+    from springcheck.physics import scenefile as scenes
     from springcheck.session import LeftOut
     from springcheck.studies import stability
 

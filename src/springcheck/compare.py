@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import checks, exact, mechanics
-from springcheck.model import Comparison, Extended, Floats, Scene, Trajectory
+from springcheck import checks
+from springcheck.arrays import Extended, Floats
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Comparison, Trajectory
 
 EXACT = "exact"
 """The label of the true motion among the others."""

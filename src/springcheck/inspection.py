@@ -13,11 +13,12 @@ from rich.table import Table
 
 from springcheck import report, session, store
 from springcheck.errors import SpringcheckError, StoreError
-from springcheck.model import Comparison, Scene, Trajectory, Verdict
+from springcheck.physics.scene import Scene
 from springcheck.studies import extremes, precision, stability
 from springcheck.studies.extremes import Atlas
 from springcheck.studies.outcome import PrecisionStudy
 from springcheck.studies.stability import Stability
+from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 T = TypeVar("T")
 

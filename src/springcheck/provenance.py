@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from springcheck import engines, store
-from springcheck.model import Label
+from springcheck.engines.contract import Label
 
 
 def origin(labels: Iterable[Label]) -> dict[str, str]:

@@ -10,9 +10,9 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from springcheck.model import Verdict
 from springcheck.schemes import SCHEMES
 from springcheck.session import LeftOut, Repeat, Report, Run
+from springcheck.trajectory import Verdict
 
 if TYPE_CHECKING:
     from springcheck.faults import FaultReport

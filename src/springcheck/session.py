@@ -13,10 +13,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import checks, compare, engines, exact, mechanics, scenes, simulate, store
+from springcheck import checks, compare, engines, simulate, store
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, StoreError
-from springcheck.model import Comparison, Floats, Label, Scene, Timing, Trajectory, Verdict
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 from springcheck.provenance import command
+from springcheck.trajectory import Comparison, Timing, Trajectory, Verdict
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""

@@ -13,19 +13,13 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from springcheck import engines, mechanics
+from springcheck import engines
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Arithmetic, Label, Simulation, Stopped
 from springcheck.errors import MethodError, SceneError
-from springcheck.model import (
-    Arithmetic,
-    Floats,
-    Label,
-    Outcome,
-    Scene,
-    Simulation,
-    Stopped,
-    Timing,
-    Trajectory,
-)
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Outcome, Timing, Trajectory
 
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""

@@ -48,7 +48,8 @@ from springcheck.checks.recorded import (
     tolerance_bound,
 )
 from springcheck.errors import MethodError
-from springcheck.model import Scene, Trajectory, Verdict
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Trajectory, Verdict
 
 __all__ = [
     "CHECKS",

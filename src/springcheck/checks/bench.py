@@ -9,10 +9,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Floats
 from springcheck.checks import verdicts
 from springcheck.checks.case import Case
-from springcheck.model import Floats, Scene, Term, Trajectory, Verdict
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene, Term
+from springcheck.trajectory import Trajectory, Verdict
 
 Run: TypeAlias = Callable[[Scene, str], Trajectory]
 """(scene, label) -> trajectory.  May raise MethodError: the experiment does not apply then."""

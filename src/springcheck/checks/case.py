@@ -9,21 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats, Force, Integers, Reals
 from springcheck.checks import verdicts
-from springcheck.model import (
-    Arithmetic,
-    Extended,
-    Floats,
-    Force,
-    Integers,
-    Reals,
-    Scene,
-    Term,
-    Trajectory,
-    Verdict,
-)
-from springcheck.terms import particles
+from springcheck.engines.contract import Arithmetic
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import particles
+from springcheck.trajectory import Trajectory, Verdict
 
 SMALLEST = np.longdouble(5e-324)
 """What an operation can lose to underflow: one unit of a subnormal double."""

@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck import mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.recorded import fastest
-from springcheck.model import Extended, Floats, Scene, Verdict
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Verdict
 
 
 def _no_matrix(bench: Bench) -> str | None:

@@ -13,12 +13,15 @@ from functools import cache
 
 import numpy as np
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
 from springcheck.checks.experiments import symmetric
-from springcheck.model import Extended, Floats, Scene, Trajectory, Verdict
-from springcheck.terms import Quartic, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic, WallSpring
+from springcheck.trajectory import Trajectory, Verdict
 
 HALVINGS = 6
 T_THREE = 12.92

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats, Reals
 from springcheck.checks.case import REPEATED, Case, overflows
-from springcheck.model import Arithmetic, Extended, Floats, Reals, Verdict
-from springcheck.terms import particles
+from springcheck.engines.contract import Arithmetic
+from springcheck.physics import exact, mechanics
+from springcheck.physics.terms import particles
+from springcheck.trajectory import Verdict
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has

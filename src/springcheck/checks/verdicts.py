@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.model import Verdict
+from springcheck.trajectory import Verdict
 
 
 def within(method: str, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:

@@ -23,8 +23,9 @@ from fnmatch import fnmatchcase
 from functools import cache
 from typing import Protocol, cast
 
+from springcheck.engines.contract import Arithmetic, Label, Method, Simulation
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Label, Method, Scene, Simulation
+from springcheck.physics.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck import mechanics
-from springcheck.model import Floats, Scene, Term
-from springcheck.terms import Spring, WallSpring
+from springcheck.arrays import Floats
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Spring, WallSpring
 
 
 def scene(

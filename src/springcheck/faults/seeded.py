@@ -11,10 +11,14 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Floats, Reals
+from springcheck.engines.contract import Arithmetic
 from springcheck.faults.steppers import State, Step, energies, record, textbook, trajectory
-from springcheck.model import Arithmetic, Floats, Reals, Scene, Trajectory
-from springcheck.terms import Quartic, Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.trajectory import Trajectory
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
 Where: TypeAlias = Literal["spring", "chain", "long spring"]

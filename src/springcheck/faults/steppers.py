@@ -10,8 +10,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck import mechanics, schemes
-from springcheck.model import Arithmetic, Floats, Force, Outcome, Scene, Timing, Trajectory
+from springcheck import schemes
+from springcheck.arrays import Floats, Force
+from springcheck.engines.contract import Arithmetic
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Outcome, Timing, Trajectory
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]

@@ -17,8 +17,9 @@ from springcheck.errors import MethodError
 from springcheck.faults import clean, steppers
 from springcheck.faults.seeded import Fault, Where
 from springcheck.faults.table import FAULTS
-from springcheck.model import Scene, Trajectory
-from springcheck.terms import Spring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring
+from springcheck.trajectory import Trajectory
 
 
 @cache

@@ -11,10 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springcheck import exact, mechanics
+from springcheck.arrays import Floats, Reals
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.model import Floats, Reals, Scene, Trajectory
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
+from springcheck.trajectory import Trajectory
 
 UNITS = {
     "reduced": ("", "", "", ""),

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from springcheck.arrays import Extended, Floats
 from springcheck.identify import coarse
 from springcheck.identify.fit import Map
 from springcheck.identify.match import Match, frame
 from springcheck.identify.record import Record
-from springcheck.model import Extended, Floats
 from springcheck.schemes import SCHEMES, roundings
 
 REBUILT = 1 / 32, 1.0

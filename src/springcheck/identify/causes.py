@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck.arrays import Floats
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.match import Terms
 from springcheck.identify.search import Joint, search
-from springcheck.model import Floats
 
 SHOWN = 4
 """Schemes that a note names of those that would fit at a scale of their own."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from springcheck.arrays import Extended, Floats, Reals
 from springcheck.identify.fit import Map
 from springcheck.identify.match import Match, power, unit_matrix
 from springcheck.identify.record import Record
-from springcheck.model import Extended, Floats, Reals
 from springcheck.schemes import SCHEMES, magnitude_step, roundings
 
 QUANTUM = 2.0**-32

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from springcheck import scenes, store
+from springcheck import store
+from springcheck.arrays import Floats, Integers
 from springcheck.errors import StoreError
 from springcheck.identify.report import identify
 from springcheck.identify.result import Identification
-from springcheck.model import Floats, Integers
+from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
 
 MOST_FRAMES = 20_000

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from springcheck.arrays import Extended, Floats
 from springcheck.identify.orbit import orbit, repeats
 from springcheck.identify.record import Record
-from springcheck.model import Extended, Floats
 
 ROUNDING = 2.0**-53
 

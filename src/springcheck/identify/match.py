@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtri
 
+from springcheck.arrays import Extended, Floats
 from springcheck.identify.fit import ROUNDING, Map
-from springcheck.model import Extended, Floats
 from springcheck.schemes import SCHEMES, Scheme, matrix, rotation, roundings
 
 CHANCE = 1e-7

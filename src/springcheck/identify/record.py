@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from springcheck.arrays import Extended, Floats
 from springcheck.errors import IdentificationError
-from springcheck.model import Extended, Floats
 
 FEWEST = 5
 """Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""

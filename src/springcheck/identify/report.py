@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.causes import causes
@@ -30,7 +31,6 @@ from springcheck.identify.search import (
     separation,
     visible,
 )
-from springcheck.model import Floats
 
 T = TypeVar("T")
 

@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
+from springcheck.arrays import Floats
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.match import ONE_STEP, OWN_FRICTION, STRIDES, Match, Terms, match, unit_matrix
 from springcheck.identify.record import Record
-from springcheck.model import Floats
 from springcheck.schemes import SCHEMES, roundings
 
 BIAS = 3.0

@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify.report import identify
 from springcheck.identify.result import Identification
-from springcheck.model import Floats
 from springcheck.schemes import SCHEMES
 
 Stepper: TypeAlias = Callable[..., Any]

@@ -18,7 +18,8 @@ from types import TracebackType
 
 import numpy as np
 
-from springcheck.model import Floats, Scene
+from springcheck.arrays import Floats
+from springcheck.physics.scene import Scene
 from springcheck.store import files, layout, seal
 from springcheck.store.layout import Column, Scalar
 

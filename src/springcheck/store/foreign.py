@@ -10,8 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from springcheck.arrays import Floats
 from springcheck.errors import StoreError
-from springcheck.model import Floats
 from springcheck.store import files, trust
 
 EXPANSION = 1100

@@ -20,12 +20,13 @@ from urllib.parse import quote
 import h5py
 
 from springcheck.errors import StoreError
-from springcheck.model import Comparison, Scene, Trajectory, Verdict
+from springcheck.physics.scene import Scene
 from springcheck.store import adopt, files, layout, merge, reading, tables
 from springcheck.store.draft import Draft
 from springcheck.store.layout import Scalar
 from springcheck.store.reading import Parts, parts_folder
 from springcheck.store.tables import Table
+from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 COLLECTION = "collection.new"
 

@@ -31,7 +31,7 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.model import Scene
+from springcheck.physics.scene import Scene
 from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool

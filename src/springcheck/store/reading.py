@@ -14,11 +14,13 @@ from urllib.parse import unquote
 import h5py
 import numpy as np
 
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Arithmetic
 from springcheck.errors import StoreError
-from springcheck.model import Arithmetic, Comparison, Floats, Outcome, Timing, Trajectory, Verdict
 from springcheck.store import files, layout, tables, trust
 from springcheck.store.layout import Scalar
 from springcheck.store.tables import Table
+from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
 
 MAPPED = 1 << 26
 """Arrays larger than this [B] are mapped into memory, not read: their pages come when they are used."""

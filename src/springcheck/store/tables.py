@@ -11,8 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from springcheck.model import Comparison, Verdict
 from springcheck.store.layout import RESERVED, Scalar, write_attributes
+from springcheck.trajectory import Comparison, Verdict
 
 _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""

@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from springcheck import exact, mechanics, schemes
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats, Integers, Reals
 from springcheck.checks.recorded import CONTRACTED
 from springcheck.errors import SceneError
-from springcheck.model import Extended, Floats, Integers, Reals, Scene
-from springcheck.terms import Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
 
 CARRIES = 1e-3
 """Modes whose amplitude is at least this part of the largest have a phase worth naming: in a mode that

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from springcheck.model import Arithmetic, Method
+from springcheck.engines.contract import Arithmetic, Method
 from springcheck.schemes import SCHEMES
 from springcheck.studies.points import Point
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.model import Floats, Scene
+from springcheck.arrays import Floats
+from springcheck.physics.scene import Scene
 from springcheck.store import Table
 from springcheck.studies.accuracy import Accuracy
 from springcheck.studies.fits import Condition

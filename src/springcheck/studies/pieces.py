@@ -7,7 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from springcheck import store
-from springcheck.model import Label
+from springcheck.engines.contract import Label
 
 T = TypeVar("T")
 

@@ -21,9 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import engines, mechanics, simulate, store
+from springcheck import engines, simulate, store
+from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import StoreError
-from springcheck.model import Label, Scene, Stopped
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
 from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits

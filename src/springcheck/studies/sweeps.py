@@ -10,8 +10,9 @@ from time import perf_counter
 import numpy as np
 
 from springcheck import engines, simulate
+from springcheck.engines.contract import Arithmetic, Label, Method, Stopped
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Label, Method, Scene, Stopped
+from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
 from springcheck.studies import fits
 from springcheck.studies.accuracy import FRAMES, Truth

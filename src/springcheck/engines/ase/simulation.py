@@ -17,8 +17,10 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
-from springcheck import mechanics
-from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Term
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Arithmetic, Label, Method, Simulation
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene, Term
 
 NANOMETRE = 10.0 * ase.units.Ang
 PICOSECOND = 1000.0 * ase.units.fs

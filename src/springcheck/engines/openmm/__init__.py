@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from springcheck.engines import Engine
-from springcheck.model import Method
+from springcheck.engines.contract import Method
 
 _TERMS = frozenset({"wall-spring", "spring", "quartic", "cosine", "morse"})
 

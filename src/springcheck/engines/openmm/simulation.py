@@ -26,12 +26,14 @@ from typing import Any
 import numpy as np
 import openmm as mm
 
-from springcheck import mechanics
+from springcheck.arrays import Floats, Force
 from springcheck.engines import quiet
+from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Floats, Force, Label, Method, Scene, Simulation, Stopped
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Morse, Spring, WallSpring
 from springcheck.schemes import SCHEMES
-from springcheck.terms import Damping, Morse, Spring, WallSpring
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision

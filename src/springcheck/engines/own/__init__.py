@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from springcheck.engines import Engine
-from springcheck.model import Method
+from springcheck.engines.contract import Method
 
 _KINDS = frozenset({"particles", "circuit", "rotor"})
 _LINEAR = frozenset({"wall-spring", "spring", "damping"})

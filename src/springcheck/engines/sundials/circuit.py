@@ -14,8 +14,9 @@ from collections.abc import Callable
 import numpy as np
 from sksundae.ida import IDA
 
-from springcheck import mechanics
-from springcheck.model import Floats, Scene
+from springcheck.arrays import Floats
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
 
 
 def solver(scene: Scene, atol: Floats, most_steps: int, called: Callable[[float], None]) -> IDA:

@@ -14,10 +14,12 @@ import numpy as np
 import sksundae
 from sksundae.cvode import CVODE
 
-from springcheck import mechanics
+from springcheck.arrays import Floats
 from springcheck.engines import quiet
+from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
-from springcheck.model import Arithmetic, Floats, Label, Method, Scene, Simulation, Stopped
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
 

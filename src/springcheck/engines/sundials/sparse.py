@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 
-from springcheck import mechanics
-from springcheck.model import Floats, Reals, Scene
-from springcheck.terms import particles
+from springcheck.arrays import Floats, Reals
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import particles
 
 LARGE = 32
 """Particles above which the sparse solver is taken; below, the dense one is faster."""

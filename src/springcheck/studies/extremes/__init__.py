@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, store
+from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, StoreError
-from springcheck.model import Label
 from springcheck.provenance import command
 from springcheck.studies.extremes import grid, keeping, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.model import Label, Scene, Term
+from springcheck.engines.contract import Label
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Damping, WallSpring
 from springcheck.studies.stability.propagators import MASS, STEP
-from springcheck.terms import Damping, WallSpring
 
 STEPS = 20
 """Of the cells that are judged step by step."""

@@ -14,10 +14,13 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from springcheck import checks, engines, model, schemes
+from springcheck import checks, engines, schemes, trajectory
+from springcheck.arrays import Extended, Floats
 from springcheck.checks.case import overflows
-from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Trajectory
+from springcheck.engines.contract import Arithmetic, Label
+from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
+from springcheck.trajectory import Timing, Trajectory
 
 Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"
@@ -226,8 +229,8 @@ def as_trajectory(label: Label, scene: Scene, q: Floats, p: Floats, how: Arithme
         p=p,
         step=scene.step,
         every=scene.every,
-        outcome=model.Outcome(status="complete", step=scene.steps),
-        timing=model.Timing(start=0.0, run=0.0),
+        outcome=trajectory.Outcome(status="complete", step=scene.steps),
+        timing=Timing(start=0.0, run=0.0),
         force_calls=0,
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,

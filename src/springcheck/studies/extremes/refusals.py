@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from springcheck import engines, scenes, simulate
+from springcheck import engines, simulate
 from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile as scenes
 from springcheck.studies.extremes.judging import Cell
 
 _SPRING = """

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, engines, exact, simulate
+from springcheck import checks, engines, simulate
 from springcheck.checks import recorded
 from springcheck.checks.case import overflows
-from springcheck.model import Label, Scene, Stopped
+from springcheck.engines.contract import Label, Stopped
+from springcheck.physics import exact
+from springcheck.physics.scene import Scene
 from springcheck.studies.extremes import grid, judging
 from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.extremes.judging import Cell, Outcome

@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import engines, mechanics, store
+from springcheck import engines, store
+from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, StoreError
-from springcheck.model import Label, Scene
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
 from springcheck.provenance import command
 from springcheck.studies.pieces import Pieces, Progress
 from springcheck.studies.stability import costs, keeping, limits, propagators, regions, resonance

@@ -13,9 +13,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import engines, exact, mechanics, scenes, schemes, simulate
+from springcheck import engines, schemes, simulate
+from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
-from springcheck.model import Label, Scene, Stopped
+from springcheck.physics import exact, mechanics
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 
 Family = Literal["two-scales", "overdamped"]
 

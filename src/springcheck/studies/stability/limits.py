@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import engines, schemes, simulate
-from springcheck.model import Extended, Floats, Label, Trajectory
+from springcheck.arrays import Extended, Floats
+from springcheck.engines.contract import Label
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
+from springcheck.trajectory import Trajectory
 
 FIRST, LAST, COARSE = 1e-9, 1e6, 4096
 """The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import engines, schemes, simulate
+from springcheck.arrays import Extended, Floats
+from springcheck.engines.contract import Arithmetic, Label
 from springcheck.errors import MethodError
-from springcheck.model import Arithmetic, Extended, Floats, Label, Scene, Term
-from springcheck.terms import Damping, WallSpring
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Damping, WallSpring
 
 FORCE = 1024.0
 """Largest force on a scanned spring, in the scene's unit of force."""

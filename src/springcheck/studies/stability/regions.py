@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import engines
-from springcheck.model import Floats, Label
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Label
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
 

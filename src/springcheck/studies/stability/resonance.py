@@ -13,10 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import engines, exact, mechanics, schemes, simulate
+from springcheck import engines, schemes, simulate
+from springcheck.arrays import Extended, Floats, Reals
+from springcheck.engines.contract import Label
 from springcheck.errors import SceneError
-from springcheck.model import Extended, Floats, Label, Reals, Scene, Term
-from springcheck.terms import Spring, WallSpring
+from springcheck.physics import exact, mechanics
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import Spring, WallSpring
 
 TURN = (1.0, 7.0)
 """h w of the fast spring, from and to."""

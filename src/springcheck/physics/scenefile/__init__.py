@@ -1,4 +1,4 @@
-"""Scene files: TOML in, `model.Scene` out, and every mistake answered with file, field and remedy."""
+"""Scene files: TOML in, `Scene` out, and every mistake answered with file, field and remedy."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 import msgspec
 
 from springcheck.errors import SceneError
-from springcheck.model import Scene
-from springcheck.scenes import building, tables
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import building, tables
 
 
 def folder() -> Path:
     """Where the shipped scenes lie: inside the installed package, or in a checkout's data folder."""
-    packaged = Path(__file__).parents[1] / "data" / "scenes"
-    return packaged if packaged.is_dir() else Path(__file__).parents[3] / "data" / "scenes"
+    packaged = Path(__file__).parents[2] / "data" / "scenes"
+    return packaged if packaged.is_dir() else Path(__file__).parents[4] / "data" / "scenes"
 
 
 def names() -> tuple[str, ...]:

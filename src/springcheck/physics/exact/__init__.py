@@ -15,11 +15,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from springcheck import mechanics
-from springcheck.exact import linear, wells
-from springcheck.exact.elliptic import EPS
-from springcheck.exact.linear import Modes, modes
-from springcheck.model import Extended, Integers, Scene
+from springcheck.arrays import Extended, Integers
+from springcheck.physics import mechanics
+from springcheck.physics.exact import linear, wells
+from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.exact.linear import Modes, modes
+from springcheck.physics.scene import Scene
 
 __all__ = ["EPS", "Modes", "has_true_motion", "modes", "true_motion"]
 

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, TypeAlias, cast, get_args
 
 import msgspec
 
-from springcheck import terms
-from springcheck.model import Kind, Units
+from springcheck.physics import terms
+from springcheck.physics.scene import Kind, Units
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=1)]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.model import Extended
+from springcheck.arrays import Extended
 
 EPS = float(np.finfo(np.longdouble).eps)
 """Of the extended precision used for every reference: 1.1e-19 on x86-64.  Where `long double` is no

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.model import Extended, Floats, Force, Integers, Reals, Scene, Term
-from springcheck.terms import LINEAR, Damping, Spring, WallSpring, apart, gather, particles, scatter
+from springcheck.arrays import Extended, Floats, Force, Integers, Reals
+from springcheck.physics.scene import Scene, Term
+from springcheck.physics.terms import LINEAR, Damping, Spring, WallSpring, apart, gather, particles, scatter
 
 
 def acting(scene: Scene) -> dict[str, NDArray[np.bool_]]:

@@ -13,10 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from springcheck import mechanics
-from springcheck.exact.elliptic import EPS
-from springcheck.model import Extended, Integers, Reals, Scene
-from springcheck.terms import Spring, WallSpring
+from springcheck.arrays import Extended, Integers, Reals
+from springcheck.physics import mechanics
+from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.exact.elliptic import argument, jacobi
-from springcheck.model import Extended, Scene
-from springcheck.terms import Cosine, Morse, Quartic, WallSpring, particles
+from springcheck.arrays import Extended
+from springcheck.physics.exact.elliptic import argument, jacobi
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Morse, Quartic, WallSpring, particles
 
 States = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))

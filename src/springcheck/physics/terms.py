@@ -13,7 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from springcheck.model import Floats, Integers, Reals, Term
+from springcheck.arrays import Floats, Integers, Reals
+from springcheck.physics.scene import Term
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""From the tables of a scene file to a `model.Scene`."""
+"""From the tables of a scene file to a `Scene`."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.model import Floats, Kind, Scene, Term, Units
-from springcheck.scenes import tables
-from springcheck.terms import Damping, Spring, WallSpring
+from springcheck.arrays import Floats
+from springcheck.physics.scene import Kind, Scene, Term, Units
+from springcheck.physics.scenefile import tables
+from springcheck.physics.terms import Damping, Spring, WallSpring
 
 
 class MistakeError(ValueError):

@@ -1,0 +1,230 @@
+"""One-step matrices of linear scenes: what they are, their powers, and what they keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.physics import mechanics
+from springcheck.physics.scene import Scene
+from springcheck.schemes.catalogue import Scheme
+from springcheck.schemes.stepping import step
+
+
+def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
+    """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
+
+    Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
+    from fast takes each spring for a fast one; the exact flow is the exponential.
+    """
+    m, k, friction = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    if scheme.flow:
+        return _exponential(m, k, friction, h)
+
+    def force(q: Reals, p: Reals) -> Reals:
+        return np.asarray(-k * q - friction * (p / m))
+
+    def none(q: Reals, p: Reals) -> Reals:
+        return np.zeros_like(q)
+
+    out = np.empty((len(m), 2, 2), dtype=np.longdouble)
+    ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
+    q, p = step(
+        scheme,
+        np.stack([ones, zeros]),
+        np.stack([zeros, ones]),
+        h=h,
+        m=m,
+        force=force,
+        stiffness=k,
+        rate=friction / m if np.any(friction) else None,
+        parts=(none, force),
+    )
+    out[:, 0, :], out[:, 1, :] = q.T, p.T
+    return out
+
+
+def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
+    """The exact flow (n, 2, 2), of any damping: of exp(h L) with L = N - g I, N**2 is a multiple of I."""
+    eye = np.eye(2, dtype=np.longdouble)
+    t = np.longdouble(h)
+    generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
+    generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
+    g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
+    traceless = generator + g[:, None, None] * eye
+    w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
+    w = np.sqrt(np.abs(w2))
+    safe = np.where(w == 0, 1, w)
+    even = np.where(w2 >= 0, np.cos(w * t), np.cosh(np.where(w2 < 0, w, 0) * t))
+    odd = np.where(w2 >= 0, np.sin(w * t), np.sinh(np.where(w2 < 0, w, 0) * t)) / safe
+    odd = np.where(w == 0, t, odd)
+    decay = np.exp(-g * t)
+    return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
+
+
+def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
+    """One-step matrix (2n, 2n) on (q - q*, p - p*) of a linear scene, q* and p* a state that stays.
+
+    Found by stepping the unit vectors and taking off what the state 0 becomes; it serves scenes whose
+    modes a scheme mixes.
+    """
+    n = scene.n
+    z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
+    slow, fast = mechanics.split(scene.terms)
+    q, p = step(
+        scheme,
+        z[:, :n],
+        z[:, n:],
+        h=h,
+        m=scene.m.astype(np.longdouble),
+        force=mechanics.force(scene.terms),
+        stiffness=mechanics.stiffness(scene, scene.q) if scheme.implicit else None,
+        rate=mechanics.rates(scene),
+        parts=(mechanics.force(slow), mechanics.force(fast)),
+    )
+    after = np.concatenate([q, p], axis=1)
+    return np.asarray((after[1:] - after[0]).T, np.longdouble)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rotation:
+    """The powers of one-step matrices of determinant d: M**j = d**(j/2) (C I + S (M/sqrt(d) - cos(angle) I)).
+
+    With `angle` the phase of one step, C = cos(j angle) and S = sin(j angle)/sin(angle); hyperbolic where
+    the motion is unbounded (`growth` > 0 then, and `sign` the sign of the eigenvalues), linear between.
+    """
+
+    determinant: Extended
+    angle: Extended
+    growth: Extended
+    sign: Extended
+
+
+def rotation(matrices: Extended) -> Rotation:
+    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2).
+
+    Where the determinant is not positive a step turns area over and has neither.
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1]
+    c, d = matrices[:, 1, 0], matrices[:, 1, 1]
+    determinant = a * d - b * c
+    # -discriminant/4 = det sin(angle)**2; b*c is -(h w)**2 to leading order, so nothing cancels
+    minus = -((a - d) ** 2 / 4 + b * c)
+    half_trace = (a + d) / 2
+    root = np.sqrt(np.abs(minus))
+    turning = minus > 0
+    angle = np.where(turning, np.arctan2(root, half_trace), 0)
+    # where area is turned over (determinant <= 0) there is no such growth
+    hyperbolic = (minus < 0) & (determinant > 0)
+    growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
+    return Rotation(
+        determinant=determinant,
+        angle=angle,
+        growth=growth,
+        sign=np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1)),
+    )
+
+
+def invariant(matrices: Extended, *, h: float) -> Extended:
+    """Coefficients (n, 3) of the quadratic form s_qq q**2 + s_qp q p + s_pp p**2 that a step multiplies
+    by the determinant of its matrix: the shadow energy, equal to H up to order h [M L2/T2].
+
+    For every 2 x 2 matrix, M21 q**2 + (M22 - M11) q p - M12 p**2 has that property; -1/2h scales it to H.
+    """
+    out = np.stack([matrices[:, 1, 0], matrices[:, 1, 1] - matrices[:, 0, 0], -matrices[:, 0, 1]], axis=-1)
+    return np.asarray(out / np.longdouble(-2 * np.longdouble(h)))
+
+
+def propagate(
+    matrices: Extended, y: Extended, v: Extended, steps: Integers, *, area_preserving: bool
+) -> tuple[Extended, Extended]:
+    """Closed form of the discrete motion: M**j (y, v) of n modes for j in steps (f,) -> (f, n), twice.
+
+    M**j = d**(j/2) (C + S (M/sqrt(d) - c)) with d the determinant, c = cos(angle), C = cos(j angle) and
+    S = sin(j angle)/sin(angle); hyperbolic where the eigenvalues are real, j at the edge between.
+    """
+    turn = rotation(matrices)
+    j = np.asarray(steps).astype(np.longdouble)[:, None]
+    d = np.ones_like(turn.determinant) if area_preserving else turn.determinant
+    if np.any(d <= 0):
+        raise ValueError("a step that turns area over has no phase")
+    sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
+    x, g = turn.angle, turn.growth
+    one = np.ones_like(x)
+    with np.errstate(over="ignore", invalid="ignore"):
+        turning, growing = x != 0, g != 0
+        near = np.where(turning, np.cos(x), np.where(growing, turn.sign * np.cosh(g), turn.sign * one))
+        even = np.where(turning, np.cos(j * x), np.where(growing, sign * np.cosh(j * g), sign))
+        sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))
+        odd = np.where(
+            turning,
+            np.sin(j * x) / sine,
+            np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
+        )
+        root = np.sqrt(d)
+        # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
+        less = matrices - np.eye(2, dtype=np.longdouble)
+        a, c = less[:, 0, 0], less[:, 1, 1]
+        beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
+        size = np.exp(j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond)))
+        a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
+        c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
+        return (
+            np.asarray(size * (even * y + odd * (a * y + b * v))),
+            np.asarray(size * (even * v + odd * (c * y + e * v))),
+        )
+
+
+def condition(matrices: Extended, w: Extended) -> Extended:
+    """How far the invariant ellipses of one-step matrices (n, 2, 2) are from circles: the ratio of their
+    axes in energy coordinates (w y, v), w (n,) > 0.  No power of a map is larger than that, whatever its
+    determinant makes of it; infinite where the motion does not turn.
+    """
+    a, b = matrices[:, 0, 0], matrices[:, 0, 1] * w
+    c, d = matrices[:, 1, 0] / w, matrices[:, 1, 1]
+    half = np.abs(c - b) / 2
+    area = -((a - d) ** 2 / 4 + b * c)
+    turning = area > 0
+    spread = np.sqrt(np.maximum(half**2 - area, 0))
+    return np.asarray(np.where(turning, (half + spread) / np.sqrt(np.where(turning, area, 1)), np.inf))
+
+
+def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
+    """How much j steps can enlarge one rounding a step: (sum over i < j of |M**i| / r**i, r**j).
+
+    r >= 1 is the spectral radius.  Norms are taken in energy coordinates (w y, v), w (n,) > 0, and the
+    worst mode counts; (f,) each.  At the edge of stability |M**i| grows with i, and the sum with j**2.
+    """
+    turn = rotation(matrices)
+    half = (matrices[:, 0, 0] + matrices[:, 1, 1]) / 2
+    split = np.sqrt(np.maximum(half * half - turn.determinant, 0))
+    larger = half + np.where(half < 0, -split, split)
+    # where area turns over or vanishes the eigenvalues are real and of unlike sign: powers are bounded by
+    # the larger one, x**i (1 + 2 |M - x| / |x - y|), instead of by the root of the determinant
+    over = turn.determinant <= 0
+    root = np.where(over, np.abs(larger), np.sqrt(np.abs(turn.determinant)))
+    root = np.where(root > 0, root, 1)
+    growth = np.where(over, 0, turn.growth)
+    near = np.where(turn.angle != 0, np.cos(turn.angle), turn.sign * np.cosh(growth))
+    near = np.where(over, larger / root, near)
+    rest = np.stack(
+        [
+            np.stack([matrices[:, 0, 0] / root - near, w * matrices[:, 0, 1] / root], axis=-1),
+            np.stack([matrices[:, 1, 0] / w / root, matrices[:, 1, 1] / root - near], axis=-1),
+        ],
+        axis=-2,
+    )
+    size = np.sqrt(np.sum(rest * rest, axis=(-2, -1)))
+    sine = np.where(turn.angle != 0, np.sin(turn.angle), 2 * np.sinh(growth))
+    sine = np.where(over, split / root, sine)
+    longest = np.where(sine > 0, 1 / np.where(sine > 0, sine, 1), np.inf)
+    radius = np.maximum(root * np.exp(growth), 1)
+    j = np.asarray(steps).astype(np.longdouble)[:, None]
+    short = np.minimum(j, longest)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
+        total = np.max(np.minimum(j + size * np.maximum(ramp, 0), j * condition(matrices, w)), axis=-1)
+        grown = np.max(radius**j, axis=-1)
+    return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)

@@ -1,0 +1,122 @@
+"""One step of any scheme, in the width of the numbers it is given."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats, Force, Reals
+from springcheck.schemes.catalogue import Scheme, number
+
+
+def weighted_sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
+    """start plus the sum of c x; a coefficient of 0 adds nothing, whatever x is."""
+    for c, x in terms:
+        if c:
+            start = start + c * x
+    return start
+
+
+def step(
+    scheme: Scheme,
+    q: Reals,
+    p: Reals,
+    *,
+    h: Any,
+    m: Reals,
+    force: Force,
+    stiffness: Reals | None = None,
+    rate: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
+) -> tuple[Reals, Reals]:
+    """One step from (q, p), each (..., n), in the width of q.
+
+    Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
+    particle is joined to another; double precision is enough, because it only steers an iteration whose
+    residual has the full width.  `rate` is `mechanics.rates`, left out where nothing is damped; `parts`
+    are the forces of the slow and the fast springs, for the schemes that part them.
+    """
+    width = q.dtype.type
+    h, m = width(h), m.astype(width)
+    if scheme.stages:
+        for kind, c in scheme.stages:
+            ch = number(c, width) * h
+            if kind == "drift":
+                q = q + ch * (p / m)
+            elif kind == "friction":
+                p = p if rate is None else p * np.exp(-ch * rate.astype(width))
+            else:
+                p = p + ch * acting(kind, force, parts)(q, p)
+        return q, p
+    if not scheme.b:
+        raise ValueError(f"{scheme.name} has no step that a force alone defines")
+    forces: list[Reals] = []
+    velocities: list[Reals] = []
+    for row in scheme.a:
+        past = [number(c, width) * h for c in row[: len(forces)]]
+        qs = weighted_sum(list(zip(past, velocities, strict=True)), q)
+        ps = weighted_sum(list(zip(past, forces, strict=True)), p)
+        own = row[len(forces)]
+        if own:
+            if stiffness is None:
+                raise ValueError(f"{scheme.name} needs the stiffness of the scene")
+            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate)
+        forces.append(force(qs, ps))
+        velocities.append(ps / m)
+    weights = [number(c, width) * h for c in scheme.b]
+    return (
+        weighted_sum(list(zip(weights, velocities, strict=True)), q),
+        weighted_sum(list(zip(weights, forces, strict=True)), p),
+    )
+
+
+def acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:
+    """The force behind a stage."""
+    if kind == "kick":
+        return force
+    if kind == "pull":
+        return lambda q, p: force(q, np.zeros_like(p))
+    if parts is None:
+        raise ValueError("this scheme needs the slow and the fast force apart")
+    return parts[kind == "fast"]
+
+
+@lru_cache(maxsize=2)
+def _inverse(matrix: bytes, n: int) -> Floats:
+    """The inverse of a matrix (n, n), found once for all steps of a run."""
+    return np.asarray(np.linalg.inv(np.frombuffer(matrix).reshape(n, n)))
+
+
+def _implicit_stage(
+    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals, rate: Reals | None
+) -> tuple[Reals, Reals]:
+    """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
+
+    Friction is linear in P: P (1 + x rate) = p + x F(Q, 0), so it needs no iteration of its own.
+    """
+    none = np.zeros_like(p)
+    slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
+    factor = x * x / (m * slowed)
+    diagonal = stiffness.ndim == 1
+    if diagonal:
+        matrix = 1 + np.asarray(stiffness, q.dtype) * factor
+    else:
+        matrix = np.eye(len(m)) + np.asarray(stiffness, np.float64) * factor.astype(np.float64)[:, None]
+        # it only steers: what counts is the residual
+        inverse = _inverse(np.ascontiguousarray(matrix).tobytes(), len(m)).T
+    guess, last = q, np.inf
+    for _ in range(50):
+        residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
+        change = residual / matrix if diagonal else residual.astype(np.float64) @ inverse
+        guess = guess - change
+        eps = np.finfo(q.dtype).eps
+        if not np.any(np.abs(change) > eps * np.abs(guess)):
+            break
+        # a component near 0 never gets there; where all are at their last digits nothing shrinks any more
+        size = np.max(np.abs(change))
+        if last / 2 <= size <= 1e3 * eps * np.max(np.abs(guess)):
+            break
+        last = size
+    return guess, np.asarray((p + x * force(guess, none)) / slowed)
