@@ -13,11 +13,11 @@ import springcheck
 from springcheck import checks, schemes
 from springcheck.checks import recorded
 from springcheck.engines.contract import Arithmetic
-from springcheck.faults import clean, steppers
 from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory, Verdict
 
 Need = Callable[[str], None]

@@ -12,10 +12,10 @@ import pytest
 from springcheck import checks, schemes, simulate
 from springcheck.checks import experiments, laws
 from springcheck.errors import MethodError
-from springcheck.faults import clean, steppers
 from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
+from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]

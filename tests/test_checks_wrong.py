@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import checks, compare, schemes, session
+from springcheck import checks, compare, schemes
 from springcheck.arrays import Floats
 from springcheck.checks import experiments, laws, recorded, verdicts
 from springcheck.engines.contract import Arithmetic
-from springcheck.faults import clean, steppers
 from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
-from springcheck.studies import accuracy, fits
-from springcheck.studies.points import Point
+from springcheck.studies.faults import clean, steppers
+from springcheck.studies.precision import accuracy, fits
+from springcheck.studies.precision.points import Point
+from springcheck.studies.run import measure as session
 from springcheck.trajectory import Trajectory, Verdict
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, report, session, store
+from springcheck import cli, store
 from springcheck.cli import main
 from springcheck.physics import scenefile as scenes
+from springcheck.studies import text as report
+from springcheck.studies.run import measure as session
 
 OWN = ["--method", "own:*"]
 

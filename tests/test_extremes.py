@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from springcheck import engines, store
-from springcheck.figures import extremes as figures
-from springcheck.studies import extremes
+from springcheck.studies.extremes import figure as figures
 from springcheck.studies.extremes import grid, judging, keeping, refusals, running
+from springcheck.studies.extremes import measure as extremes
 
 Need = Callable[[str], None]
 METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]

@@ -13,9 +13,11 @@ import pytest
 
 import springcheck
 from springcheck import checks, simulate
-from springcheck.faults import FAULTS, Fault, Result, examine, trial
-from springcheck.faults.seeded import stiffer
 from springcheck.physics import scenefile as scenes
+from springcheck.studies.faults import measure as trial
+from springcheck.studies.faults.measure import Result, examine
+from springcheck.studies.faults.seeded import Fault, stiffer
+from springcheck.studies.faults.table import FAULTS
 
 Need = Callable[[str], None]
 

@@ -16,18 +16,20 @@ HOME = Path(springcheck.__file__).parent
 
 ROWS = [
     "errors", "arrays", "physics", "schemes", "engines", "trajectory", "store", "provenance",
-    "simulate", "checks", "compare", "identify", "faults", "studies", "figures", "session", "report",
-    "inspection", "catalogue", "cli", "__main__",
+    "simulate", "checks", "compare", "identify", "figures", "studies", "inspection", "catalogue", "cli",
+    "__main__",
 ]  # fmt: skip
+
+STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
 
 HOMES = {
     "h5py": ("store",),
-    "matplotlib": ("figures",),
+    "matplotlib": ("figures", *(f"studies/{name}/figure.py" for name in STUDIES)),
     "openmm": ("engines/openmm/simulation.py",),
     "ase": ("engines/ase/simulation.py",),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
-    "rich": ("report.py", "inspection.py", "cli.py"),
+    "rich": ("studies/text.py", "inspection.py", "cli.py"),
     "msgspec": ("physics/scenefile",),
 }
 

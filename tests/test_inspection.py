@@ -18,15 +18,19 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import cli, engines, inspection, report, session, store
+from springcheck import cli, engines, inspection, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
-from springcheck.figures import trajectories
 from springcheck.figures.style import save
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import extremes, precision, stability
+from springcheck.studies import text as report
+from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.run import figure as trajectories
+from springcheck.studies.run import measure as session
 from springcheck.studies.stability import limits
+from springcheck.studies.stability import measure as stability
 
 Need = Callable[[str], None]
 

@@ -13,13 +13,14 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import session, simulate
+from springcheck import simulate
 from springcheck.arrays import Reals
 from springcheck.engines.own import kernels
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring
+from springcheck.studies.run import measure as session
 
 Need = Callable[[str], None]
 
@@ -167,7 +168,7 @@ def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: 
 
 
 def test_what_was_left_out_is_said_in_one_line_for_each_reason() -> None:
-    from springcheck import report
+    from springcheck.studies import text as report
 
     _, left = session.choose(scenes.load_scene("lc-circuit"), ())
     lines = [str(line) for line in report.left_out(left) if str(line)]

@@ -12,14 +12,14 @@ import pytest
 
 from springcheck import engines, simulate, store
 from springcheck.errors import SceneError, StoreError
-from springcheck.figures import precision as figure
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
-from springcheck.studies import accuracy, fits, precision, sweeps
-from springcheck.studies.accuracy import Accuracy
-from springcheck.studies.points import Point
+from springcheck.studies.precision import accuracy, figure, fits, sweeps
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision.accuracy import Accuracy
+from springcheck.studies.precision.points import Point
 
 FIXED = [str(label) for label in engines.match(("*",)) if not engines.method(label).adaptive]
 SINGLE = [name for name in scenes.names() if name in ("spring", "spring-uneven", "anharmonic")]

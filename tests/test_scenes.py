@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import catalogue, checks, engines, session, simulate
+from springcheck import catalogue, checks, engines, simulate
 from springcheck.arrays import Floats
 from springcheck.cli import main
 from springcheck.engines.own import simulation as own
@@ -27,6 +27,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.exact import linear
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring
+from springcheck.studies.run import measure as session
 from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]

@@ -16,10 +16,10 @@ import pytest
 
 from springcheck import engines, schemes
 from springcheck.arrays import Extended
-from springcheck.figures import stability as figures
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import stability
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
+from springcheck.studies.stability import figure as figures
+from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.propagators import Springs
 
 LABELS = [str(label) for label in propagators.one_step_labels(engines.match(("*",)))]

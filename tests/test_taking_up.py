@@ -15,13 +15,16 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, engines, provenance, session, store
+from springcheck import cli, engines, provenance, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import extremes, precision, stability
-from springcheck.studies.outcome import of_points, to_points
+from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision.result import of_points, to_points
+from springcheck.studies.run import measure as session
 from springcheck.studies.stability import limits
+from springcheck.studies.stability import measure as stability
 
 OWN = ["own:euler", "own:implicit-euler", "own:semi-implicit-euler"]
 

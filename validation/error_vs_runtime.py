@@ -45,12 +45,14 @@ from pathlib import Path
 from rich.console import Console
 
 from arguments import arguments
-from springcheck import engines, report, session
-from springcheck.figures import precision as figure
+from springcheck import engines
 from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
-from springcheck.studies import precision
-from springcheck.studies.outcome import PrecisionStudy
+from springcheck.studies import text as report
+from springcheck.studies.precision import figure
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision.result import PrecisionStudy
+from springcheck.studies.run import measure as session
 
 SCENES = ("spring", "spring-uneven", "anharmonic")
 

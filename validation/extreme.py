@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 from arguments import arguments
-from springcheck.figures import extremes as figures
-from springcheck.studies import extremes
+from springcheck.studies.extremes import figure as figures
+from springcheck.studies.extremes import measure as extremes
 
 
 def main() -> int:

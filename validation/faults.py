@@ -19,7 +19,7 @@ import sys
 
 from arguments import arguments
 from springcheck import engines, simulate
-from springcheck.faults import ENGINES, FaultReport, study
+from springcheck.studies.faults.measure import ENGINES, FaultReport, study
 
 
 def table(found: FaultReport) -> list[str]:

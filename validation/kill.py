@@ -40,7 +40,8 @@ from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.store import adopt, reading
-from springcheck.studies import outcome, precision
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision import result as outcome
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "checkpoint", "collection")

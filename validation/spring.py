@@ -26,8 +26,8 @@ import numpy as np
 from arguments import arguments
 from springcheck import compare, load_scene, run
 from springcheck.checks import judge
-from springcheck.figures import trajectories
 from springcheck.physics import mechanics
+from springcheck.studies.run import figure as trajectories
 
 METHODS = [
     "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:euler", "openmm:leapfrog",

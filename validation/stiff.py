@@ -17,9 +17,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from arguments import arguments
-from springcheck.figures import stability as figures
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import stability
+from springcheck.studies.stability import figure as figures
+from springcheck.studies.stability import measure as stability
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
 

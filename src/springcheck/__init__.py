@@ -17,12 +17,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from springcheck.checks import judge
     from springcheck.physics.scenefile import load_scene
-    from springcheck.session import read
     from springcheck.simulate import run
+    from springcheck.studies.run.measure import read
 
 __all__ = ["judge", "load_scene", "read", "run"]
 
-_HOMES = {"judge": "checks", "load_scene": "physics.scenefile", "read": "session", "run": "simulate"}
+_HOMES = {
+    "judge": "checks",
+    "load_scene": "physics.scenefile",
+    "read": "studies.run.measure",
+    "run": "simulate",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -218,8 +218,8 @@ def _document(data: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from springcheck import session
     from springcheck.physics import scenefile as scenes
+    from springcheck.studies.run import measure as session
 
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
@@ -241,7 +241,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.json:
         _document(session.document(found))
     elif not options.quiet:
-        from springcheck import report
+        from springcheck.studies import text as report
 
         lines: list[RenderableType] = list(report.run_report(found))
         if options.verdicts:
@@ -251,7 +251,8 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _repeat(options: argparse.Namespace) -> int:
-    from springcheck import report, session
+    from springcheck.studies import text as report
+    from springcheck.studies.run import measure as session
 
     with _progress(options) as started:
         found = session.repeat(Path(options.source), methods=options.method, started=started)
@@ -263,8 +264,9 @@ def _repeat(options: argparse.Namespace) -> int:
 
 
 def _faults(options: argparse.Namespace) -> int:
-    from springcheck import engines, report, simulate
-    from springcheck.faults import ENGINES, study
+    from springcheck import engines, simulate
+    from springcheck.studies import text as report
+    from springcheck.studies.faults.measure import ENGINES, study
 
     labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
     with _progress(options) as started:
@@ -279,9 +281,10 @@ def _faults(options: argparse.Namespace) -> int:
 
 
 def _precision(options: argparse.Namespace) -> int:
-    from springcheck import report, session
     from springcheck.physics import scenefile as scenes
-    from springcheck.studies import precision
+    from springcheck.studies import text as report
+    from springcheck.studies.precision import measure as precision
+    from springcheck.studies.run import measure as session
 
     budget = precision.BUDGET if options.budget is None else options.budget
     if not (math.isfinite(budget) and budget > 0):
@@ -304,10 +307,10 @@ def _precision(options: argparse.Namespace) -> int:
 
 
 def _stability(options: argparse.Namespace) -> int:
-    from springcheck import report
     from springcheck.physics import scenefile as scenes
-    from springcheck.session import LeftOut
-    from springcheck.studies import stability
+    from springcheck.studies import text as report
+    from springcheck.studies.run.measure import LeftOut
+    from springcheck.studies.stability import measure as stability
 
     scene = scenes.load_scene(options.scene)
     path = Path(options.output or f"{scene.name}-stability.h5")
@@ -325,9 +328,9 @@ def _stability(options: argparse.Namespace) -> int:
 
 
 def _extremes(options: argparse.Namespace) -> int:
-    from springcheck import report
-    from springcheck.session import LeftOut
-    from springcheck.studies import extremes
+    from springcheck.studies import text as report
+    from springcheck.studies.extremes import measure as extremes
+    from springcheck.studies.run.measure import LeftOut
 
     path = Path(options.output or "extremes.h5")
     with _progress(options) as started:
@@ -405,8 +408,9 @@ def _inspect(options: argparse.Namespace) -> int:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from springcheck import identify, report
+    from springcheck import identify
     from springcheck.identify import files
+    from springcheck.studies import text as report
 
     if (options.file is None) == (options.stepper is None):
         raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
@@ -433,7 +437,10 @@ def _identify(options: argparse.Namespace) -> int:
 
 def _plot(options: argparse.Namespace) -> int:
     from springcheck import inspection, store
-    from springcheck.figures import extremes, precision, stability, trajectories
+    from springcheck.studies.extremes import figure as extremes
+    from springcheck.studies.precision import figure as precision
+    from springcheck.studies.run import figure as trajectories
+    from springcheck.studies.stability import figure as stability
 
     path, folder = Path(options.file), Path(options.output)
     summary = store.summary(path)

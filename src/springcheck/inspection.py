@@ -11,13 +11,17 @@ from typing import Any, TypeVar
 import numpy as np
 from rich.table import Table
 
-from springcheck import report, session, store
+from springcheck import store
 from springcheck.errors import SpringcheckError, StoreError
 from springcheck.physics.scene import Scene
-from springcheck.studies import extremes, precision, stability
-from springcheck.studies.extremes import Atlas
-from springcheck.studies.outcome import PrecisionStudy
-from springcheck.studies.stability import Stability
+from springcheck.studies import text as report
+from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.extremes.measure import Atlas
+from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision.result import PrecisionStudy
+from springcheck.studies.run import measure as session
+from springcheck.studies.stability import measure as stability
+from springcheck.studies.stability.measure import Stability
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 T = TypeVar("T")

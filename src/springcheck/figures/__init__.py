@@ -1,1 +1,1 @@
-"""Figures: the only package that imports matplotlib."""
+"""What all figures share.  Each study draws its own (`figure.py` beside its measure)."""

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.faults import seeded
-from springcheck.faults.seeded import Fault
 from springcheck.physics import mechanics
+from springcheck.studies.faults import seeded
+from springcheck.studies.faults.seeded import Fault
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")

@@ -14,11 +14,11 @@ import numpy as np
 from springcheck import checks, schemes
 from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
-from springcheck.faults import clean, steppers
-from springcheck.faults.seeded import Fault, Where
-from springcheck.faults.table import FAULTS
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
+from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults.seeded import Fault, Where
+from springcheck.studies.faults.table import FAULTS
 from springcheck.trajectory import Trajectory
 
 

@@ -28,9 +28,11 @@ from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
-from springcheck.studies import fits
-from springcheck.studies.accuracy import Errors, Truth, truth
-from springcheck.studies.outcome import (
+from springcheck.studies.pieces import Pieces, Progress
+from springcheck.studies.precision import fits
+from springcheck.studies.precision.accuracy import Errors, Truth, truth
+from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.result import (
     Answer,
     MethodSummary,
     PrecisionStudy,
@@ -38,9 +40,7 @@ from springcheck.studies.outcome import (
     table_name,
     to_points,
 )
-from springcheck.studies.pieces import Pieces, Progress
-from springcheck.studies.points import Point
-from springcheck.studies.sweeps import (
+from springcheck.studies.precision.sweeps import (
     PLANNED,
     Sweep,
     affordable,

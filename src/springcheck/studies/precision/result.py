@@ -11,9 +11,9 @@ import numpy as np
 from springcheck.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.store import Table
-from springcheck.studies.accuracy import Accuracy
-from springcheck.studies.fits import Condition
-from springcheck.studies.points import Point
+from springcheck.studies.precision.accuracy import Accuracy
+from springcheck.studies.precision.fits import Condition
+from springcheck.studies.precision.points import Point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,10 +14,10 @@ import numpy as np
 from springcheck import schemes
 from springcheck.arrays import Floats, Reals
 from springcheck.engines.contract import Arithmetic
-from springcheck.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.physics import exact, mechanics
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.trajectory import Trajectory
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]

@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.engines.contract import Arithmetic, Method
 from springcheck.schemes import SCHEMES
-from springcheck.studies.points import Point
+from springcheck.studies.precision.points import Point
 
 ASYMPTOTIC = 2e-2
 """Errors from here down are led by the first term of their expansion: the next is about the error's own

@@ -14,9 +14,9 @@ from springcheck.engines.contract import Arithmetic, Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
-from springcheck.studies import fits
-from springcheck.studies.accuracy import FRAMES, Truth
-from springcheck.studies.points import Point
+from springcheck.studies.precision import fits
+from springcheck.studies.precision.accuracy import FRAMES, Truth
+from springcheck.studies.precision.points import Point
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double

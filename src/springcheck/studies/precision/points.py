@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.studies.accuracy import Accuracy
+from springcheck.studies.precision.accuracy import Accuracy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,16 +11,16 @@ from rich.table import Table
 from rich.text import Text
 
 from springcheck.schemes import SCHEMES
-from springcheck.session import LeftOut, Repeat, Report, Run
+from springcheck.studies.run.measure import LeftOut, Repeat, Report, Run
 from springcheck.trajectory import Verdict
 
 if TYPE_CHECKING:
-    from springcheck.faults import FaultReport
     from springcheck.identify import Identification
-    from springcheck.studies.extremes import Atlas
-    from springcheck.studies.outcome import MethodSummary, PrecisionStudy
-    from springcheck.studies.points import Point
-    from springcheck.studies.stability import Stability
+    from springcheck.studies.extremes.measure import Atlas
+    from springcheck.studies.faults.measure import FaultReport
+    from springcheck.studies.precision.points import Point
+    from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
+    from springcheck.studies.stability.measure import Stability
 
 Lines = list[Table | Text]
 
@@ -470,7 +470,7 @@ def fault_report(found: FaultReport) -> Lines:
 
 def stability_report(study: Stability) -> Lines:
     """The whole report of `springcheck stability`."""
-    from springcheck.studies import stability
+    from springcheck.studies.stability import measure as stability
 
     out: Lines = [
         plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"),

@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.studies.stability import Cost, Limit, Region, Resonance, Stability
+from springcheck.studies.stability.measure import Cost, Limit, Region, Resonance, Stability
 
 
 def draw(study: Stability, folder: Path) -> list[Path]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from springcheck.figures.style import save, style
-from springcheck.studies.extremes import Atlas, Cell
+from springcheck.studies.extremes.measure import Atlas, Cell
 
 OUTCOMES = ("right", "unstable, as theory says", "engine's limit", "refused", "silently wrong")
 SHADES = ("#9ecae1", "#fee391", "#d94801", "#bdbdbd", "#000000")

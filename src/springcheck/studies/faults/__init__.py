@@ -1,0 +1,1 @@
+"""Engines broken on purpose: the negative controls of the package and its detection limits."""

@@ -1,0 +1,1 @@
+"""The main job: a scene by all its methods, stored, compared and judged."""
