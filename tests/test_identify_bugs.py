@@ -1,0 +1,245 @@
+"""Bugs that users of simulators reported, rebuilt as steppers: the first sentence names the cause.
+
+Each case quotes the thread that it is taken from.  `step(q, p, h, force, mass)` is what the code did, on one
+particle; it is driven as `springcheck identify --stepper` drives it, or recorded over one spring.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springcheck.identify import identify, identify_stepper
+
+pytestmark = pytest.mark.xfail(run=False, reason="the diagnosis is being written")
+Stepper = Callable[..., tuple[Any, Any]]
+M, K, H = 3.7, 2.9, 0.1
+
+
+def halves_swapped(q, p, h, force, mass):
+    """headmyshoulder/odeint-v2#150."""
+    a = force(q) / mass
+    q = q + h / 2 * p / mass + h * h * a
+    return q, p + h / 2 * (a + force(q) / mass) * mass
+
+
+def half_drift(q, p, h, force, mass):
+    """erf-model/ERF#3594."""
+    p = p + h / 2 * force(q)
+    q = q + h / 2 * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def decayed(q, p, h, force, mass):
+    """chaos-polymtl/lethe#2082: velocity Verlet had become the symplectic Euler method."""
+    p = p + h * force(q)
+    return q + h * p / mass, p
+
+
+def not_symplectic(q, p, h, force, mass):
+    """SciML/OrdinaryDiffEq.jl#577: SymplecticEuler was the explicit one; openai/gym#907 and #1018."""
+    return q + h * p / mass, p + h * force(q)
+
+
+def absolute_step(q, p, h, force, mass):
+    """ben-cassese/jorbit#85: abs(dt)."""
+    h = abs(h)
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def fourth_from_second(q, p, h, force, mass):
+    """f1tenth/f1tenth_gym#52: the fourth stage took the second's slope instead of the third's."""
+    k1 = p / mass, force(q)
+    k2 = (p + h / 2 * k1[1]) / mass, force(q + h / 2 * k1[0])
+    k3 = (p + h / 2 * k2[1]) / mass, force(q + h / 2 * k2[0])
+    k4 = (p + h * k2[1]) / mass, force(q + h * k2[0])
+    return tuple(x + h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]) for i, x in enumerate((q, p)))
+
+
+def equal_weights(q, p, h, force, mass):
+    """GeomScale/volesti#375: the stages' weights were wrong."""
+    k1 = p / mass, force(q)
+    k2 = (p + h / 2 * k1[1]) / mass, force(q + h / 2 * k1[0])
+    k3 = (p + h / 2 * k2[1]) / mass, force(q + h / 2 * k2[0])
+    k4 = (p + h * k3[1]) / mass, force(q + h * k3[0])
+    return tuple(x + h / 4 * (k1[i] + k2[i] + k3[i] + k4[i]) for i, x in enumerate((q, p)))
+
+
+def implicit_velocity_only(q, p, h, force, mass):
+    """gbionics/jaxsim#68: an implicit velocity, but the position moved by the old one."""
+    k = -force(1.0)
+    new = (p + h * force(q)) / (1 + h * h * k / mass)
+    return q + h * p / mass, new
+
+
+def mean_velocity(q, p, h, force, mass):
+    """bulletphysics/bullet3#1446, proposed there: P += (Vi + Vf) / 2."""
+    new = p + h * force(q)
+    return q + h * (p + new) / 2 / mass, new
+
+
+def old_force(q, p, h, force, mass):
+    """Both half kicks of velocity Verlet with the force of the old position."""
+    f = force(q)
+    p = p + h / 2 * f
+    return q + h * p / mass, p + h / 2 * f
+
+
+def loses_energy(q, p, h, force, mass):
+    """dartsim/dart#846 and phys-sim-book/solid-sim-tutorial#2: a spring without damping that decays."""
+    a = h * h * -force(1.0) / mass
+    return (q + h * p / mass) / (1 + a), (p + h * force(q)) / (1 + a)
+
+
+def friction_added(q, p, h, force, mass):
+    """slembcke/Chipmunk2D#248: the damping is added instead of subtracted."""
+    p = p + h * (force(q) + 0.1 * p / mass)
+    return q + h * p / mass, p
+
+
+def massless(q, p, h, force, mass):
+    p = p + h / 2 * force(q)
+    q = q + h * p
+    return q, p + h / 2 * force(q)
+
+
+def velocity_is_momentum(q, p, h, force, mass):
+    p = p + h / 2 * force(q) / mass
+    q = q + h * p
+    return q, p + h / 2 * force(q) / mass
+
+
+def kcal(q, p, h, force, mass):
+    """openmm/openmm#1486, a comment: kJ to kcal as 4.814; here forces in kcal taken for kJ."""
+    f = lambda x: force(x) / 4.184  # noqa: E731
+    p = p + h / 2 * f(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * f(q)
+
+
+def drag_by_default(q, p, h, force, mass):
+    """Users of pybullet: energy is lost although no damping was asked for (0.04 a second by default)."""
+    p = (p + h * force(q)) * (1 - 0.04 * h)
+    return q + h * p / mass, p
+
+
+def one_fixed_point(q, p, h, force, mass):
+    """Implicit Euler by a single fixed-point iteration."""
+    new = q + h * p / mass
+    p = p + h * force(new)
+    return q + h * p / mass, p
+
+
+def reciprocal(q, p, h, force, mass):
+    """ThomasLengeling/traerphysics#2: divides by the step instead of multiplying."""
+    p = p + force(q) / h
+    return q + p / mass / h, p
+
+
+STEPPERS: dict[str, tuple[Stepper, str]] = {
+    "halves swapped": (halves_swapped, r"halves swapped|h/2 v \+ h"),
+    "drift of half a step": (half_drift, "drift of half|drift.* 0.5 "),
+    "Verlet decayed to symplectic Euler": (decayed, "semi-implicit Euler"),
+    "SymplecticEuler was Euler": (not_symplectic, "explicit Euler"),
+    "abs(dt)": (absolute_step, "sign of the step"),
+    "fourth stage from the second": (fourth_from_second, "RK4.*stage"),
+    "equal weights": (equal_weights, "RK4.*weights"),
+    "implicit velocity, old position": (implicit_velocity_only, "implicit.*old velocity"),
+    "mean velocity": (mean_velocity, "old force|held"),
+    "old force in the second half kick": (old_force, "old force|held"),
+    "energy lost without damping": (loses_energy, "implicit Euler"),
+    "friction added": (friction_added, "negative friction|friction.*wrong sign"),
+    "mass left out": (massless, "mass is left out"),
+    "p treated as a velocity": (velocity_is_momentum, "treated as a velocity"),
+    "kcal": (kcal, "kcal"),
+    "drag by default": (drag_by_default, "friction"),
+    "one fixed-point iteration": (one_fixed_point, "fixed-point|old velocity|not solved"),
+    "divided by the step": (reciprocal, "1/h|step"),
+}
+RIGHT = {"Verlet decayed to symplectic Euler", "SymplecticEuler was Euler", "energy lost without damping"}
+"""The bug is the scheme itself: it fits, and its name is the diagnosis."""
+
+
+@pytest.mark.parametrize("name", STEPPERS)
+def test_the_first_sentence_names_the_cause(name: str) -> None:
+    stepper, words = STEPPERS[name]
+    found = identify_stepper(stepper)
+    assert re.search(words, found.statement), (found.statement, found.notes)
+    assert found.fits == (name in RIGHT)
+
+
+def run(stepper: Stepper, frames: int = 401) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    states = [(0.3, 0.7)]
+    for _ in range(frames - 1):
+        states.append(stepper(*states[-1], H, lambda q, p=0.0: -K * q, M))
+    q, p = np.array(states).T
+    return H * np.arange(frames), q, p
+
+
+def right(q, p, h, force, mass):
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def lagging(t, q, p):
+    """NVIDIA-Omniverse/PhysX#308: a lag in the velocity compared to the position."""
+    return t, q[1:], p[:-1]
+
+
+def half_step_late(t, q, p):
+    """openmm/openmm#1474 and #4929: velocities are half a step from the positions."""
+    return t, q, p + H / 2 * K * q
+
+
+def doubled_time(t, q, p):
+    """OPALX-project/OPAL#1375: the time is doubled."""
+    return 2 * t, q, p
+
+
+def missing(t, q, p):
+    return t[:-1], np.delete(q, 272), np.delete(p, 272)
+
+
+def repeated(t, q, p):
+    return t, np.r_[q[:101], q[100:-1]], np.r_[p[:101], p[100:-1]]
+
+
+def degrees(t, q, p):
+    return t, np.degrees(q), p
+
+
+RECORDS: dict[str, tuple[Callable, str]] = {
+    "velocity one step behind": (
+        lagging,
+        "velocit.* (one|a) (step|frame) (behind|late|early)|one frame behind",
+    ),
+    "velocities half a step early": (half_step_late, "half a step early"),
+    "time doubled": (doubled_time, "times? .*(0.5|half|twice)"),
+    "a frame is missing": (missing, "frame 27[12].*missing|missing.*frame 27[12]"),
+    "a step is repeated": (repeated, "repeated at frame 10[01]|frame 10[01].*repeat"),
+    "degrees": (degrees, "degrees|57.29"),
+}
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_a_wrong_record_of_a_right_motion_is_told_as_that(name: str) -> None:
+    change, words = RECORDS[name]
+    t, q, p = change(*run(right))
+    found = identify(t[: len(q)], q, p, mass=M, stiffness=K)
+    assert re.search(words, found.statement), (found.statement, found.notes)
+
+
+def test_no_explanation_is_without_a_remedy() -> None:
+    for stepper, _ in STEPPERS.values():
+        for one in identify_stepper(stepper).explanations:
+            assert one.cause
+            assert one.remedy
+            assert math.isfinite(one.misfit)
