@@ -1,4 +1,4 @@
-"""What deceives an identification: forces that are wrong in the seventh digit, friction, clocks, files that hold
+"""What deceives an identification: forces that are wrong in the seventh digit, friction, clocks, files of
 several motions.
 
 Every trajectory is stepped here in plain Python, without the catalogue of schemes, so that a mistake of the
@@ -388,7 +388,7 @@ def test_what_can_be_judged_is_judged_and_the_rest_is_said(name: str) -> None:
 
 def test_a_file_of_free_particles_alone_cannot_be_judged() -> None:
     t, q, v = run_many(lambda q: 0 * q, [1.0, 0.2], [0.1, 0.3])
-    with pytest.raises(IdentificationError, match="straight line|no force"):
+    with pytest.raises(IdentificationError, match=r"straight line|no force"):
         identify(t, q, v=v)
 
 
