@@ -15,9 +15,9 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "errors", "arrays", "physics", "schemes", "engines", "trajectory", "store", "provenance",
-    "simulate", "checks", "compare", "identify", "figures", "studies", "inspection", "catalogue", "cli",
-    "__main__",
+    "interrupts", "errors", "workers", "arrays", "physics", "schemes", "engines", "trajectory", "store",
+    "provenance", "simulate", "checks", "compare", "identify", "figures", "studies", "inspection",
+    "catalogue", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))

@@ -14,7 +14,7 @@ from springcheck.engines.contract import Arithmetic
 class Outcome:
     """How a run ended.  Nothing that is not `complete` passes for a result."""
 
-    status: Literal["complete", "diverged", "stopped", "interrupted"]
+    status: Literal["complete", "diverged", "stopped"]
     step: int
     """Steps done with finite numbers."""
     message: str = ""

@@ -210,8 +210,6 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
-    if outcome.status == "interrupted":
-        raise KeyboardInterrupt
     if outcome.status != "complete":
         message = f"after {outcome.step} steps: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
