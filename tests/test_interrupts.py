@@ -21,10 +21,11 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, cli, engines, interrupts, session, simulate, store, workers
+from springcheck import checks, cli, engines, interrupts, simulate, store, workers
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.studies.run import measure as session
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "validation"))
