@@ -17,7 +17,6 @@ from springcheck import engines
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Arithmetic, Label, Simulation, Stopped
 from springcheck.errors import MethodError, SceneError
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
 
@@ -187,7 +186,7 @@ def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, with_
     energy = None
     if with_energy:
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            energy = np.asarray(mechanics.energy(scene, q, p), dtype=np.float64)
+            energy = np.asarray(scene.system.energy(q, p), dtype=np.float64)
     sink(t, q, p, energy)
 
 

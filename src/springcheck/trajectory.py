@@ -58,7 +58,7 @@ class Trajectory:
 class Comparison:
     """Largest difference of each pair of trajectories over all frames, (l, l), symmetric.
 
-    In units of the start (`mechanics.Norm`); NaN where one of the two runs did not complete.
+    In units of the start (`Norm`); NaN where one of the two runs did not complete.
     """
 
     labels: tuple[str, ...]

@@ -24,7 +24,6 @@ import numpy as np
 from springcheck import engines, simulate, store
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import StoreError
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
@@ -206,7 +205,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         scene.step,
         scene.every,
         scheme=SCHEMES[sweep.method.scheme],
-        judged=mechanics.in_single(known.scene) if sweep.arithmetic.parameters == "single" else None,
+        judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome

@@ -17,7 +17,7 @@ from springcheck import checks, compare, engines, simulate, store
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, StoreError
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.provenance import command
@@ -44,7 +44,7 @@ class Run:
     step: int
     message: str
     max_error: float
-    """Largest distance from the true motion (`mechanics.Norm`); NaN where that is not known."""
+    """Largest distance from the true motion (`Norm`); NaN where that is not known."""
     energy_drift: float
     """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
     timing: Timing
@@ -235,9 +235,9 @@ class _Tally:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._norm = mechanics.norm(scene)
+        self._norm = scene.system.norm
         self._known = exact.has_true_motion(scene)
-        self._start = float(mechanics.energy(scene, scene.q, scene.p))
+        self._start = float(scene.system.energy(scene.q, scene.p))
         self.error = 0.0 if self._known else np.nan
         self.drift = 0.0
 
@@ -251,7 +251,7 @@ class _Tally:
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
         with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(mechanics.energy(scene, piece.q, piece.p), np.float64) - self._start
+            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - self._start
         worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
@@ -332,7 +332,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None =
 
 
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     worst = 0.0
     rows = max(2, PIECE // scene.n)
     for a, b in zip_longest(store.windows(one, label, rows), store.windows(other, label, rows)):

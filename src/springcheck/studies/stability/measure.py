@@ -19,7 +19,6 @@ import numpy as np
 from springcheck import engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, StoreError
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.provenance import command
 from springcheck.studies.pieces import Pieces, Progress
@@ -97,7 +96,7 @@ def measure(
             left_out.append((str(label), absent))
         else:
             usable.append(label)
-    damped = regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ()
+    damped = regions.labels(tuple(usable)) if scene.system.is_damped else ()
     resonant = [label for label in usable if resonance.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
     stiff = [label for label in chosen if family and costs.serves(label, family)]
