@@ -17,8 +17,8 @@ import springcheck
 from springcheck import cli, store
 from springcheck.cli import main
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import text as report
 from springcheck.studies.run import measure as session
+from springcheck.text import table
 
 OWN = ["--method", "own:*"]
 
@@ -225,13 +225,9 @@ def test_a_store_in_a_folder_that_is_read_only_is_run_again(
 def test_a_narrow_terminal_cuts_no_number_and_breaks_sentences(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numbers, sentences = report.grid(), report.grid()
     words = [f"{i / 7:.15f} us" for i in range(6)]
-    for _ in words:
-        numbers.add_column("", no_wrap=True)
-        sentences.add_column("")
-    numbers.add_row(*words)
-    sentences.add_row(*["half a kick too early"] * 6)
+    numbers = table([""] * 6, [words])
+    sentences = table(["a", "b"], [["1.5e-300", "half a kick too early " * 6]], prose="b")
     monkeypatch.setenv("TERM", "dumb")  # 80 columns, no colours
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     cli._show([numbers])

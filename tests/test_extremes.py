@@ -12,8 +12,9 @@ import pytest
 
 from springcheck import engines, store
 from springcheck.studies.extremes import figure as figures
-from springcheck.studies.extremes import grid, judging, keeping, refusals, running
+from springcheck.studies.extremes import grid, judging, refusals, running
 from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.extremes import result as keeping
 
 Need = Callable[[str], None]
 METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
@@ -103,7 +104,7 @@ def test_bad_input_is_refused_with_a_reason() -> None:
 
 def test_the_document_has_the_promised_fields() -> None:
     atlas = extremes.measure(["own:implicit-euler"], quick=True)
-    found = json.loads(json.dumps(extremes.document(atlas), allow_nan=False))
+    found = json.loads(json.dumps(atlas.document(), allow_nan=False))
     fields = {"method", "parameters", "outcome", "reason", "value", "bound"}
     assert all(fields <= set(cell) for cell in found["cells"])
     assert found["windows"][0]["sentence"].startswith("springcheck (own:implicit-euler): right for forces")

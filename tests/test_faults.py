@@ -15,7 +15,8 @@ import springcheck
 from springcheck import checks, simulate
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.faults import measure as trial
-from springcheck.studies.faults.measure import Result, examine
+from springcheck.studies.faults.measure import examine
+from springcheck.studies.faults.result import Clean, FaultReport, Result
 from springcheck.studies.faults.seeded import Fault, stiffer
 from springcheck.studies.faults.table import FAULTS
 
@@ -92,7 +93,7 @@ def test_a_broken_engine_among_the_clean_ones_is_a_false_alarm_that_is_reported(
 
 def test_the_report_is_one_json_document() -> None:
     results = tuple(result(fault) for fault in FAULTS[:3])
-    report = trial.FaultReport(results=results, clean=trial.Clean(runs=3, verdicts=30, alarms=()))
+    report = FaultReport(results=results, clean=Clean(runs=3, verdicts=30, alarms=()))
     document = json.loads(json.dumps(report.document(), allow_nan=False))
     assert document["clean_runs"] == 3
     assert document["false_alarms"] == []

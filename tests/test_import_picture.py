@@ -15,9 +15,10 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "workers", "arrays", "physics", "schemes", "engines", "trajectory", "store",
-    "provenance", "simulate", "checks", "compare", "identify", "figures", "studies", "inspection",
-    "catalogue", "cli", "__main__",
+    "errors", "arrays", "physics", "schemes", "engines", "trajectory", "store", "provenance",
+    "text", "simulate", "checks", "compare", "identify", "figures", "studies", "inspect", "plot", "listing",
+    "cli",
+    "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
@@ -29,8 +30,8 @@ HOMES = {
     "ase": ("engines/ase/simulation.py",),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
-    "rich": ("studies/text.py", "inspection.py", "cli.py"),
-    "msgspec": ("physics/scenefile",),
+    "rich": ("text.py", "studies/run/text.py", "cli.py"),
+    "msgspec": ("physics/scenefile", "studies/keeper.py"),
 }
 
 

@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -18,18 +19,19 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import cli, engines, inspection, store
+from springcheck import cli, engines, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.figures.style import save
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import text as report
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision import text as report
 from springcheck.studies.run import figure as trajectories
 from springcheck.studies.run import measure as session
-from springcheck.studies.stability import limits
+from springcheck.studies.run.drawable import drawable
+from springcheck.studies.stability import limits, result
 from springcheck.studies.stability import measure as stability
 
 Need = Callable[[str], None]
@@ -67,12 +69,12 @@ def test_a_study_of_stability_is_read_back_bit_for_bit(
             need(method)
     scene, path = scenes.load_scene(name), tmp_path / "study.h5"
     fresh = stability.record(scene, path, methods)
-    kept = stability.stored(path, scene)
+    kept = stability.stored(path)
     assert getattr(fresh, kind)
     for part in ("limits", "regions", "resonances", "costs"):
         assert_same_rows(getattr(fresh, part), getattr(kept, part))
     assert kept.left_out == fresh.left_out
-    assert stability.document(kept) == stability.document(fresh)
+    assert kept.document() == fresh.document()
     assert store.check(path) == []
 
 
@@ -82,13 +84,13 @@ def test_what_a_stored_study_of_stability_fails_is_still_seen(tmp_path: Path) ->
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(limits, "measure", lambda _: replace(right, growth_above=2 * right.growth_above))
         wrong = stability.record(scene, path, ["own:semi-implicit-euler"])
-    assert stability.failures(stability.stored(path, scene)) == stability.failures(wrong) != []
+    assert result.failures(stability.stored(path)) == result.failures(wrong) != []
 
 
 def test_the_atlas_is_read_back_as_it_was(tmp_path: Path) -> None:
     fresh = extremes.record(tmp_path / "extremes.h5", ["own:euler"], quick=True)
     kept = extremes.stored(tmp_path / "extremes.h5")
-    assert extremes.document(kept) == extremes.document(fresh)
+    assert kept.document() == fresh.document()
     assert kept.counts() == fresh.counts()
     assert kept.windows == fresh.windows
 
@@ -212,7 +214,7 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     scene = scenes.parse(long_scene(20_000, step), name="long")
     path = tmp_path / "long.h5"
     session.run(scene, path, methods=["own:semi-implicit-euler"])
-    found = inspection.drawable(path, store.summary(path))
+    found = drawable(path)
     whole = store.read_one(path, "own:semi-implicit-euler")
     run, followed = (x["own:semi-implicit-euler"] for x in (found.runs, found.followed))
     np.testing.assert_array_equal(run.q, whole.q[::5])
@@ -225,13 +227,13 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     assert (t[0], t[-1]) == pytest.approx((followed.t[0], followed.t[-1]))
     assert 1400 < len(t) <= 1501
     np.testing.assert_allclose(q, exact.true_motion(scene, t / step, step)[0], atol=1e-12)
-    assert trajectories.draw(scene, found.runs, tmp_path, followed=found.followed)
+    assert trajectories.draw_runs(scene, found.runs, tmp_path, followed=found.followed)
 
 
 def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("two-scales"), tmp_path / "two-scales.h5"
     session.run(scene, path, methods=["own:euler", "own:implicit-euler"])
-    found = inspection.drawable(path, store.summary(path))
+    found = drawable(path)
     assert np.max(np.abs(found.runs["own:euler"].q)) > 1e200
     for name, picture in trajectories.pictures(scene, found.runs, found.followed).items():
         for axes in picture.axes:
@@ -246,7 +248,7 @@ def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
 def drawn(tmp_path: Path, name: str, *methods: str) -> dict[str, Any]:
     scene, path = scenes.load_scene(name), tmp_path / f"{name}.h5"
     session.run(scene, path, methods=methods)
-    found = inspection.drawable(path, store.summary(path))
+    found = drawable(path)
     return trajectories.pictures(scene, found.runs, found.followed)
 
 
@@ -328,14 +330,14 @@ def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = [engines.parse(name) for name in ("own:semi-implicit-euler", "sundials:bdf")]
     fresh = precision.record(scene, labels, path, budget=1.5)
-    kept = precision.stored(path, scene)
+    kept = precision.stored(path)
     assert kept.points == fresh.points
     assert kept.methods == fresh.methods
     assert kept.methods[0].order == pytest.approx(1, abs=0.01)
     assert (kept.front, kept.cheapest) == (fresh.front, fresh.cheapest)
     assert kept.document() == fresh.document()
     for study in (fresh, kept):
-        cli._show(report.precision_report(study, points=True))
+        cli._show(report.lines(study, Namespace(points=True)))
     text = capsys.readouterr().out
     assert text[: len(text) // 2] == text[len(text) // 2 :]
     assert main(["inspect", str(path)]) == 0
@@ -347,4 +349,4 @@ def test_a_study_of_precision_that_lacks_a_table_is_refused(tmp_path: Path) -> N
     with store.open_new(path, "precision") as journal:
         journal.commit(scene, documents={"precision": '{"methods": [{"method": "own:euler"}]}'})
     with pytest.raises(StoreError, match="lacks 'precision/own:euler'"):
-        precision.stored(path, scene)
+        precision.stored(path)

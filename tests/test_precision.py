@@ -301,7 +301,7 @@ def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
     path = tmp_path / "study.h5"
     found = precision.record(scene, labels, path, budget=1.5)
     assert store.check(path) == []
-    document = json.loads(store.document(path, precision.DOCUMENT))
+    document = json.loads(store.document(path, "precision"))
     assert document == found.document()
     table = store.read_tables(path)["precision/own:semi-implicit-euler"]
     assert table.signal == "max_error"
@@ -312,7 +312,7 @@ def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
     assert np.nanmin(repeats[0]) == mine[0].seconds
     with pytest.raises(StoreError, match="exists"):
         precision.record(scene, labels, path, budget=1.5)
-    written = figure.draw(document, tmp_path)
+    written = figure.draw(found, tmp_path)
     assert {file.suffix for file in written} == {".png", ".svg"}
     assert "own:semi-implicit-euler" in (tmp_path / "precision.svg").read_text()
 

@@ -17,7 +17,7 @@ import pytest
 from springcheck import engines, schemes
 from springcheck.arrays import Extended
 from springcheck.physics import scenefile as scenes
-from springcheck.studies.stability import costs, limits, propagators, regions, resonance
+from springcheck.studies.stability import costs, limits, propagators, regions, resonance, result
 from springcheck.studies.stability import figure as figures
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.propagators import Springs
@@ -110,7 +110,7 @@ def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None
 def test_the_document_has_the_promised_fields(need: Need) -> None:
     need("own:euler")
     study = stability.measure(scenes.load_scene("overdamped"), ["own:*"])
-    found = json.loads(json.dumps(stability.document(study), allow_nan=False))
+    found = json.loads(json.dumps(study.document(), allow_nan=False))
     assert study.passed
     for method in found["methods"]:
         assert {"method", "limit", "theory", "growth_above", "growth_predicted", "points"} <= set(method)
@@ -125,7 +125,7 @@ def test_a_wrong_growth_fails_the_study(need: Need) -> None:
     (limit,) = study.limits
     wrong = replace(study, limits=(replace(limit, growth_above=limit.growth_above * (1 + 1e-4)),))
     assert not wrong.passed
-    assert "growth" in stability.failures(wrong)[0]
+    assert "growth" in result.failures(wrong)[0]
 
 
 def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:

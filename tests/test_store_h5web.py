@@ -18,7 +18,8 @@ from h5grove.content import get_content_from_file
 
 from springcheck import engines, simulate, store
 from springcheck.physics import scenefile as scenes
-from springcheck.studies.stability import keeping, regions
+from springcheck.studies.stability import regions
+from springcheck.studies.stability.result import REGIONS
 from springcheck.trajectory import Comparison
 from test_store import LABELS, scene, trajectory, written
 
@@ -172,7 +173,7 @@ def test_a_store_with_nothing_to_draw_promises_no_plot(tmp_path: Path) -> None:
 def test_a_region_of_stability_lies_on_even_axes(tmp_path: Path) -> None:
     region = regions.measure(engines.parse("own:euler"), points=20)
     with store.open_new(tmp_path / "s.h5", "stability") as journal:
-        journal.add(keeping.of_region(region))
+        journal.add(REGIONS.table(region.method, region))
         journal.commit()
     image = drawn(tmp_path / "s.h5")
     assert np.array_equal(image.signal, region.radius)

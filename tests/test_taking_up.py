@@ -15,13 +15,14 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, engines, provenance, store
+from springcheck import cli, engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile as scenes
+from springcheck.studies import keeper
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.result import of_points, to_points
+from springcheck.studies.precision.points import POINTS, points_of
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
@@ -101,9 +102,9 @@ def test_a_killed_study_of_precision_keeps_its_points(
         "1.5",
         *(x for name in OWN for x in ("--method", name)),
     ]
-    kept = {name: to_points(table)[0] for name, table in killed(arguments, path, 3).items()}
+    kept = {name: POINTS.found(table) for name, table in killed(arguments, path, 3).items()}
     assert cli.main([*arguments, "-o", str(path), "--json"]) == 0
-    whole = {name: to_points(table)[0] for name, table in store.read_tables(path).items() if ":" in name}
+    whole = {name: POINTS.found(table) for name, table in store.read_tables(path).items() if ":" in name}
     assert sum(map(len, kept.values())) >= 3
     for name, points in kept.items():
         assert whole[name][: len(points)] == points
@@ -118,7 +119,7 @@ def test_points_are_read_back_as_they_were() -> None:
     for method in found.methods:
         points = found.of(method.method)
         assert len(points) > 3
-        assert to_points(of_points(scene, method.method, points, 1.5)) == (list(points), 1.5)
+        assert POINTS.found(points_of(scene).table(method.method, points)) == list(points)
 
 
 def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(
@@ -129,7 +130,7 @@ def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(
     first = precision.record(scene, labels, path, budget=2.0, progress=raising(12))
     assert first.interrupted
     assert not store.summary(path).complete
-    assert json.loads(store.document(path, precision.DOCUMENT)) == first.document()
+    assert json.loads(store.document(path, "precision")) == first.document()
     assert cli.main(["check", str(path)]) == 0
     assert "unfinished" in capsys.readouterr().out
     done = [point for point in first.points if point.complete]
@@ -159,7 +160,7 @@ def test_a_study_whose_budget_was_spent_when_it_was_killed_measures_nothing_more
         with pytest.raises(StoreError, match="full"):
             precision.record(scene, labels, path, budget=0.5)
     (table,) = [t for name, t in store.read_tables(path).items() if name == "precision/own:euler"]
-    before, seconds = to_points(table)
+    before, seconds = POINTS.found(table), float(table.attributes["study_seconds"])
     found = precision.record(scene, labels, path, budget=0.5)
     assert [p for p in found.points if p.complete] == [p for p in before if p.complete]
     assert found.seconds >= seconds
@@ -213,13 +214,14 @@ def test_runs_of_another_version_are_not_taken_up(tmp_path: Path, monkeypatch: p
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "run.h5"
     started: list[str] = []
 
-    def interrupting(label: Label, _: int) -> None:
-        started.append(str(label))
+    def interrupting(done: float, whole: float, what: str = "") -> None:
+        if what not in started:
+            started.append(what)
         if len(started) == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        session.run(scene, path, methods=OWN, started=interrupting)
+        session.run(scene, path, methods=OWN, progress=interrupting)
     machine = store.machine()
     with monkeypatch.context() as patch:
         patch.setattr(store, "machine", lambda: machine | {"springcheck": "another"})
@@ -230,7 +232,7 @@ def test_runs_of_another_version_are_not_taken_up(tmp_path: Path, monkeypatch: p
 
 def test_every_version_that_a_study_runs_on_is_in_its_command() -> None:
     labels = [engines.parse(name) for name in ("own:euler", "sundials:bdf")]
-    text = provenance.command("stability", labels, "a scene")
+    text = keeper.command("stability", labels, "a scene")
     assert text.splitlines()[0] == "stability"
     for line in ("own:euler", "sundials:bdf", f"numpy {np.__version__}", "a scene"):
         assert line in text.splitlines()

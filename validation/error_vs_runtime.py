@@ -48,11 +48,10 @@ from arguments import arguments
 from springcheck import engines
 from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
-from springcheck.studies import text as report
-from springcheck.studies.precision import figure
+from springcheck.studies.choose import choose
+from springcheck.studies.precision import figure, text
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.result import PrecisionStudy
-from springcheck.studies.run import measure as session
 
 SCENES = ("spring", "spring-uneven", "anharmonic")
 
@@ -79,11 +78,11 @@ def main() -> int:
     wrong = []
     for name in SCENES:
         scene = scenes.load_scene(name)
-        labels, _ = session.choose(scene, ())
+        labels, _ = choose(scene, ())
         study = precision.study(scene, labels, budget=budget)
-        for line in report.precision_report(study):
+        for line in text.lines(study):
             console.print(line)
-        for path in figure.draw(study.document(), folder / name):
+        for path in figure.draw(study, folder / name):
             console.print(str(path))
         wrong += failures(study)
     for what in wrong:

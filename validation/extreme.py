@@ -28,8 +28,8 @@ def main() -> int:
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")
     for window in atlas.windows:
         print(window.sentence)
-    for method, reason in atlas.left_out:
-        print(f"left out {method}: {reason}")
+    for left in atlas.left_out:
+        print(f"left out {left.method}: {left.reason}")
     for cell in atlas.wrong:
         print(f"silently wrong: {cell}")
     for path in figures.draw(atlas, folder):

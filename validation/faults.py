@@ -19,7 +19,8 @@ import sys
 
 from arguments import arguments
 from springcheck import engines, simulate
-from springcheck.studies.faults.measure import ENGINES, FaultReport, study
+from springcheck.studies.faults.measure import ENGINES, study
+from springcheck.studies.faults.result import FaultReport
 
 
 def table(found: FaultReport) -> list[str]:

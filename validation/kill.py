@@ -41,7 +41,7 @@ from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.store import adopt, reading
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision import result as outcome
+from springcheck.studies.precision.points import POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "checkpoint", "collection")
@@ -283,7 +283,7 @@ def finished(path: Path) -> dict[str, object]:
         raise
     for name, one in tables.items():
         if name.startswith("precision/") and ":" in name:
-            points, _ = outcome.to_points(one)
+            points = POINTS.found(one)
             found[name] = [point for point in points if point.outcome != precision.CUT_OFF]
         elif name != "precision/methods":
             found[name] = {

@@ -26,6 +26,7 @@ import numpy as np
 from arguments import arguments
 from springcheck import compare, load_scene, run
 from springcheck.checks import judge
+from springcheck.physics import mechanics
 from springcheck.studies.run import figure as trajectories
 
 METHODS = [
@@ -48,7 +49,7 @@ def main() -> int:
     runs = {label: run(scene, label) for label in METHODS}
     good = True
 
-    energy = scene.system.energy(runs["own:euler"].q, runs["own:euler"].p)
+    energy = mechanics.energy(scene, runs["own:euler"].q, runs["own:euler"].p)
     growth = float(energy[-1] / energy[0])
     print(f"own:euler: energy x {growth:.4g}, amplitude x {np.sqrt(growth):.4g}")
     good &= abs(growth / 1.01**200 - 1) < 1e-12
@@ -71,7 +72,7 @@ def main() -> int:
     verdicts = [verdict for each in runs.values() for verdict in judge(scene, each)]
     failed = [verdict for verdict in verdicts if verdict.passed is False]
     print(f"{sum(v.passed is True for v in verdicts)} verdicts passed, {len(failed)} failed")
-    for path in trajectories.draw(scene, runs, folder):
+    for path in trajectories.draw_runs(scene, runs, folder):
         print(path)
     return 0 if good and not failed else 1
 

@@ -38,7 +38,7 @@ def main() -> int:
                     f"{x.method:28} limit {x.limit:.10g}, theory {x.theory:g}, "
                     f"growth {x.growth_above:.9f} of {x.growth_predicted:.9f}, at the limit n**{x.edge:.3f}"
                 )
-        for line in stability.sentences(study):
+        for line in study.sentences:
             print(line)
         for cost in study.costs:
             print(

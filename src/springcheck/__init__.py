@@ -12,21 +12,20 @@ What they return is described in `springcheck.trajectory`.  Each is imported whe
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # typing takes longer to import than all else here
-if TYPE_CHECKING:
-    from typing import Any
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
     from springcheck.checks import judge
     from springcheck.physics.scenefile import load_scene
     from springcheck.simulate import run
-    from springcheck.studies.run.measure import read
+    from springcheck.studies.keeper import read
 
 __all__ = ["judge", "load_scene", "read", "run"]
 
 _HOMES = {
     "judge": "checks",
     "load_scene": "physics.scenefile",
-    "read": "studies.run.measure",
+    "read": "studies.keeper",
     "run": "simulate",
 }
 

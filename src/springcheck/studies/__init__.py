@@ -1,1 +1,12 @@
-"""Studies: many runs put together.  They measure how good a scheme is; nothing here passes or fails."""
+"""Studies: many runs put together.  A study is a folder here and a line in `STUDIES`; nothing else names it.
+
+They measure how good a scheme is.  A study's own control may fail it; a large error never does.
+"""
+
+from __future__ import annotations
+
+from springcheck.studies import extremes, faults, precision, run, stability
+from springcheck.studies.study import Study
+
+STUDIES: tuple[Study, ...] = (run.STUDY, faults.STUDY, precision.STUDY, stability.STUDY, extremes.STUDY)
+"""Every study, in the order in which `--help` names them."""

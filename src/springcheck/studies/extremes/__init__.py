@@ -1,1 +1,15 @@
 """The atlas of extreme cases."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+
+from springcheck.studies.study import Study, store_options
+
+
+def _options(parser: ArgumentParser) -> None:
+    store_options(parser, "extremes.h5")
+    parser.add_argument("--quick", action="store_true", help="fewer cells, in about 20 seconds")
+
+
+STUDY = Study(name="extremes", about="the atlas of extreme cases", options=_options)

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from springcheck.figures.style import save, style
-from springcheck.studies.extremes.measure import Atlas, Cell
+from springcheck.studies.extremes.judging import Cell
+from springcheck.studies.extremes.result import Atlas
 
 OUTCOMES = ("right", "unstable, as theory says", "engine's limit", "refused", "silently wrong")
 SHADES = ("#9ecae1", "#fee391", "#d94801", "#bdbdbd", "#000000")

@@ -9,7 +9,7 @@ that is off without a reason makes the cell silently wrong.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -20,6 +20,7 @@ from springcheck.checks.case import overflows
 from springcheck.engines.contract import Arithmetic, Label
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
+from springcheck.studies.tables import column
 from springcheck.trajectory import Timing, Trajectory
 
 Outcome: TypeAlias = Literal[
@@ -39,13 +40,16 @@ RANGES = {
 """Smallest normal and largest number of a width."""
 
 
+PARAMETERS = ("m", "k", "q", "p", "h", "steps", "h_w", "force", "tolerance")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
     """One cell of the atlas."""
 
     method: str
     block: str
-    parameters: dict[str, float]
+    parameters: dict[str, float] = field(metadata=column(keys=PARAMETERS))
     outcome: Outcome
     reason: str
     value: float
@@ -83,7 +87,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     """
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
-    k = np.abs(scene.system.hessian_diagonal(scene.q))
+    k = np.abs(_stiffness(scene))
     x, y = np.maximum(np.abs(q), np.abs(q2)), np.maximum(np.abs(p), np.abs(p2))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
@@ -95,6 +99,15 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
     return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
+
+
+def _stiffness(scene: Scene) -> Extended:
+    out = np.zeros(scene.n, dtype=np.longdouble)
+    for term in scene.terms:
+        k = getattr(term, "k", None)
+        if k is not None:
+            np.add.at(out, term.i, k)  # type: ignore[attr-defined]
+    return out
 
 
 def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
@@ -199,7 +212,7 @@ def _largest(dq: Extended, dp: Extended, of_q: Extended, of_p: Extended) -> Exte
 
 def growth_of(case: checks.Case, scene: Scene) -> Floats:
     """Logarithm of the spectral radius of each cell's own one-step matrix."""
-    k = scene.system.hessian_diagonal(scene.q)
+    k = _stiffness(scene)
     w = np.sqrt(np.abs(k) / scene.m.astype(np.longdouble))
     # in units of the period, so that no entry leaves the range
     turn = np.abs(np.longdouble(scene.step)) * w

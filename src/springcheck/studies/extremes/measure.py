@@ -6,30 +6,26 @@ say why), or refused.  A cell that is off without a named reason is silently wro
 
 from __future__ import annotations
 
-import json
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from argparse import Namespace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from springcheck import engines, store
+from springcheck import engines
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, StoreError
-from springcheck.provenance import command
-from springcheck.studies.extremes import grid, keeping, refusals, running, solving
+from springcheck.errors import MethodError
+from springcheck.studies import keeper
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.pieces import Pieces, Progress
+from springcheck.studies.extremes.result import CELLS, Atlas, Window
+from springcheck.studies.keeper import Keeper, Piece, each
 from springcheck.studies.stability import propagators
-
-__all__ = ["Atlas", "Cell", "Window", "document", "measure", "record", "windows", "stored"]
-
-DOCUMENT = "extremes"
-"""Name of the atlas in a store."""
+from springcheck.studies.study import Progress
 
 ALL = ("*", "openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
        "openmm:verlet@OpenCL-double")  # fmt: skip
@@ -39,51 +35,15 @@ CALM = (0.01, 1.9)
 """h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Window:
-    """The forces between which a method is right at every h w in `CALM`, as decades of the scene's unit."""
-
-    method: str
-    sentence: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Atlas:
-    """All cells, the windows, and the methods that are not here."""
-
-    cells: tuple[Cell, ...]
-    windows: tuple[Window, ...]
-    left_out: tuple[tuple[str, str], ...]
-    taken_up: int = 0
-    """Methods that an interrupted call had finished."""
-
-    @property
-    def wrong(self) -> tuple[Cell, ...]:
-        """Cells that are silently wrong."""
-        return tuple(cell for cell in self.cells if cell.outcome == "silently wrong")
-
-    @property
-    def passed(self) -> bool:
-        """Whether anything was measured and no cell is silently wrong."""
-        return bool(self.cells) and not self.wrong
-
-    def counts(self, method: str | None = None) -> Counter[str]:
-        """Cells by outcome, of one method or of all."""
-        return Counter(cell.outcome for cell in self.cells if method in (None, cell.method))
-
-
 def measure(
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
-    progress: Progress | None = None,
-    pieces: Pieces | None = None,
+    kept: Keeper | None = None,
 ) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 
-    What an earlier call has finished (`pieces`) is taken up.
+    What an earlier call has finished (`kept`) is taken up.
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
@@ -95,25 +55,20 @@ def measure(
         if reason is None:
             usable.append(label)
         else:
-            left_out.append((str(label), reason))
+            left_out.append(LeftOut(method=str(label), reason=reason))
     if not usable:
-        raise MethodError("none of these methods is here: " + "; ".join(map(": ".join, left_out)))
-    work: list[tuple[str, Callable[[], list[Cell]]]] = [
-        (str(label), partial(of_method, label, quick=quick)) for label in usable
-    ]
+        reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
+        raise MethodError(f"none of these methods is here: {reasons}")
+    work = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
     if not methods:
-        work.append(("refusals", refusals.cells))
-    pieces = pieces or Pieces()
-    pieces.expect(len(work), progress)
-    cells: list[Cell] = []
-    for what, measured in work:
-        name = f"{keeping.CELLS}{what}"
-        cells += pieces.piece(name, what, measured, partial(keeping.of_cells, name), keeping.to_cells)
+        work.append(Piece(key="refusals", what="refusals", measure=refusals.cells, form=CELLS))
+    kept = kept or Keeper()
+    cells = [cell for found in kept.results(work) for cell in found]
     return Atlas(
         cells=tuple(cells),
         windows=tuple(windows(cells)),
         left_out=tuple(left_out),
-        taken_up=len(pieces.taken_up),
+        taken_up=kept.taken_up,
     )
 
 
@@ -140,28 +95,33 @@ def record(
     """
     labels = engines.match(tuple(methods) or ALL)
     size = "quick" if quick else "whole"
-    with store.open_new(path, command("extremes", labels, size), force=force) as journal:
-        pieces = Pieces(journal)
-        atlas = measure(methods, quick=quick, progress=progress, pieces=pieces)
-        known = {"tables": pieces.names, **document(atlas)}
-        # the tables hold the cells, and hold them exactly
-        del known["cells"]
-        journal.commit(documents={DOCUMENT: json.dumps(known, allow_nan=False)})
+    command = keeper.command("extremes", labels, size)
+    with keeper.kept(path, command, force=force, progress=progress) as kept:
+        atlas = measure(methods, quick=quick, kept=kept)
+        known = {"tables": kept.names, **atlas.document(cells=False)}
+        kept.commit("extremes", known)
     return atlas
+
+
+def perform(options: Namespace, progress: Progress | None) -> Atlas:
+    """What `springcheck extremes` does."""
+    path = Path(options.output or "extremes.h5")
+    atlas = record(path, options.method, quick=options.quick, force=options.force, progress=progress)
+    return replace(atlas, path=path)
 
 
 def stored(path: str | Path) -> Atlas:
     """The atlas that `record` has kept.  StoreError where the file holds none."""
-    known = json.loads(store.document(path, DOCUMENT))
-    tables = store.read_tables(path)
-    try:
-        return Atlas(
-            cells=tuple(cell for name in known["tables"] for cell in keeping.to_cells(tables[name])),
-            windows=tuple(Window(**window) for window in known["windows"]),
-            left_out=tuple((one["method"], one["reason"]) for one in known["left_out"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise StoreError(f"{path}: its atlas of extremes lacks {error}; measure it anew") from error
+    return keeper.restored(path, "extremes", _restored)
+
+
+def _restored(kept: keeper.Kept) -> Atlas:
+    known = kept.document
+    return Atlas(
+        cells=tuple(cell for name in known["tables"] for cell in CELLS.found(kept.tables[name])),
+        windows=tuple(Window(**window) for window in known["windows"]),
+        left_out=tuple(LeftOut(**one) for one in known["left_out"]),
+    )
 
 
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
@@ -222,32 +182,3 @@ RIGHT = ("right", "unstable, as theory says")
 def _decade(cell: Cell) -> int:
     k, q = cell.parameters["k"], cell.parameters["q"]
     return int(np.round(np.log10(k) + np.log10(q)))
-
-
-def document(atlas: Atlas) -> dict[str, Any]:
-    """Plain data for JSON; what is not a finite number is None."""
-    return {
-        "passed": atlas.passed,
-        "counts": dict(atlas.counts()),
-        "cells": [
-            {
-                "method": cell.method,
-                "block": cell.block,
-                "parameters": {name: _finite(value) for name, value in cell.parameters.items()},
-                "outcome": cell.outcome,
-                "reason": cell.reason,
-                "value": _finite(cell.value),
-                "bound": _finite(cell.bound),
-            }
-            for cell in atlas.cells
-        ],
-        "windows": [
-            {"method": w.method, "sentence": w.sentence, "low": _finite(w.low), "high": _finite(w.high)}
-            for w in atlas.windows
-        ],
-        "left_out": [{"method": method, "reason": reason} for method, reason in atlas.left_out],
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+import os
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from functools import cache, partial
-from typing import Any
+from multiprocessing import get_context
 
 import numpy as np
 
-from springcheck import checks, schemes
+from springcheck import checks, engines, schemes, simulate
 from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
 from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults.result import Clean, FaultReport, Result
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
+from springcheck.studies.study import Progress
 from springcheck.trajectory import Trajectory
-from springcheck.workers import carried_out
 
 
 @cache
@@ -62,61 +65,6 @@ SMALLEST, LARGEST = 1e-20, 0.3
 """Sizes between which a detection limit is looked for."""
 HALVINGS = 4
 """Of a decade: limits are known to a factor 10**(1/16) = 1.15."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """What the checks say of one fault."""
-
-    name: str
-    about: str
-    size: float | None
-    rejected_by: tuple[str, ...]
-    missed_by: tuple[str, ...]
-    """Checks that should have rejected it and did not."""
-    limits: dict[str, float]
-    """Smallest size that each check rejects."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clean:
-    """Right engines: trajectories judged, verdicts passed on them, and those that were false alarms."""
-
-    runs: int
-    verdicts: int
-    alarms: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultReport:
-    """The whole study."""
-
-    results: tuple[Result, ...]
-    clean: Clean
-
-    @property
-    def sound(self) -> bool:
-        """Every fault was rejected by every check that must reject it, and nothing else was."""
-        return not self.clean.alarms and not any(result.missed_by for result in self.results)
-
-    def document(self) -> dict[str, Any]:
-        """As one JSON document."""
-        return {
-            "faults": [
-                {
-                    "name": result.name,
-                    "about": result.about,
-                    "size": result.size,
-                    "rejected_by": list(result.rejected_by),
-                    "missed_by": list(result.missed_by),
-                }
-                for result in self.results
-            ],
-            "limits": {result.name: result.limits for result in self.results if result.limits},
-            "clean_runs": self.clean.runs,
-            "clean_verdicts": self.clean.verdicts,
-            "false_alarms": list(self.clean.alarms),
-        }
 
 
 class _Probe:
@@ -249,12 +197,18 @@ def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Ex
     )
 
 
+def perform(options: Namespace, progress: Progress | None) -> FaultReport:
+    """What `springcheck faults` does."""
+    labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
+    return study(simulate.run, labels, workers=min(2, os.cpu_count() or 1), progress=progress)
+
+
 def study(
     run: Run | None = None,
     labels: Sequence[str] = (),
     *,
     workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> FaultReport:
     """All faults, their limits, and the clean runs; `run` and `labels` add those of the engines.
 
@@ -271,11 +225,10 @@ def study(
             for first in range(0, BY_ENGINES, _BATCH)
         ]
     done: list[Result | Clean] = []
-    with closing(carried_out(parts, workers)) as found:
-        for part in found:
-            done.append(part)
-            if progress:
-                progress(len(done), len(parts))
+    for part in _carried_out(parts, workers):
+        done.append(part)
+        if progress:
+            progress(len(done), len(parts))
     cleans = [part for part in done if isinstance(part, Clean)]
     order = [fault.name for fault in FAULTS]
     results = sorted((part for part in done if isinstance(part, Result)), key=lambda r: order.index(r.name))
@@ -303,3 +256,13 @@ def _together(parts: Sequence[Clean]) -> Clean:
         verdicts=sum(part.verdicts for part in parts),
         alarms=tuple(alarm for part in parts for alarm in part.alarms),
     )
+
+
+def _carried_out(parts: Sequence[Callable[[], Result | Clean]], workers: int) -> Iterator[Result | Clean]:
+    if workers <= 1:
+        for part in parts:
+            yield part()
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(part) for part in parts]):
+            yield future.result()

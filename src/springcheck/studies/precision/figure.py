@@ -1,4 +1,4 @@
-"""Error against run time and against force calls, drawn from a study's document, fresh or stored."""
+"""Error against run time and against force calls."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
+from springcheck.studies.precision.result import PrecisionStudy
 
 Document = Mapping[str, Any]
 
@@ -19,8 +20,9 @@ ROOM = 30.0
 """Errors above this are left of the picture: nothing is read off them."""
 
 
-def draw(document: Document, folder: Path) -> list[Path]:
-    """Draw a study (`PrecisionStudy.document`) into a folder; returns the files."""
+def draw(study: PrecisionStudy, folder: Path) -> list[Path]:
+    """Draw a study, fresh or stored, into a folder; returns the files."""
+    document = study.document()
     if not any(point["max_error"] for point in document["points"]):
         return []
     with style():

@@ -11,34 +11,29 @@ repeats to quote.
 
 from __future__ import annotations
 
-import json
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import ceil
+from math import ceil, isfinite
 from pathlib import Path
 from time import get_clock_info, perf_counter
 from typing import Any
 
 import numpy as np
 
-from springcheck import engines, simulate, store
+from springcheck import engines, simulate
 from springcheck.engines.contract import Label, Stopped
-from springcheck.errors import StoreError
+from springcheck.errors import SpringcheckError
+from springcheck.physics import mechanics, scenefile
 from springcheck.physics.scene import Scene
-from springcheck.provenance import command, origin
 from springcheck.schemes import SCHEMES
-from springcheck.studies.pieces import Pieces, Progress
+from springcheck.studies import keeper
+from springcheck.studies.choose import choose
+from springcheck.studies.keeper import Keeper
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
-from springcheck.studies.precision.points import Point
-from springcheck.studies.precision.result import (
-    Answer,
-    MethodSummary,
-    PrecisionStudy,
-    of_points,
-    table_name,
-    to_points,
-)
+from springcheck.studies.precision.points import POINTS, Point, points_of
+from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.precision.sweeps import (
     PLANNED,
     Sweep,
@@ -50,6 +45,7 @@ from springcheck.studies.precision.sweeps import (
     to_time,
     warm_ups,
 )
+from springcheck.studies.study import Progress
 
 BUDGET = 75.0
 """Seconds that a study takes unless it is told otherwise."""
@@ -72,47 +68,44 @@ READ_SECONDS = 0.1
 CUT_OFF = "cut off"
 """Outcome of the first point that a study did not come to."""
 
-DOCUMENT = "precision"
-"""Name of the study's document in a store."""
-
 
 def study(
     scene: Scene,
     labels: Sequence[Label],
     *,
     budget: float = BUDGET,
+    kept: Keeper | None = None,
     progress: Progress | None = None,
-    pieces: Pieces | None = None,
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
     A method that cannot run, a run that diverges and a sweep that is cut off are points with their
     reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.  Points
-    that an earlier call has finished (`pieces`) are taken up, and what they took counts for the budget.
+    that an earlier call has finished (`kept`) are taken up, and what they took counts for the budget.
 
     Raises:
         SceneError: the true motion of the scene is not known, or nothing moves in it.
     """
     known = truth(scene)
     sweeps = [begin(scene, label, known) for label in labels]
-    pieces = pieces or Pieces()
+    kept = kept or Keeper(progress=progress)
     able = _open(sweeps)
-    before = [_take_up(sweep, pieces) for sweep in able]
+    before = [_take_up(sweep, kept) for sweep in able]
     taken_up = sum(len(sweep.points) for sweep in able)
     # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
     began = perf_counter() - max(before, default=0.0)
     interrupted = False
 
     def tell(what: str) -> None:
-        if progress:
-            progress(min(perf_counter() - began, budget), budget, what)
+        if kept.progress:
+            kept.progress(min(perf_counter() - began, budget), budget, what)
 
     try:
         while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
             _level(ready, known, tell)
             for sweep in ready:
-                name = str(sweep.label)
-                pieces.keep(of_points(scene, name, sweep.points, perf_counter() - began))
+                form = points_of(scene)
+                kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
     except KeyboardInterrupt:
         interrupted = True
     why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
@@ -125,23 +118,22 @@ def study(
         budget=budget,
         seconds=perf_counter() - began,
         interrupted=interrupted,
-        machine=origin([sweep.label for sweep in sweeps]),
+        machine=keeper.origin([sweep.label for sweep in sweeps]),
         tick=tick(),
         taken_up=taken_up,
     )
 
 
-def _take_up(sweep: Sweep, pieces: Pieces) -> float:
+def _take_up(sweep: Sweep, kept: Keeper) -> float:
     """Go on where an earlier call ended -> the seconds that it had taken."""
-    table = pieces.finished(table_name(str(sweep.label)))
-    if table is None:
+    points = kept.finished(POINTS, str(sweep.label))
+    if points is None:
         return 0.0
-    points, seconds = to_points(table)
     for point in points:
         # what the end of that call cut off is this one's to measure
         if point.outcome != CUT_OFF:
             take(sweep, point)
-    return seconds
+    return float(kept.attribute(POINTS, str(sweep.label), "study_seconds"))
 
 
 def record(
@@ -160,13 +152,27 @@ def record(
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
-    with store.open_new(path, command("precision", labels, scene.text), force=force) as journal:
-        found = study(scene, labels, budget=budget, progress=progress, pieces=Pieces(journal))
-        for table in found.tables():
-            journal.add(table)
-        text = json.dumps(found.document(), allow_nan=False)
-        journal.commit(scene, documents={DOCUMENT: text}, final=not found.interrupted)
+    command = keeper.command("precision", labels, scene.text)
+    with keeper.kept(path, command, force=force, progress=progress) as kept:
+        found = study(scene, labels, budget=budget, kept=kept)
+        for summary in found.methods:
+            form = points_of(scene)
+            kept.keep(form, summary.method, found.of(summary.method), study_seconds=found.seconds)
+        kept.add(found.summary())
+        kept.commit("precision", found.document(), scene, final=not found.interrupted)
     return found
+
+
+def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
+    """What `springcheck precision` does."""
+    budget = BUDGET if options.budget is None else options.budget
+    if not (isfinite(budget) and budget > 0):
+        raise SpringcheckError(f"--budget {budget}: a number of seconds above 0 is needed")
+    scene = scenefile.load_scene(options.scene)
+    labels, left = choose(scene, options.method)
+    path = Path(options.output or f"{scene.name}-precision.h5")
+    found = record(scene, labels, path, budget=budget, force=options.force, progress=progress)
+    return replace(found, left_out=tuple(left), path=path)
 
 
 def _open(sweeps: list[Sweep]) -> list[Sweep]:
@@ -205,10 +211,12 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         scene.step,
         scene.every,
         scheme=SCHEMES[sweep.method.scheme],
-        judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
+        judged=mechanics.in_single(known.scene) if sweep.arithmetic.parameters == "single" else None,
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
     if outcome.status != "complete":
         message = f"after {outcome.step} steps: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
@@ -298,33 +306,33 @@ def _time(clocks: list[_Clock]) -> None:
                 clock.turn(number)
 
 
-def stored(path: str | Path, scene: Scene) -> PrecisionStudy:
-    """The study that `record` has kept, of this scene.  StoreError where the file holds none."""
-    known = json.loads(store.document(path, DOCUMENT))
-    tables = store.read_tables(path)
+def stored(path: str | Path) -> PrecisionStudy:
+    """The study that `record` has kept.  StoreError where the file holds none."""
+    return keeper.restored(path, "precision", _restored)
+
+
+def _restored(kept: keeper.Kept) -> PrecisionStudy:
+    scene, known = kept.scene, kept.document
     points: list[Point] = []
     methods = []
-    try:
-        for one in known["methods"]:
-            own, _ = to_points(tables[table_name(one["method"])])
-            how = one["floor_condition"]
-            condition = fits.Condition(**how) if how else None
-            points += own
-            methods.append(
-                _summary(scene, engines.parse(one["method"]), own, condition, one["first_start_seconds"])
-            )
-        return _put_together(
-            scene,
-            points,
-            methods,
-            budget=known["budget_seconds"],
-            seconds=known["seconds"],
-            interrupted=known["interrupted"],
-            machine=known["machine"],
-            tick=known["clock_seconds"],
+    for one in known["methods"]:
+        own = kept.found(POINTS, one["method"])
+        how = one["floor_condition"]
+        condition = fits.Condition(**how) if how else None
+        points += own
+        methods.append(
+            _summary(scene, engines.parse(one["method"]), own, condition, one["first_start_seconds"])
         )
-    except (KeyError, TypeError, ValueError) as error:
-        raise StoreError(f"{path}: its study of precision lacks {error}; measure it anew") from error
+    return _put_together(
+        scene,
+        points,
+        methods,
+        budget=known["budget_seconds"],
+        seconds=known["seconds"],
+        interrupted=known["interrupted"],
+        machine=known["machine"],
+        tick=known["clock_seconds"],
+    )
 
 
 def _put_together(

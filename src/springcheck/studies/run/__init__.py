@@ -1,1 +1,28 @@
 """The main job: a scene by all its methods, stored, compared and judged."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+
+from springcheck.studies.study import Study, scene_option, store_options
+
+
+def _options(parser: ArgumentParser) -> None:
+    scene_option(parser, nargs="?")
+    store_options(parser)
+    parser.add_argument(
+        "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
+    )
+    parser.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
+    parser.add_argument(
+        "--thorough", action="store_true", help="add the experiments: order, reversal, rounding"
+    )
+
+
+STUDY = Study(
+    name="run",
+    about="run a scene by every method, compare, store, judge",
+    options=_options,
+    trajectories=True,
+    keeps=lambda options: options.source is None,
+)

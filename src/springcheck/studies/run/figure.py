@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from springcheck.arrays import Floats, Reals
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.physics import exact
+from springcheck.physics import exact, mechanics
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
+from springcheck.studies.run.result import Stored
 from springcheck.trajectory import Trajectory
 
 UNITS = {
@@ -39,14 +40,20 @@ DECADES = 100.0
 """Ratio of largest to smallest energy from which the scale is logarithmic."""
 
 
-def draw(
+def draw(found: Stored, folder: Path) -> list[Path]:
+    """Draw the trajectories of a store into a folder; returns the files."""
+    shown = found.drawable
+    return draw_runs(shown.scene, shown.runs, folder, followed=shown.followed)
+
+
+def draw_runs(
     scene: Scene,
     runs: Mapping[str, Trajectory],
     folder: Path,
     *,
     followed: Mapping[str, Trajectory] | None = None,
 ) -> list[Path]:
-    """Draw all figures of a store into a folder; returns the files (see `pictures`)."""
+    """Draw all figures of trajectories into a folder; returns the files (see `pictures`)."""
     if not any(len(run.t) > 1 for run in runs.values()):
         return []
     written = []
@@ -228,15 +235,15 @@ def _energy(scene: Scene, groups: Sequence[Group]) -> Figure:
     _, _, t_unit, e_unit = _units(scene)
     figure = Figure(figsize=(7.6, 6.2), layout="constrained")
     upper, lower = figure.subplots(2, sharex=True)
-    start = float(scene.system.energy(scene.q, scene.p))
+    start = float(mechanics.energy(scene, scene.q, scene.p))
     unit = abs(start) or 1.0
 
-    damped = scene.system.is_damped
+    damped = mechanics.is_damped(scene)
     truth = true_motion(scene, _all(groups)) if damped else None
 
     def energies(q: Reals, p: Reals) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(scene.system.energy(q, p), np.float64)
+            return np.asarray(mechanics.energy(scene, q, p), np.float64)
 
     def right(run: Trajectory) -> Floats | float:
         if truth is None:

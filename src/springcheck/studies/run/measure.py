@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from argparse import Namespace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import checks, compare, engines, simulate, store
+from springcheck import checks, compare, engines, simulate
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, StoreError
-from springcheck.physics import exact
-from springcheck.physics import scenefile as scenes
+from springcheck.errors import MethodError, SpringcheckError, StoreError
+from springcheck.physics import exact, mechanics, scenefile
 from springcheck.physics.scene import Scene
-from springcheck.provenance import command
-from springcheck.trajectory import Comparison, Timing, Trajectory, Verdict
+from springcheck.studies import keeper
+from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
+from springcheck.studies.study import Progress
+from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
@@ -34,84 +36,31 @@ LONG_PIECE = PIECE // 4
 seconds in all.  A slip between two pieces shows in the closed form of every piece after it, however short."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """One line of the report."""
-
-    method: str
-    scheme: str
-    outcome: str
-    step: int
-    message: str
-    max_error: float
-    """Largest distance from the true motion (`Norm`); NaN where that is not known."""
-    energy_drift: float
-    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
-    timing: Timing
-    force_calls: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOut:
-    """A method that was not run, or a part of a scene's report that was not made, and why."""
-
-    method: str
-    reason: str
+def perform(options: Namespace, progress: Progress | None) -> Report | Repeats:
+    """What `springcheck run` does."""
+    if (options.scene is None) == (options.source is None):
+        raise SpringcheckError(
+            "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
+        )
+    if options.source is not None:
+        return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
+    scene = scenefile.load_scene(options.scene)
+    return run(
+        scene,
+        Path(options.output or f"{scene.name}.h5"),
+        methods=options.method,
+        force=options.force,
+        thorough=options.thorough,
+        progress=progress,
+    )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
-    """Everything that `springcheck run` says."""
-
-    scene: Scene
-    path: Path
-    runs: tuple[Run, ...]
-    left_out: tuple[LeftOut, ...]
-    verdicts: tuple[Verdict, ...]
-    comparison: Comparison
-    same: tuple[compare.Same, ...]
-    judged_frames: int
-    """Frames of each run that were judged: all of them, unless the run is very long."""
-    resumed: tuple[str, ...] = ()
-
-    @property
-    def status(self) -> Literal[0, 1, 2]:
-        """Exit status: 0 all passed, 1 some verdict failed, 2 nothing was measured."""
-        judged = [verdict.passed for verdict in self.verdicts if verdict.passed is not None]
-        if not judged:
-            return 2
-        return 0 if all(judged) else 1
-
-
-def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut]]:
-    """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
-
-    Raises MethodError when a method that is named in full cannot run: it was asked for.
-    """
-    named = tuple(patterns) or scene.include
-    chosen: list[Label] = []
-    left: list[LeftOut] = []
-    try:
-        matched = engines.match(named)
-    except MethodError as error:
-        if patterns:
-            raise
-        raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
-    for label in matched:
-        reason = engines.refusal(scene, label) or engines.absence(label.engine)
-        if reason is None:
-            chosen.append(label)
-        elif str(label) in patterns:
-            raise MethodError(f"{label} cannot run scene {scene.name}: {reason}")
-        else:
-            left.append(LeftOut(method=str(label), reason=reason))
-    if not chosen:
-        raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
-    return chosen, left
-
-
-Started = Callable[[Label, int], simulate.Progress | None]
-"""Told of each run before it starts, with its number of steps; returns where its progress goes."""
+def stored(path: Path) -> Stored:
+    """What a store keeps of a run beside its trajectories."""
+    # an unfinished run has trajectories beside the file that it will write
+    return Stored(
+        path=path, **(keeper.judged(path) if path.is_file() else {"verdicts": (), "comparison": None})
+    )
 
 
 def run(
@@ -121,7 +70,7 @@ def run(
     methods: Sequence[str] = (),
     force: bool = False,
     thorough: bool = False,
-    started: Started | None = None,
+    progress: Progress | None = None,
 ) -> Report:
     """Run, compare, store, judge.  Work that an interrupted call has stored is taken up.
 
@@ -132,19 +81,17 @@ def run(
     """
     path = Path(path)
     labels, left = choose(scene, methods)
-    with store.open_new(path, command("run", labels, scene.text), force=force) as journal:
-        resumed = journal.finished()
-        store.room(path, store.size(scene) * (len(labels) - len(resumed)))
+    bar = _Bar(progress, len(labels) * (1 + thorough))
+    with keeper.kept(path, keeper.command("run", labels, scene.text), force=force) as kept:
+        resumed = kept.runs()
+        kept.room(scene, len(labels) - len(resumed))
         for label in tuple(labels):
             if str(label) in resumed:
                 continue
-            progress = started(label, scene.steps) if started else None
             try:
-                with journal.draft(str(label), scene) as draft:
-                    record = simulate.play(scene, label, draft.append, progress=progress)
-                    empty = np.empty(0)
-                    whole = simulate.trajectory(record, empty, empty, empty, None)
-                    draft.finish(store.attributes(whole))
+                with kept.draft(label, scene) as draft:
+                    told = bar.of(label, scene.steps)
+                    draft.finish(simulate.play(scene, label, draft.append, progress=told))
             except MethodError as error:
                 # what only shows as an engine starts; a method that was asked for by name must not go missing
                 if str(label) in methods or len(labels) == 1:
@@ -152,19 +99,41 @@ def run(
                 labels.remove(label)
                 left.append(LeftOut(method=str(label), reason=str(error)))
         names = tuple(str(label) for label in labels)
-        sources = journal.sources()
+        sources = kept.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
         if thorough:
-            report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, started)))
-        journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
+            report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
+        kept.commit_run(scene, report.comparison, report.verdicts)
     return report
 
 
-def _experiments(scene: Scene, labels: Sequence[Label], started: Started | None) -> list[Verdict]:
+class _Bar:
+    """Progress over several methods, each a part of the whole."""
+
+    def __init__(self, progress: Progress | None, parts: int) -> None:
+        self._progress, self._parts, self._begun = progress, parts, -1
+
+    def of(self, label: Label, size: int) -> simulate.Progress | None:
+        """Where the progress of the next part goes, in units of `size` for all of it."""
+        if self._progress is None:
+            return None
+        self._begun += 1
+        told, before, done = self._progress, self._begun, 0
+        told(before, self._parts, str(label))
+
+        def step(more: int) -> None:
+            nonlocal done
+            done += more
+            told(before + done / size, self._parts, str(label))
+
+        return step
+
+
+def _experiments(scene: Scene, labels: Sequence[Label], bar: _Bar) -> list[Verdict]:
     """The verdicts of the experiments with every method."""
     found: list[Verdict] = []
     for label in labels:
-        progress = started(label, len(checks.THOROUGH)) if started else None
+        progress = bar.of(label, len(checks.THOROUGH))
         found += checks.judge_thoroughly(scene, str(label), simulate.run, progress=progress)
     return found
 
@@ -188,7 +157,7 @@ def judge(
     tallies = {name: _Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last: dict[str, Trajectory] = {}
-    streams = {name: store.windows(source, name, rows, stride) for name, source in sources.items()}
+    streams = {name: keeper.windows(source, name, rows, stride) for name, source in sources.items()}
     for pieces in _together(streams):
         judged_frames += max(len(piece.t) for piece in pieces.values())
         for name, piece in pieces.items():
@@ -235,9 +204,9 @@ class _Tally:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._norm = scene.system.norm
+        self._norm = mechanics.norm(scene)
         self._known = exact.has_true_motion(scene)
-        self._start = float(scene.system.energy(scene.q, scene.p))
+        self._start = float(mechanics.energy(scene, scene.q, scene.p))
         self.error = 0.0 if self._known else np.nan
         self.drift = 0.0
 
@@ -251,71 +220,56 @@ class _Tally:
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
         with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - self._start
+            off: Floats = np.asarray(mechanics.energy(scene, piece.q, piece.p), np.float64) - self._start
         worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
 
 
-def _line(piece: Trajectory, tally: _Tally) -> Run:
-    return Run(
+def _line(piece: Trajectory, tally: _Tally) -> MethodRun:
+    return MethodRun(
         method=piece.label,
         scheme=piece.scheme,
         outcome=piece.outcome.status,
-        step=piece.outcome.step,
+        steps=piece.outcome.step,
         message=piece.outcome.message,
         max_error=tally.error,
         energy_drift=tally.drift,
-        timing=piece.timing,
+        start_seconds=piece.timing.start,
+        run_seconds=piece.timing.run,
         force_calls=piece.force_calls,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Repeat:
-    """A stored trajectory beside its repetition."""
-
-    method: str
-    equal: bool
-    """Bit for bit, by the digests."""
-    difference: float
-    """Largest, in units of the start; NaN where the two do not have the same frames."""
-    changed: tuple[str, ...]
-    """Versions that are not what they were, as ``numpy 2.0.1 -> 2.4.6``."""
-
-
-def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None = None) -> list[Repeat]:
+def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None = None) -> list[Repeat]:
     """Run every trajectory of a store again, and say whether the numbers are the same bit for bit.
 
     `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
     """
-    stored = {run.label: run for run in store.summary(path).runs}
-    chosen = [label for label in stored if not methods or any(fnmatchcase(label, m) for m in methods)]
-    if not stored:
+    known = {run.label: run for run in keeper.summary(path).runs}
+    chosen = [label for label in known if not methods or any(fnmatchcase(label, m) for m in methods)]
+    if not known:
         raise StoreError(f"{path}: holds no trajectory to run again")
     if not chosen:
-        raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(stored)}")
-    scene = stored_scene(path)
+        raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(known)}")
+    scene = keeper.stored_scene(path)
     found = []
     beside = path.absolute().parent
     # where there was room for the store there is room for its repetition, unless it is kept read-only
     place = beside if os.access(beside, os.W_OK) else None
     with tempfile.TemporaryDirectory(dir=place, prefix=".springcheck-") as folder:
         again = Path(folder) / "again.h5"
-        with store.open_new(again, "repeat") as journal:
+        with keeper.kept(again, "repeat") as kept:
+            bar = _Bar(progress, len(chosen))
             for name in chosen:
-                before = stored[name].parameters
+                before = known[name].parameters
                 label = engines.parse(name)
-                kept = ("q", "p", "energy") if "energy" in stored[name].quantities else ("q", "p")
-                mine = replace(scene, quantities=kept)
-                progress = started(label, scene.steps) if started else None
-                with journal.draft(name, mine) as draft:
-                    record = simulate.play(mine, label, draft.append, progress=progress)
-                    empty = np.empty(0)
-                    digest = draft.finish(
-                        store.attributes(simulate.trajectory(record, empty, empty, empty, None))
-                    )
-                source = journal.sources()[name]
+                quantities = ("q", "p", "energy") if "energy" in known[name].quantities else ("q", "p")
+                mine = replace(scene, quantities=quantities)
+                with kept.draft(label, mine) as draft:
+                    record = simulate.play(mine, label, draft.append, progress=bar.of(label, scene.steps))
+                    digest = draft.finish(record)
+                source = kept.sources()[name]
                 found.append(
                     Repeat(
                         method=name,
@@ -332,91 +286,11 @@ def repeat(path: Path, *, methods: Sequence[str] = (), started: Started | None =
 
 
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
-    norm = scene.system.norm
+    norm = mechanics.norm(scene)
     worst = 0.0
     rows = max(2, PIECE // scene.n)
-    for a, b in zip_longest(store.windows(one, label, rows), store.windows(other, label, rows)):
+    for a, b in zip_longest(keeper.windows(one, label, rows), keeper.windows(other, label, rows)):
         if a is None or b is None or len(a.t) != len(b.t):
             return float("nan")
         worst = float(np.maximum(worst, np.max(norm(a.q - b.q, a.p - b.p))))
     return worst
-
-
-def stored_scene(path: Path) -> Scene:
-    """The scene of a store, parsed from the text that it keeps."""
-    name = str(store.summary(path).root.get("scene_name", path.stem))
-    return scenes.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
-
-
-def document(report: Report) -> dict[str, Any]:
-    """The report as plain data for JSON; what is not a finite number is None."""
-    return {
-        "scene": report.scene.name,
-        "store": str(report.path),
-        "runs": [
-            {
-                "method": run.method,
-                "scheme": run.scheme,
-                "outcome": run.outcome,
-                "steps": run.step,
-                "max_error": number(run.max_error),
-                "energy_drift": number(run.energy_drift),
-                "start_seconds": number(run.timing.start),
-                "run_seconds": number(run.timing.run),
-                "force_calls": run.force_calls,
-            }
-            for run in report.runs
-        ],
-        "judged_frames": report.judged_frames,
-        "left_out": [{"method": left.method, "reason": left.reason} for left in report.left_out],
-        "verdicts": [verdict_document(verdict) for verdict in report.verdicts],
-        "comparison": {
-            "labels": list(report.comparison.labels),
-            "max_difference": [[number(x) for x in row] for row in report.comparison.max_difference.tolist()],
-        },
-        "same_motion": [
-            {"labels": list(same.labels), "difference": same.difference, "allowed": number(same.allowed)}
-            for same in report.same
-        ],
-    }
-
-
-def repeat_document(found: Sequence[Repeat]) -> dict[str, Any]:
-    """Repetitions as plain data for JSON."""
-    return {
-        "repeats": [
-            {
-                "method": one.method,
-                "equal": one.equal,
-                "difference": number(one.difference),
-                "changed": list(one.changed),
-            }
-            for one in found
-        ]
-    }
-
-
-def verdict_document(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as plain data for JSON."""
-    return {
-        "method": verdict.method,
-        "check": verdict.check,
-        "value": number(verdict.value),
-        "bound": number(verdict.bound),
-        "unit": verdict.unit,
-        "passed": verdict.passed,
-        "why": verdict.why,
-    }
-
-
-def number(x: float) -> float | None:
-    """A finite number, or None: JSON has no infinity."""
-    return float(x) if np.isfinite(x) else None
-
-
-def read(path: str | Path) -> dict[str, Trajectory]:
-    """The trajectories of a store by label.  StoreError where it cannot be read."""
-    found = store.read(path)
-    if not found:
-        raise StoreError(f"{path}: holds no trajectories")
-    return found

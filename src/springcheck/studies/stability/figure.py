@@ -11,7 +11,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.studies.stability.measure import Cost, Limit, Region, Resonance, Stability
+from springcheck.studies.stability.costs import Cost
+from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.regions import Region
+from springcheck.studies.stability.resonance import Resonance
+from springcheck.studies.stability.result import Stability
 
 
 def draw(study: Stability, folder: Path) -> list[Path]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from springcheck.arrays import Extended, Floats
 from springcheck.engines.contract import Label
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
+from springcheck.studies.tables import column
 from springcheck.trajectory import Trajectory
 
 FIRST, LAST, COARSE = 1e-9, 1e6, 4096
@@ -53,7 +54,7 @@ class Limit:
     edge: float
     """Exponent of the growth in the number of steps at the limit itself; NaN where there is none."""
     edge_predicted: float
-    turn: Floats
+    turn: Floats = field(metadata=column("h_w"))
     """h w of the points drawn (j,)."""
     radius: Floats
     """Measured spectral radius there."""

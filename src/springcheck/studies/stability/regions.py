@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from springcheck.arrays import Floats
 from springcheck.engines.contract import Label
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
+from springcheck.studies.tables import column
 
 TURN = (0.05, 20.0)
 """h w from and to."""
@@ -27,9 +28,9 @@ class Region:
     """Measured and predicted spectral radii on a grid."""
 
     method: str
-    turn: Floats
+    turn: Floats = field(metadata=column("h_w"))
     """h w (i,)."""
-    ratio: Floats
+    ratio: Floats = field(metadata=column("damping_ratio"))
     """Damping ratio (j,)."""
     radius: Floats
     """Measured (j, i)."""

@@ -9,7 +9,7 @@ from springcheck import checks, engines, schemes
 from springcheck.physics import scenefile as scenes
 
 
-def catalogue() -> dict[str, Any]:
+def listing() -> dict[str, Any]:
     """Scenes, engines with versions or the reason of their absence, and checks, as plain data."""
     return {
         "scenes": [{"name": name, "title": scenes.load_scene(name).title} for name in scenes.names()],
@@ -42,7 +42,7 @@ def _engine(name: str) -> dict[str, Any]:
 
 
 def lines(found: dict[str, Any]) -> Iterator[str]:
-    """The catalogue as text of 80 columns."""
+    """The list as text of 80 columns."""
     yield "Scenes"
     width = max(len(scene["name"]) for scene in found["scenes"])
     for scene in found["scenes"]:

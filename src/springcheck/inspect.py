@@ -1,0 +1,137 @@
+"""`springcheck inspect`: what is in a store, in bounded memory however long its runs are."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springcheck import store
+from springcheck.studies import STUDIES
+from springcheck.studies.keeper import plain as plainly
+from springcheck.studies.study import Result, Study
+from springcheck.text import Lines, Table, plain, table
+from springcheck.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """What `springcheck inspect` shows."""
+
+    summary: store.Summary
+    studies: tuple[tuple[Study, Result], ...]
+    frames: Trajectory | None
+    """Some frames of the trajectory asked for, all over its length."""
+    stride: int = 1
+
+
+def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
+    """Read what is in a store.  StoreError where it cannot be read or holds no such trajectory."""
+    summary = store.summary(path)
+    frames, stride = store.strided(path, trajectory, rows) if trajectory else (None, 1)
+    return Found(summary=summary, studies=tuple(held(summary)), frames=frames, stride=stride)
+
+
+def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
+    """The studies of a store, each with its result.  StoreError where one of them cannot be read."""
+    for study in STUDIES:
+        if study.held(summary):
+            yield study, study.stored(summary.path)
+
+
+def lines(found: Found, options: Namespace) -> Lines:
+    """The store as text."""
+    summary = found.summary
+    out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
+    if not summary.complete:
+        out.append(plain("unfinished: the command that writes it has not ended", "bold red"))
+    if summary.runs:
+        known = summary.runs[0].parameters
+        out += [
+            plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"),
+            plain(
+                f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
+                f"{known.get('cores')} cores, {known.get('system')}"
+            ),
+            plain(
+                f"  python {known.get('python')}, numpy {known.get('numpy')}, "
+                f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
+            ),
+            _runs(summary),
+        ]
+    out += [plain(f"table {name}") for name in summary.tables]
+    for study, result in found.studies:
+        said = study.lines(result, options)
+        out += [*([] if study.trajectories else [plain()]), *said]
+    if found.frames is not None:
+        out += [plain(), *_frames(found.frames, found.stride)]
+    return out
+
+
+def _runs(summary: store.Summary) -> Table:
+    rows = []
+    for run in summary.runs:
+        known = run.parameters
+        versions = ", ".join(
+            f"{key[7:]} {known[key]}"
+            for key in known
+            if key.startswith("origin.") and key[7:] not in ("engine", "method", "velocity")
+        )
+        outcome, digest = str(known.get("outcome", "")), str(known.get("sha256", ""))[:12]
+        rows.append((run.label, str(run.frames), str(run.n), outcome, versions, digest))
+    titles = ("trajectory", "frames", "n", "outcome", "versions", "sha256")
+    return table(titles, rows, left=("trajectory", "outcome", "sha256"), prose="versions")
+
+
+def _frames(run: Trajectory, stride: int) -> Lines:
+    n = run.q.shape[1]
+    shown = min(n, 3)
+    title = f"{run.label}" + (f", every {stride}th frame" if stride > 1 else "")
+    if n > shown:
+        title += f", the first {shown} of {n} particles"
+    names = [f"{name}{i}" if n > 1 else name for name in ("q", "p") for i in range(shown)]
+    rows = [
+        [repr(float(x)) for x in (t, *q[:shown], *p[:shown])]
+        for t, q, p in zip(run.t, run.q, run.p, strict=True)
+    ]
+    return [plain(title, "italic"), table(("t", *names), rows)]
+
+
+def document(found: Found) -> dict[str, Any]:
+    """The store as plain data for JSON."""
+    summary, frames = found.summary, found.frames
+    documents: dict[str, Any] = {}
+    kept: dict[str, Any] = {"verdicts": ()}
+    for study, result in found.studies:
+        if study.trajectories:
+            kept |= result.document()
+        else:
+            documents[study.name] = result.document()
+    shown = frames and {
+        "label": frames.label, "stride": found.stride, "t": frames.t, "q": frames.q, "p": frames.p,
+    }  # fmt: skip
+    out: dict[str, Any] = plainly(
+        {
+            "store": summary.path,
+            "bytes": summary.size,
+            "complete": summary.complete,
+            "root": summary.root,
+            "trajectories": [
+                {
+                    "label": run.label,
+                    "frames": run.frames,
+                    "particles": run.n,
+                    "quantities": run.quantities,
+                    "parameters": run.parameters,
+                }
+                for run in summary.runs
+            ],
+            "tables": summary.tables,
+            "studies": documents,
+            **kept,
+            "trajectory": shown,
+        }
+    )
+    return out

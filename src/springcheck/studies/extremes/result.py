@@ -1,0 +1,94 @@
+"""What the atlas of extreme cases has found: plain data, and the form in which it is kept."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.extremes.judging import Cell, Outcome
+from springcheck.studies.keeper import plain
+from springcheck.studies.tables import Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """The forces between which a method is right at every h w in `CALM`, as decades of the scene's unit."""
+
+    method: str
+    sentence: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Atlas:
+    """All cells, the windows, and the methods that are not here."""
+
+    cells: tuple[Cell, ...]
+    windows: tuple[Window, ...]
+    left_out: tuple[LeftOut, ...]
+    taken_up: int = 0
+    """Methods that an interrupted call had finished."""
+    path: Path | None = None
+    """Where it was stored."""
+
+    @property
+    def wrong(self) -> tuple[Cell, ...]:
+        """Cells that are silently wrong."""
+        return tuple(cell for cell in self.cells if cell.outcome == "silently wrong")
+
+    @property
+    def passed(self) -> bool:
+        """Whether anything was measured and no cell is silently wrong."""
+        return bool(self.cells) and not self.wrong
+
+    def counts(self, method: str | None = None) -> Counter[str]:
+        """Cells by outcome, of one method or of all."""
+        return Counter(cell.outcome for cell in self.cells if method in (None, cell.method))
+
+    @property
+    def status(self) -> Literal[0, 1]:
+        """Exit status: 0 where `passed`."""
+        return 0 if self.passed else 1
+
+    def document(self, *, cells: bool = True) -> dict[str, Any]:
+        """Plain data for JSON; in a store the tables hold the cells, and hold them exactly."""
+        found: dict[str, Any] = plain(
+            {
+                "passed": self.passed,
+                "counts": self.counts(),
+                **({"cells": self.cells} if cells else {}),
+                "windows": self.windows,
+                "left_out": self.left_out,
+            }
+        )
+        return found
+
+
+def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:
+    """Outcomes, numbered, over decades of force and of h w, where cells have both."""
+    found = {"outcome_number": np.array([OUTCOMES.index(cell.outcome) for cell in cells], np.int8)}
+    for name in ("force", "h_w"):
+        values = np.array([cell.parameters.get(name, np.nan) for cell in cells], np.float64)
+        found[f"log10_{name}"] = np.log10(np.where(np.isfinite(values) & (values > 0), values, np.nan))
+    return found
+
+
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+
+CELLS: Rows[Cell] = Rows(
+    kind=Cell,
+    beginning="extremes/",
+    named="",
+    signal="outcome_number",
+    axes=("log10_force", "log10_h_w"),
+    about="outcome_number: " + ", ".join(f"{i} {text}" for i, text in enumerate(OUTCOMES)),
+    extra=_for_viewers,
+)
+"""A table for each method."""

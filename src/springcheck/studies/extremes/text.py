@@ -1,0 +1,43 @@
+"""The report of the atlas of extreme cases as text."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from springcheck.studies.extremes.result import Atlas
+from springcheck.studies.text import left_out, taken_up
+from springcheck.text import Lines, plain, table
+
+SHORT = {
+    "right": "right",
+    "unstable, as theory says": "unstable",
+    "engine's limit": "limit",
+    "refused": "refused",
+    "silently wrong": "wrong",
+}
+"""Outcomes, and their columns."""
+
+
+def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:
+    """The whole report."""
+    rows = []
+    for method in dict.fromkeys(cell.method for cell in atlas.cells):
+        counts = atlas.counts(method)
+        rows.append((method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in SHORT)))
+    wrong = atlas.wrong
+    verdict = f"{len(wrong)} cells silently wrong" if wrong else "no cell is silently wrong"
+    out: Lines = [
+        plain(f"{len(atlas.cells)} extreme cases", "bold"),
+        *taken_up(atlas.taken_up, "tables of cells"),
+        plain(),
+        table(("method", "cells", *SHORT.values()), rows),
+        plain(),
+        *(plain(window.sentence) for window in atlas.windows),
+        *(
+            plain(f"silently wrong: {cell.method} {cell.parameters}: {cell.reason}", "bold red")
+            for cell in wrong[:20]
+        ),
+        plain(verdict, "bold red" if wrong else "bold green"),
+        *left_out(atlas.left_out),
+    ]
+    return [*out, plain(f"Stored in {atlas.path}")] if atlas.path else out

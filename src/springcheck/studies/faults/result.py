@@ -1,0 +1,62 @@
+"""What the study of the faults has found: plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from springcheck.studies.keeper import plain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What the checks say of one fault."""
+
+    name: str
+    about: str
+    size: float | None
+    rejected_by: tuple[str, ...]
+    missed_by: tuple[str, ...]
+    """Checks that should have rejected it and did not."""
+    limits: dict[str, float]
+    """Smallest size that each check rejects."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clean:
+    """Right engines: trajectories judged, verdicts passed on them, and those that were false alarms."""
+
+    runs: int
+    verdicts: int
+    alarms: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultReport:
+    """The whole study."""
+
+    results: tuple[Result, ...]
+    clean: Clean
+
+    @property
+    def sound(self) -> bool:
+        """Every fault was rejected by every check that must reject it, and nothing else was."""
+        return not self.clean.alarms and not any(result.missed_by for result in self.results)
+
+    @property
+    def status(self) -> Literal[0, 1]:
+        """Exit status: 0 where `sound`."""
+        return 0 if self.sound else 1
+
+    def document(self) -> dict[str, Any]:
+        """As one JSON document."""
+        names = ("name", "about", "size", "rejected_by", "missed_by")
+        found: dict[str, Any] = {
+            "faults": [{name: getattr(result, name) for name in names} for result in self.results],
+            "limits": {result.name: result.limits for result in self.results if result.limits},
+            "clean_runs": self.clean.runs,
+            "clean_verdicts": self.clean.verdicts,
+            "false_alarms": self.clean.alarms,
+        }
+        document: dict[str, Any] = plain(found)
+        return document

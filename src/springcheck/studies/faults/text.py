@@ -1,0 +1,39 @@
+"""The report of the negative controls as text."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from springcheck.studies.faults.result import FaultReport
+from springcheck.text import Lines, plain, table
+
+
+def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
+    """Every fault with what rejects it and the smallest size that is seen; the right engines' runs."""
+    rows = []
+    for result in found.results:
+        limit = min(result.limits.values(), default=None)
+        rows.append(
+            (
+                plain(result.name, "bold red" if result.missed_by else ""),
+                "" if result.size is None else f"{result.size:.0e}",
+                "" if limit is None else f"{limit:.1e}",
+                ", ".join(result.rejected_by),
+            )
+        )
+    clean = found.clean
+    rejected = sum(bool(result.rejected_by) for result in found.results)
+    return [
+        table(("fault", "size", "seen from", "rejected by"), rows, left=("fault",), prose="rejected by"),
+        plain(),
+        *(
+            plain(f"FAILED {result.name}: not rejected by {', '.join(result.missed_by)}", "bold red")
+            for result in found.results
+            if result.missed_by
+        ),
+        *(plain(f"FALSE ALARM {alarm}", "bold red") for alarm in clean.alarms),
+        plain(
+            f"{rejected} of {len(found.results)} faults rejected; {clean.runs} clean runs, "
+            f"{clean.verdicts} verdicts, {len(clean.alarms)} false alarms"
+        ),
+    ]

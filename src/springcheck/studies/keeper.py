@@ -1,0 +1,261 @@
+"""What studies keep: their only way to a store, to the pieces of an interrupted call, and to JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+
+from springcheck import engines, simulate, store
+from springcheck.engines.contract import Label
+from springcheck.errors import StoreError
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.studies.study import Progress
+from springcheck.studies.tables import Form
+from springcheck.trajectory import Comparison, Trajectory, Verdict
+
+__all__ = [
+    "Keeper",
+    "Kept",
+    "Piece",
+    "Table",
+    "command",
+    "each",
+    "kept",
+    "origin",
+    "plain",
+    "read",
+    "restored",
+]
+
+T = TypeVar("T")
+Table = store.Table
+
+windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
+"""Trajectories of a store, read in pieces."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """A part of a study that is measured by itself, and kept as one table."""
+
+    key: str
+    """Its name among the pieces of its form."""
+    what: str
+    """Its name for people."""
+    measure: Callable[[], Any]
+    form: Form[Any]
+
+    @property
+    def name(self) -> str:
+        """Of its table."""
+        return self.form.beginning + self.key
+
+
+def each(
+    labels: Iterable[Label], what: str, measure: Callable[[Label], Callable[[], Any]], form: Form[Any]
+) -> list[Piece]:
+    """One piece for each method; `measure(label)` is what measures it."""
+    named = [(label, f"{what} {label}".strip()) for label in labels]
+    return [Piece(key=str(label), what=name, measure=measure(label), form=form) for label, name in named]
+
+
+class Keeper:
+    """What an earlier call has finished, and where this one keeps what it finishes.
+
+    Without a journal nothing was finished and nothing is kept.
+    """
+
+    def __init__(self, journal: store.Journal | None = None, progress: Progress | None = None) -> None:
+        self._journal = journal
+        self._finished = journal.tables() if journal else {}
+        self.progress = progress
+        self.names: list[str] = []
+        """Names of the tables of the pieces, in the order in which they were asked for."""
+        self.taken_up = 0
+        """Pieces that were not measured again."""
+
+    def finished(self, form: Form[Any], key: str) -> Any:
+        """What an earlier call has kept under this key, or None."""
+        table = self._finished.get(form.beginning + key)
+        return None if table is None else form.found(table)
+
+    def attribute(self, form: Form[Any], key: str, name: str) -> Any:
+        """An attribute of such a table."""
+        return self._finished[form.beginning + key].attributes[name]
+
+    def keep(self, form: Form[Any], key: str, found: Any, **attributes: Any) -> None:
+        """Keep a result, in the place of an earlier one of its key: from here on it outlives crashes."""
+        self.add(form.table(key, found, **attributes))
+
+    def add(self, table: Table) -> None:
+        """Keep a table that is no result."""
+        if self._journal is not None:
+            self._journal.add(table)
+
+    def results(self, pieces: Sequence[Piece]) -> list[Any]:
+        """The results of these pieces, in their order: taken up where finished, else measured and kept."""
+        found = []
+        for done, piece in enumerate(pieces):
+            if self.progress:
+                self.progress(done, len(pieces), piece.what)
+            self.names.append(piece.name)
+            result = self.finished(piece.form, piece.key)
+            if result is None:
+                result = piece.measure()
+                self.keep(piece.form, piece.key, result)
+            else:
+                self.taken_up += 1
+            found.append(result)
+        return found
+
+    def runs(self) -> tuple[str, ...]:
+        """Labels of the trajectories that are finished."""
+        return self._writing.finished()
+
+    def sources(self) -> dict[str, Path]:
+        """Label of each finished trajectory -> the file that holds it."""
+        return self._writing.sources()
+
+    def room(self, scene: Scene, runs: int) -> None:
+        """StoreError where there is no space for so many trajectories of a scene."""
+        store.room(self._writing.path, store.size(scene) * runs)
+
+    @contextmanager
+    def draft(self, label: Label, scene: Scene) -> Iterator[Draft]:
+        """A writer of one trajectory."""
+        with self._writing.draft(str(label), scene) as draft:
+            yield Draft(draft)
+
+    def commit_run(self, scene: Scene, comparison: Comparison, verdicts: Sequence[Verdict]) -> None:
+        """Put the trajectories and what was found of them into the store."""
+        self._writing.commit(scene, comparison=comparison, verdicts=verdicts)
+
+    @property
+    def _writing(self) -> store.Journal:
+        assert self._journal is not None, "trajectories are kept in a store"
+        return self._journal
+
+    def commit(
+        self, name: str, document: Mapping[str, Any], scene: Scene | None = None, *, final: bool = True
+    ) -> None:
+        """Put everything that was kept, and the study's document, into the store."""
+        if self._journal is not None:
+            text = json.dumps(document, allow_nan=False)
+            self._journal.commit(scene, documents={name: text}, final=final)
+
+
+class Draft:
+    """A trajectory that is being written."""
+
+    def __init__(self, draft: store.Draft) -> None:
+        self._draft = draft
+        self.append = draft.append
+
+    def finish(self, record: simulate.Record) -> str:
+        """Keep it, with what is known of the run -> digest."""
+        if record.outcome.status == "interrupted":
+            raise KeyboardInterrupt
+        empty = np.empty(0)
+        return self._draft.finish(store.attributes(simulate.trajectory(record, empty, empty, empty, None)))
+
+
+@contextmanager
+def kept(
+    path: str | Path, command: str, *, force: bool = False, progress: Progress | None = None
+) -> Iterator[Keeper]:
+    """A study that is kept in a store; an unfinished one of the same command is taken up.
+
+    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    """
+    with store.open_new(path, command, force=force) as journal:
+        yield Keeper(journal, progress)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """A study in a store: its document, and its tables by name."""
+
+    path: Path
+    document: Any
+    tables: Mapping[str, store.Table]
+
+    def found(self, form: Form[Any], key: str) -> Any:
+        """The result of this key.  KeyError where it is missing."""
+        return form.found(self.tables[form.beginning + key])
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that was studied."""
+        return stored_scene(self.path)
+
+
+def restored(path: str | Path, name: str, build: Callable[[Kept], T]) -> T:
+    """A study of a store.  StoreError where the file holds none, or a part of it is missing."""
+    text = store.document(path, name)
+    try:
+        kept = Kept(path=Path(path), document=json.loads(text), tables=store.read_tables(path))
+        return build(kept)
+    except json.JSONDecodeError as error:
+        raise StoreError(f"{path}: the document of its study is no JSON: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
+
+
+def stored_scene(path: Path) -> Scene:
+    """The scene of a store, parsed from the text that it keeps."""
+    name = str(store.summary(path).root.get("scene_name", path.stem))
+    return scenefile.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
+
+
+def origin(labels: Iterable[Label]) -> dict[str, str]:
+    """The machine, and the versions of everything that these methods run on."""
+    found = {name: str(value) for name, value in store.machine().items()}
+    for name in sorted({label.engine for label in labels}):
+        distribution = engines.engine(name).distribution
+        if distribution and engines.absence(name) is None:
+            found[distribution] = engines.installed_version(name)
+    return found
+
+
+def command(study: str, labels: Sequence[Label], *options: str) -> str:
+    """All that decides the numbers of a study, by which its journal is recognised.
+
+    The machine and the versions are part of it: times of two machines, limits of two releases of an
+    engine, do not belong into one file.
+    """
+    versions = [f"{name} {version}" for name, version in origin(labels).items()]
+    return "\n".join([study, *map(str, labels), *versions, *options])
+
+
+def plain(data: Any) -> Any:
+    """Results as plain data for JSON: dataclasses are objects, arrays lists; no finite number is None."""
+    return msgspec.json.decode(msgspec.json.encode(data, enc_hook=_plain))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def read(path: str | Path) -> dict[str, Trajectory]:
+    """The trajectories of a store by label.  StoreError where it cannot be read."""
+    found = store.read(path)
+    if not found:
+        raise StoreError(f"{path}: holds no trajectories")
+    return found
+
+
+def judged(path: Path) -> dict[str, Any]:
+    """Verdicts and comparison of a store."""
+    return {"verdicts": store.verdicts(path), "comparison": store.comparison(path)}

@@ -1,0 +1,106 @@
+"""The report of a study of precision as text."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Sequence
+
+from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
+from springcheck.studies.text import left_out, taken_up
+from springcheck.text import Lines, Row, Table, duration, plain, seconds, table
+
+
+def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
+    """The whole report; `--points` adds every point."""
+    scene = study.scene
+    done = sum(point.complete for point in study.points)
+    out: Lines = [
+        plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
+        plain(f"  {done} points in {study.seconds:.0f} s on {study.machine['processor']}"),
+        *taken_up(study.taken_up, "points"),
+        plain(),
+        _methods(study.methods),
+    ]
+    for method in study.methods:
+        expected = method.expected_floor
+        if expected and method.condition:
+            steps, error = expected
+            longer = (
+                "" if method.seconds_per_step is None else f", {duration(steps * method.seconds_per_step)}"
+            )
+            out.append(
+                plain(f"  {method.method}: floor expected near {error:.0e}, {steps:.0e} steps{longer} a run")
+            )
+    rest = [point for point in study.points if not point.complete]
+    if rest:
+        out += [plain(), plain("Not measured:")]
+        out += [plain(f"  {point.method} at {_where(point)}: {point.said}") for point in rest]
+    out += [
+        plain(),
+        plain("The cheapest way to an error (largest, of the start):"),
+        _cheapest(study.cheapest),
+    ]
+    if getattr(options, "points", False):
+        out += [plain(), _points(study.points)]
+    if study.interrupted:
+        out.append(plain("Interrupted: every point that was finished is here.", "bold red"))
+    out += left_out(study.left_out)
+    return [*out, plain(f"Stored in {study.path}")] if study.path else out
+
+
+def _methods(methods: Sequence[MethodSummary]) -> Table:
+    rows = [
+        (
+            m.method,
+            "-" if m.order is None else f"{m.order:.4f}({m.order_standard_error:.0e})",
+            "-" if m.floor is None else f"{m.floor:.1e}",
+            "-" if m.floor_ratio is None else f"{m.floor_ratio:.2g}",
+            *map(seconds, (m.seconds_per_step, m.read_seconds_per_step, m.start_seconds)),
+        )
+        for m in methods
+    ]
+    return table(("method", "order", "floor", "/eps*cond", "step", "step, read", "start"), rows)
+
+
+def _cheapest(answers: Sequence[Answer]) -> Table:
+    rows = [
+        (f"{answer.target:.0e}", "none reaches it")
+        if answer.point is None
+        else (
+            f"{answer.target:.0e}",
+            answer.point.method,
+            _where(answer.point),
+            seconds(answer.point.seconds),
+            str(answer.point.force_calls),
+        )
+        for answer in answers
+    ]
+    return table(("error", "method", "at", "run", "force calls"), rows)
+
+
+def _where(point: Point) -> str:
+    if point.tolerance is not None:
+        return f"tolerance {point.tolerance:.0e}"
+    return "-" if point.step is None else f"step {point.step:.3g}"
+
+
+def _points(points: Sequence[Point]) -> Table:
+    rows: list[Row] = []
+    for point in points:
+        where, found = _where(point).replace("tolerance ", "tol "), point.accuracy
+        if found is None:
+            rows.append((plain(point.method), plain(where), plain(point.outcome, "red")))
+            continue
+        cells = (
+            point.method,
+            where,
+            f"{found.largest:.1e}",
+            f"{found.end:.1e}",
+            "-" if found.phase is None else f"{found.phase:+.0e}",
+            f"{found.energy:.0e}",
+            seconds(point.seconds),
+            str(point.force_calls),
+        )
+        rows.append(tuple(map(plain, cells)))
+    return table(("method", "at", "error", "end", "phase", "energy", "run", "calls"), rows)

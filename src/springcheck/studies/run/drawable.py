@@ -1,0 +1,58 @@
+"""What of a stored run is drawn, in bounded memory however long its trajectories are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from springcheck.physics.scene import Scene
+from springcheck.studies import keeper
+from springcheck.trajectory import Trajectory
+
+MOST_FRAMES = 4001
+"""Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
+
+END_FRAMES = 500
+"""Frames at the end of a run whose motion is too fast for that."""
+
+RESOLVED = 0.25
+"""Largest way between two drawn frames, as a part of the whole, that still shows the motion: half a radian
+of an oscillation.  Beyond, lines between them are chords, and a slow wave is seen that is not there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawable:
+    """Trajectories to draw: over their whole length, and the part whose motion can be followed."""
+
+    scene: Scene
+    runs: dict[str, Trajectory]
+    followed: dict[str, Trajectory]
+    notes: list[str]
+    """What was left out."""
+
+
+def drawable(path: Path) -> Drawable:
+    """Scene and trajectories of a store to draw."""
+    summary = keeper.summary(path)
+    runs: dict[str, Trajectory] = {}
+    notes = []
+    fast = False
+    for run in summary.runs:
+        runs[run.label], stride = keeper.strided(path, run.label, MOST_FRAMES)
+        if stride > 1:
+            notes.append(f"{run.label}: every {stride}th of {run.frames} frames is drawn")
+            fast |= not _shows_motion(runs[run.label])
+    followed = runs
+    if fast:
+        followed = {run.label: keeper.end(path, run.label, END_FRAMES) for run in summary.runs}
+        notes.append(f"position and phase portrait: the last {END_FRAMES} frames, energy: the whole run")
+    return Drawable(scene=keeper.stored_scene(path), runs=runs, followed=followed, notes=notes)
+
+
+def _shows_motion(run: Trajectory) -> bool:
+    """Whether its frames stand close enough to be joined by lines."""
+    q = run.q[:, 0] if len(run.q) > 1 else np.zeros(2)
+    with np.errstate(over="ignore"):
+        return bool(np.max(np.abs(np.diff(q))) <= RESOLVED * np.ptp(q))

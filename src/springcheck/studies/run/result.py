@@ -1,0 +1,128 @@
+"""What a run has found: plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from springcheck.compare import Same
+from springcheck.physics.scene import Scene
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.keeper import plain
+from springcheck.studies.run.drawable import Drawable, drawable
+from springcheck.trajectory import Comparison, Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodRun:
+    """One line of the report."""
+
+    method: str
+    scheme: str
+    outcome: str
+    steps: int
+    """Steps that were taken."""
+    message: str
+    max_error: float
+    """Largest distance from the exact solution (`mechanics.Norm`); NaN where that is not known."""
+    energy_drift: float
+    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
+    start_seconds: float
+    run_seconds: float
+    force_calls: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """Everything that `springcheck run` says."""
+
+    scene: Scene
+    path: Path
+    runs: tuple[MethodRun, ...]
+    left_out: tuple[LeftOut, ...]
+    verdicts: tuple[Verdict, ...]
+    comparison: Comparison
+    same: tuple[Same, ...]
+    judged_frames: int
+    """Frames of each run that were judged: all of them, unless the run is very long."""
+    resumed: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> Literal[0, 1, 2]:
+        """Exit status: 0 all passed, 1 some verdict failed, 2 nothing was measured."""
+        judged = [verdict.passed for verdict in self.verdicts if verdict.passed is not None]
+        if not judged:
+            return 2
+        return 0 if all(judged) else 1
+
+    def document(self) -> dict[str, Any]:
+        """The report as plain data for JSON."""
+        found: dict[str, Any] = plain(
+            {
+                "scene": self.scene.name,
+                "store": self.path,
+                "runs": self.runs,
+                "judged_frames": self.judged_frames,
+                "left_out": self.left_out,
+                "verdicts": self.verdicts,
+                "comparison": self.comparison,
+                "same_motion": self.same,
+            }
+        )
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeat:
+    """A stored trajectory beside its repetition."""
+
+    method: str
+    equal: bool
+    """Bit for bit, by the digests."""
+    difference: float
+    """Largest, relative to the initial energy norm; NaN where the two do not have the same frames."""
+    changed: tuple[str, ...]
+    """Versions that are not what they were, as ``numpy 2.0.1 -> 2.4.6``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeats:
+    """Everything that `springcheck run --from` says."""
+
+    repeats: tuple[Repeat, ...]
+
+    @property
+    def status(self) -> Literal[0, 1]:
+        """Exit status: 0 all are equal."""
+        return 0 if all(one.equal for one in self.repeats) else 1
+
+    def document(self) -> dict[str, Any]:
+        """Repetitions as plain data for JSON."""
+        found: dict[str, Any] = plain(self)
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stored:
+    """What a store keeps of a run."""
+
+    path: Path
+    verdicts: tuple[Verdict, ...]
+    comparison: Comparison | None
+    status: int = 0
+
+    @cached_property
+    def drawable(self) -> Drawable:
+        """Its trajectories, as far as they are drawn."""
+        return drawable(self.path)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a picture leaves out."""
+        return self.drawable.notes
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {"verdicts": plain(self.verdicts)}

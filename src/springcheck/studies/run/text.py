@@ -1,0 +1,238 @@
+"""The report of a run as text."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from rich.text import Text
+
+from springcheck.schemes import SCHEMES
+from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
+from springcheck.studies.text import left_out
+from springcheck.text import Lines, Row, Table, plain, seconds, table
+from springcheck.trajectory import Comparison, Verdict
+
+
+def lines(found: Report | Repeats | Stored, options: Namespace | None = None) -> Lines:
+    """What `springcheck run` says, what `run --from` says, and what `inspect` says of a stored run."""
+    verdicts = getattr(options, "verdicts", False)
+    if isinstance(found, Repeats):
+        return [_repeat(one) for one in found.repeats]
+    if isinstance(found, Report):
+        return [*_report(found), *([verdicts_table(found.verdicts)] if verdicts else [])]
+    out: Lines = []
+    if found.verdicts:
+        out += [plain(), plain("Largest value of each check, as a fraction of its bound:")]
+        out += [*matrices(found.verdicts), *failures(found.verdicts)]
+        if verdicts:
+            out.append(verdicts_table(found.verdicts))
+    if found.comparison is not None:
+        out += [plain(), plain("Largest differences, in units of the start:"), _comparison(found.comparison)]
+    return out
+
+
+def _report(report: Report) -> Lines:
+    """The whole report of `springcheck run`."""
+    out: Lines = [_headline(report), plain(), _runs(report.runs)]
+    out.append(plain("error: farthest from the true motion; energy: (H - H0)/|H0| where largest", "dim"))
+    out += [
+        plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
+        for run in report.runs
+        if run.outcome != "complete"
+    ]
+    out += _same_motions(report)
+    out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
+    out += matrices(report.verdicts)
+    out += failures(report.verdicts)
+    out += left_out(report.left_out)
+    if report.judged_frames < report.scene.frames:
+        share = f"{report.judged_frames} of {report.scene.frames} frames"
+        out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
+    out += [plain(), _summary(report)]
+    return out
+
+
+def _headline(report: Report) -> Text:
+    """Title, grid and start of a scene."""
+    scene = report.scene
+    size = "" if scene.n == 1 else f", {scene.n} particles"
+    steps = "1 step" if scene.steps == 1 else f"{scene.steps} steps"
+    return plain(f"{scene.title}: {steps} of {scene.step:g}{size}", "bold")
+
+
+def _runs(runs: Sequence[MethodRun]) -> Table:
+    """One line a method, under the scheme that it runs."""
+    rows: list[Row] = []
+    for scheme in dict.fromkeys(run.scheme for run in runs):
+        rows.append(plain(SCHEMES[scheme].title, "italic"))
+        rows += [
+            (
+                f"  {run.method}",
+                _error(run.max_error),
+                f"{run.energy_drift:+.1e}",
+                seconds(run.start_seconds),
+                seconds(run.run_seconds),
+                plain(run.outcome, "" if run.outcome == "complete" else "red"),
+            )
+            for run in runs
+            if run.scheme == scheme
+        ]
+    titles = ("method", "error", "energy", "start", "run", "outcome")
+    return table(titles, rows, left=("method", "outcome"))
+
+
+def _error(x: float) -> str:
+    """Three digits in eight columns, two where the exponent takes three places."""
+    if np.isnan(x):
+        return "-"
+    return f"{x:.2e}" if x < 1e100 else f"{x:.1e}"
+
+
+def _same_motions(report: Report) -> Lines:
+    """Which trajectories are one motion, and how closely."""
+    if not report.same:
+        return []
+    out: Lines = [plain(), plain("The same motion, to rounding or tolerance:")]
+    for same in report.same:
+        names = " = ".join("true motion" if label == "exact" else label for label in same.labels)
+        out.append(plain(f"  {names}"))
+        far = f"differ by at most {same.difference:.1e} of the start ({same.allowed:.1e} allowed)"
+        out.append(plain(f"    {far if same.difference else 'equal bit for bit'}"))
+    return out
+
+
+SHORT = {
+    "step-defect": "step",
+    "arithmetic": "arith",
+    "closed-form": "closed",
+    "shadow-energy": "shadow",
+    "frequency": "freq",
+    "momentum": "moment",
+    "tolerance": "toler",
+}
+
+
+MAP = {"propagator": "matrix", "determinant": "det", "symplecticity": "sympl", "reversibility": "reverse"}
+"""Experiments with the one-step map; those whose bound is 0 share the column `exact`."""
+
+LAWS = {
+    "order": "order",
+    "order-anharmonic": "order, well",
+    "rounding-bias": "bias",
+    "rounding-growth": "growth",
+    "convergence": "tolerance",
+}
+"""Experiments over many runs."""
+
+EXACT_EXPERIMENTS = frozenset({"mirror", "repeatability"})
+
+
+def ratio(verdict: Verdict) -> float:
+    """Value as a fraction of the bound; infinite where an exact bound is missed."""
+    if verdict.value == 0:
+        return 0.0
+    return verdict.value / verdict.bound if verdict.bound else float("inf")
+
+
+def matrices(verdicts: Sequence[Verdict]) -> Lines:
+    """The checks of the recorded states, and below them the experiments where there are any."""
+    tried = MAP.keys() | LAWS.keys() | EXACT_EXPERIMENTS
+    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], SHORT)]
+    for title, short, exact in (("steps", MAP, EXACT_EXPERIMENTS), ("laws", LAWS, frozenset[str]())):
+        mine = [v for v in verdicts if v.check in short or v.check in exact]
+        if any(v.passed is not None for v in mine):
+            out += [plain(), plain(f"Experiments with {title}, likewise:"), verdict_matrix(mine, short)]
+    return out
+
+
+def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> Table:
+    """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
+    checks = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
+    shown = [c for c in checks if any(v.check == c and v.passed is not None for v in verdicts)]
+    exact = any(v.check not in short for v in verdicts)
+    rows: list[Row] = []
+    for method in dict.fromkeys(v.method for v in verdicts):
+        mine = {v.check: v for v in verdicts if v.method == method}
+        cells = [_cell(mine.get(check)) for check in shown]
+        rest = [v for name, v in mine.items() if name not in short and v.passed is not None]
+        good = sum(1 for v in rest if v.passed)
+        if exact:
+            cells.append(plain(f"{good}/{len(rest)}", "" if good == len(rest) else "bold red"))
+        rows.append((method, *cells))
+    return table(["method", *(short[check] for check in shown), *(["exact"] if exact else [])], rows)
+
+
+def _cell(verdict: Verdict | None) -> Text:
+    if verdict is None or verdict.passed is None:
+        return plain("-", "dim")
+    value = ratio(verdict)
+    text = f"{value:.2f}" if 0.01 <= value < 100 else f"{value:.0e}"
+    return plain(text if verdict.passed else text + "!", "" if verdict.passed else "bold red")
+
+
+def failures(verdicts: Iterable[Verdict]) -> Lines:
+    """Every failed verdict with value, bound, ratio and why."""
+    out: Lines = []
+    for v in verdicts:
+        if v.passed is False:
+            out.append(plain(f"FAILED {v.method} {v.check}: {verdict_line(v)}", "bold red"))
+    return out
+
+
+def verdict_line(v: Verdict) -> str:
+    """Value, bound, ratio and why."""
+    if v.passed is None:
+        return f"not applicable: {v.why}"
+    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.why}"
+
+
+def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
+    """Every verdict in full."""
+    words = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}
+    titles = ("method", "check", "verdict", "value, bound, ratio, why")
+    rows = [
+        (v.method, v.check, plain(*words[v.passed]), plain(verdict_line(v), words[v.passed][1]))
+        for v in verdicts
+    ]
+    return table(titles, rows, left=titles, prose=titles[-1])
+
+
+def _repeat(one: Repeat) -> Text:
+    """One line for a repeated trajectory."""
+    if one.equal:
+        return plain(f"{one.method}: equal bit for bit")
+    why = f"; {', '.join(one.changed)}" if one.changed else ""
+    return plain(
+        f"{one.method}: NOT equal, differs by up to {one.difference:.1e} of the start{why}", "bold red"
+    )
+
+
+def _summary(report: Report) -> Text:
+    """How many verdicts passed, and where the store is."""
+    passed = sum(1 for v in report.verdicts if v.passed)
+    failed = sum(1 for v in report.verdicts if v.passed is False)
+    skipped = len(report.verdicts) - passed - failed
+    taken = f"; taken up from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
+    return plain(
+        f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}\n"
+        f"Stored in {report.path}",
+        "bold red" if failed else "bold green",
+    )
+
+
+def _comparison(comparison: Comparison) -> Table:
+    rows = [
+        (f"{i} {label}", *(_short(x) for x in comparison.max_difference[i, : i + 1]))
+        for i, label in enumerate(comparison.labels)
+    ]
+    return table(["", *map(str, range(len(comparison.labels)))], rows, left=("",))
+
+
+def _short(x: float) -> str:
+    if np.isnan(x):
+        return "-"
+    if x == 0:
+        return "0"
+    return f"{x:.0e}".replace("e-0", "e-").replace("e+00", "").replace("e+0", "e")

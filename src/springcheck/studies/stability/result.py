@@ -1,0 +1,172 @@
+"""What a study of stability has found: plain data, what of it fails, and the forms in which it is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from springcheck.physics.scene import Scene
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.keeper import plain
+from springcheck.studies.stability import limits
+from springcheck.studies.stability.costs import Cost
+from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.regions import Region
+from springcheck.studies.stability.resonance import Resonance
+from springcheck.studies.tables import Record, Rows
+
+GROWTH = 1e-6
+"""Relative difference allowed between measured and predicted growth in double precision: what is left of
+the decaying eigenvector in the fitted quarter of a run."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stability:
+    """All that was measured, and what was left out and why."""
+
+    scene: Scene
+    limits: tuple[Limit, ...]
+    regions: tuple[Region, ...]
+    resonances: tuple[Resonance, ...]
+    costs: tuple[Cost, ...]
+    left_out: tuple[LeftOut, ...]
+    taken_up: int = 0
+    """Limits, regions, resonances and costs that an interrupted call had finished."""
+    path: Path | None = None
+    """Where it was stored."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether limits, growth, regions and bands are where theory puts them, and any was measured."""
+        return bool(self.limits) and not failures(self)
+
+    @property
+    def status(self) -> Literal[0, 1]:
+        """Exit status: 0 where `passed`."""
+        return 0 if self.passed else 1
+
+    @property
+    def sentences(self) -> list[str]:
+        """What was found beside the table of limits, in sentences."""
+        return sentences(self)
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON (a limit of None: there is none)."""
+        found: dict[str, Any] = plain(
+            {
+                "scene": self.scene.name,
+                "passed": self.passed,
+                "methods": [_limit(limit) for limit in self.limits],
+                "regions": [
+                    {
+                        "stable": np.count_nonzero(x.stable),
+                        **_named(x, "method", "points", "wrong", "undecided", "off"),
+                    }
+                    for x in self.regions
+                ],
+                "resonances": [_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
+                "costs": self.costs,
+                "left_out": self.left_out,
+                "failures": failures(self),
+            }
+        )
+        return found
+
+
+def _named(found: Any, *names: str) -> dict[str, Any]:
+    return {name: getattr(found, name) for name in names}
+
+
+def _limit(x: Limit) -> dict[str, Any]:
+    names = (
+        "method", "scheme", "limit", "theory", "bound", "agrees",
+        "growth_above", "growth_predicted", "growth_below", "edge",
+    )  # fmt: skip
+    points = zip(x.turn, x.radius, x.radius_predicted, strict=True)
+    return {
+        **_named(x, *names),
+        "points": [{"h_w": a, "radius": b, "radius_predicted": c} for a, b, c in points],
+    }
+
+
+def growth_allowed(limit: Limit) -> float:
+    """Relative difference allowed between measured and predicted growth above the limit.
+
+    Growth is the square root of the distance from the limit, so a limit known to `bound` moves it by half
+    of bound over that distance; in double precision the limit is known to far better than `AGREED`.
+    """
+    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED:
+        return GROWTH
+    return GROWTH + 0.5 * limit.bound / (limit.theory * limits.NEXT)
+
+
+def failures(study: Stability) -> list[str]:
+    """What is not where theory puts it, one sentence each."""
+    out = []
+    for x in study.limits:
+        if not x.agrees:
+            out.append(f"{x.method}: limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}")
+        if np.isfinite(x.theory):
+            off = abs(x.growth_above / x.growth_predicted - 1)
+            if not off <= growth_allowed(x):
+                out.append(
+                    f"{x.method}: growth {x.growth_above:.9g} a step, predicted {x.growth_predicted:.9g}"
+                )
+        if np.isfinite(x.growth_below) and not x.growth_below <= max(x.growth_below_predicted, 0) + 1e-4:
+            out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
+    out += [f"{x.method}: {x.wrong} points of the damped plane disagree" for x in study.regions if x.wrong]
+    for y in study.resonances:
+        if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
+            out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
+    return out
+
+
+def sentences(study: Stability) -> list[str]:
+    """What was found beside the table of limits, in sentences."""
+    out = [
+        f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
+        f"{x.wrong} against theory; radii within {x.off:.2f} of what rounding allows"
+        for x in study.regions
+    ]
+    for y in study.resonances:
+        bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in y.bands)
+        out.append(f"{y.method}: grows at h w_fast from {bands}; the exact map agrees to {_apart(y):.1e}")
+    out += failures(study)
+    return out
+
+
+def _apart(x: Resonance) -> float:
+    a, b = np.array(x.bands), np.array(x.bands_predicted)
+    return float(np.max(np.abs(a - b))) if a.shape == b.shape and a.size else float("nan")
+
+
+LIMITS: Record[Limit] = Record(
+    kind=Limit,
+    beginning="stability/limits/",
+    signal="radius",
+    axes=("h_w",),
+    auxiliary=("radius_predicted",),
+    log=("h_w", "radius"),
+)
+REGIONS: Record[Region] = Record(
+    kind=Region,
+    beginning="stability/regions/",
+    signal="radius",
+    axes=("log10_damping_ratio", "log10_h_w"),
+    auxiliary=("radius_predicted",),
+    log=("radius",),
+    # H5Web draws every image on even axes
+    extra=lambda x: {"log10_damping_ratio": np.log10(x.ratio), "log10_h_w": np.log10(x.turn)},
+)
+RESONANCES: Record[Resonance] = Record(
+    kind=Resonance,
+    beginning="stability/resonances/",
+    signal="radius",
+    axes=("h_w",),
+    auxiliary=("radius_predicted",),
+)
+COSTS: Rows[Cost] = Rows(kind=Cost, beginning="stability/costs/", named="")
+"""How each kind of measurement is kept: a table for each method."""

@@ -1,0 +1,108 @@
+"""What a study is: a folder with its measure, result, text and figure, and its line in the list of studies.
+
+The folder's `__init__` declares the study and imports nothing heavy; its parts are imported when they are
+used: `measure.perform` and `measure.stored`, `text.lines`, `figure.draw`.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from springcheck.store import Summary
+    from springcheck.text import Lines
+
+
+class Progress(Protocol):
+    """Told how much is done, of how much (pieces, steps or seconds of a budget), and what comes next."""
+
+    def __call__(self, done: float, whole: float, what: str = "") -> None: ...
+
+
+class Result(Protocol):
+    """What a study has found."""
+
+    @property
+    def status(self) -> int:
+        """Exit status: 0 passed, 1 a verdict or a control failed, 2 nothing was measured, 130 interrupted."""
+        ...
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not a finite number is None."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """A study as the command line, `inspect` and `plot` know it."""
+
+    name: str
+    """Of its command, of its folder, and of its document in a store."""
+    about: str
+    options: Callable[[ArgumentParser], None]
+    """Adds the options of its command."""
+    trajectories: bool = False
+    """Kept in a store as trajectories, not as a document."""
+    keeps: Callable[[Namespace], bool] = lambda options: True
+    """Whether what is finished outlives an interrupt, so that the same command goes on."""
+    package: str = ""
+    """Where its parts are; left out: in the folder of its name."""
+
+    def perform(self, options: Namespace, progress: Progress | None) -> Result:
+        """Measure what the command line asks for; SpringcheckError for what a user can mend."""
+        found: Result = self._part("measure").perform(options, progress)
+        return found
+
+    def lines(self, found: Result, options: Namespace | None = None) -> Lines:
+        """The report as text; without options the one that `inspect` shows."""
+        lines: Lines = self._part("text").lines(found, options)
+        return lines
+
+    def held(self, summary: Summary) -> bool:
+        """Whether a store holds a study of this kind."""
+        return bool(summary.runs) if self.trajectories else self.name in summary.documents
+
+    def stored(self, path: Path) -> Result:
+        """What a store holds of this study.  StoreError where it cannot be read."""
+        found: Result = self._part("measure").stored(path)
+        return found
+
+    def draw(self, found: Result, folder: Path) -> list[Path]:
+        """Draw a stored or a fresh result into a folder; returns the files."""
+        written: list[Path] = self._part("figure").draw(found, folder)
+        return written
+
+    def _part(self, name: str) -> Any:
+        return import_module(f"{self.package or f'springcheck.studies.{self.name}'}.{name}")
+
+
+def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:
+    """The options of every study that is kept in a store."""
+    parser.add_argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})")
+    parser.add_argument(
+        "--method",
+        action="append",
+        default=[],
+        metavar="LABEL",
+        help="engine:method[@platform[-precision]] or a glob such as 'own:*'; repeatable",
+    )
+    parser.add_argument("--force", action="store_true", help="write an existing store anew")
+    report_options(parser)
+
+
+def report_options(parser: ArgumentParser) -> None:
+    """The options of every study."""
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+
+
+def scene_option(parser: ArgumentParser, **more: Any) -> None:
+    """The scene of a study."""
+    parser.add_argument(
+        "scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file", **more
+    )

@@ -1,0 +1,187 @@
+"""Results as tables of a store and back, bit for bit, by the fields of their dataclasses.
+
+A field is a column of its own name, or of the one that `column` gives it.  Unknown numbers (None) are NaN
+and unknown counts -1; a tuple of numbers is a row of a column of two dimensions, filled up with NaN.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from springcheck.store import Table
+
+T = TypeVar("T")
+
+
+def column(name: str = "", *, keys: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Metadata of a field kept under another name; `keys`: a dictionary of numbers, a column for each."""
+    return {"column": name, "keys": keys}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form(Generic[T]):
+    """How results of one kind are kept.  A table's name is `beginning` and the key of its result."""
+
+    kind: type[Any]
+    beginning: str
+    named: str = "method"
+    """The field that is the key, and no column; empty where there is none."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    signal: str = ""
+    axes: tuple[str, ...] = ()
+    auxiliary: tuple[str, ...] = ()
+    log: tuple[str, ...] = ()
+    about: str = ""
+    extra: Callable[[T], Mapping[str, Any]] = lambda found: {}
+    """Columns for viewers that follow from the others; they are not read back."""
+
+    def table(self, key: str, found: T, **attributes: Any) -> Table:
+        """The result as a table; a signal is named where its axes have finite points."""
+        kept, more = self._split(found)
+        kept |= self.extra(found)
+        shown = all(np.any(np.isfinite(kept[axis])) for axis in self.axes)
+        about = {"about": self.about} if self.about else {}
+        return Table(
+            name=self.beginning + key,
+            columns=kept,
+            units={name: unit for name, unit in self.units.items() if name in kept},
+            attributes={**about, **more, **attributes},
+            signal=self.signal if shown else "",
+            axes=self.axes if shown else (),
+            auxiliary=self.auxiliary if shown else (),
+            log=self.log if shown else (),
+        )
+
+    def found(self, table: Table) -> T:
+        """The result of such a table.  KeyError where it is another's."""
+        raise NotImplementedError
+
+    def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Columns and attributes."""
+        raise NotImplementedError
+
+    def _key(self, table: Table) -> dict[str, Any]:
+        return {self.named: table.name.removeprefix(self.beginning)} if self.named else {}
+
+
+class Record(Form[T]):
+    """One result a table: its arrays are the columns, its numbers and texts the attributes."""
+
+    def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
+        kept: dict[str, Any] = {}
+        more: dict[str, Any] = {}
+        for one in _fields(self.kind):
+            value = getattr(found, one.name)
+            if one.is_array:
+                kept[one.column] = value if isinstance(value, np.ndarray) else np.reshape(value, (-1, 2))
+            elif one.name != self.named:
+                more[one.column] = value
+        return kept, more
+
+    def found(self, table: Table) -> T:
+        values = self._key(table)
+        for one in _fields(self.kind):
+            if one.is_array:
+                array = np.asarray(table.columns[one.column])
+                pairs = get_origin(one.hint) is tuple
+                values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
+            elif one.name != self.named:
+                values[one.name] = table.attributes[one.column]
+        return self.kind(**values)  # type: ignore[no-any-return]
+
+
+class Rows(Form[Sequence[T]]):
+    """One result a row."""
+
+    def _split(self, found: Sequence[T]) -> tuple[dict[str, Any], dict[str, Any]]:
+        return dict(_columns(_fields(self.kind), self.named, found)), {}
+
+    def found(self, table: Table) -> list[T]:
+        key = self._key(table)
+        parts = [(one, _values(one, table)) for one in _fields(self.kind) if one.name != self.named]
+        count = len(parts[0][1]) if parts else 0
+        return [self.kind(**key, **{one.name: values[row] for one, values in parts}) for row in range(count)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Field:
+    name: str
+    column: str
+    hint: Any
+    optional: bool
+    keys: tuple[str, ...]
+
+    @property
+    def is_array(self) -> bool:
+        return get_origin(self.hint) in (tuple, np.ndarray) or self.hint is np.ndarray
+
+
+def _fields(kind: Any) -> tuple[_Field, ...]:
+    hints = get_type_hints(kind)
+    found = []
+    for one in fields(kind):
+        hint, optional = hints[one.name], False
+        if get_origin(hint) in (Union, types.UnionType):
+            (hint,) = (x for x in get_args(hint) if x is not type(None))
+            optional = True
+        if get_origin(hint) is Literal:
+            hint = str
+        found.append(
+            _Field(
+                name=one.name,
+                column=one.metadata.get("column") or one.name,
+                hint=hint,
+                optional=optional,
+                keys=one.metadata.get("keys", ()),
+            )
+        )
+    return tuple(found)
+
+
+def _columns(parts: Sequence[_Field], named: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+    for one in parts:
+        if one.name == named:
+            continue
+        values: list[Any] = [None if row is None else getattr(row, one.name) for row in rows]
+        if is_dataclass(one.hint):
+            yield from _columns(_fields(one.hint), "", values)
+        elif one.keys:
+            for key in one.keys:
+                yield key, np.array([value.get(key, np.nan) for value in values], np.float64)
+        elif one.hint is str:
+            yield one.column, [str(value) for value in values]
+        elif one.is_array:
+            filled = np.full((len(values), max([1, *map(len, values)])), np.nan)
+            for row, value in zip(filled, values, strict=True):
+                row[: len(value)] = value
+            yield one.column, filled
+        elif one.hint is int:
+            yield one.column, np.array([-1 if value is None else value for value in values], np.int64)
+        else:
+            yield one.column, np.array([np.nan if value is None else value for value in values], np.float64)
+
+
+def _values(one: _Field, table: Table) -> list[Any]:
+    """The field's values in the rows of a table."""
+    if is_dataclass(one.hint):
+        names = [part.name for part in _fields(one.hint)]
+        rows = zip(*(_values(part, table) for part in _fields(one.hint)), strict=True)
+        # an unknown result is one whose first number is
+        kind: Any = one.hint
+        return [None if np.isnan(row[0]) else kind(**dict(zip(names, row, strict=True))) for row in rows]
+    if one.keys:
+        columns = {key: np.asarray(table.columns[key], np.float64).tolist() for key in one.keys}
+        count = len(next(iter(columns.values())))
+        return [{k: v[row] for k, v in columns.items() if not np.isnan(v[row])} for row in range(count)]
+    found = np.asarray(table.columns[one.column])
+    if one.is_array:
+        return [tuple(row[~np.isnan(row)].tolist()) for row in found]
+    values: list[Any] = found.tolist()
+    if not one.optional:
+        return values
+    return [None if np.isnan(value) or (one.hint is int and value < 0) else value for value in values]

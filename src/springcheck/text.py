@@ -1,0 +1,110 @@
+"""Lines and tables of text, by rich: numbers, labels and names are never cut, however narrow the terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
+from rich.text import Text
+
+Lines = list[RenderableType]
+Cell = str | Text
+Row = Sequence[Cell] | Text
+
+PROSE = 30
+"""Fewest columns that a cell of prose is broken into."""
+GAP = 2
+
+
+def plain(text: str = "", style: str = "") -> Text:
+    """A line of text that is never taken for markup."""
+    return Text(text, style=style)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table without lines, as narrow as its cells; `prose` alone is broken to fit the width."""
+
+    titles: tuple[str, ...]
+    rows: tuple[Row, ...]
+    """A row that is a Text is a heading over all columns."""
+    left: frozenset[str]
+    prose: str
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        head: Row = tuple(map(plain, self.titles))
+        cells = [row for row in (head, *self.rows) if not isinstance(row, Text)]
+        widths = [
+            max((len(row[j]) for row in cells if j < len(row)), default=0) for j in range(len(self.titles))
+        ]
+        if self.prose in self.titles:
+            j = self.titles.index(self.prose)
+            others = sum(widths) - widths[j] + GAP * (len(widths) - 1)
+            widths[j] = min(widths[j], max(PROSE, options.max_width - others))
+        for row in (head, *self.rows):
+            if isinstance(row, Text):
+                yield _line(row)
+            else:
+                yield from self._lines(row, widths)
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
+        return Measurement(1, options.max_width)
+
+    def _lines(self, row: Sequence[Cell], widths: Sequence[int]) -> Iterator[Text]:
+        parts = []
+        for title, width, cell in zip(self.titles, widths, row, strict=False):
+            whole = plain(cell) if isinstance(cell, str) else cell
+            pieces = [whole]
+            if title == self.prose and len(whole) > width:
+                pieces = [plain(piece, str(whole.style)) for piece in textwrap.wrap(whole.plain, width)]
+            parts.append((title in self.left or title == self.prose, width, pieces))
+        for i in range(max(len(pieces) for _, _, pieces in parts)):
+            out = plain()
+            for left, width, pieces in parts:
+                piece = pieces[i] if i < len(pieces) else plain()
+                blank = " " * (width - len(piece))
+                out.append_text(piece.copy() if left else plain(blank).append_text(piece))
+                out.append(blank + " " * GAP if left else " " * GAP)
+            out.rstrip()
+            yield _line(out)
+
+
+def _line(text: Text) -> Text:
+    text = text.copy()
+    text.no_wrap, text.overflow = True, "ignore"
+    return text
+
+
+def table(
+    titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = ""
+) -> Table:
+    """A table; the columns `left` start at their left edge, numbers end at their right one."""
+    return Table(tuple(titles), tuple(rows), frozenset(left), prose)
+
+
+def hanging(head: str, text: str) -> Lines:
+    """Text of 80 columns, its further lines indented as far as its head is long."""
+    broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
+    return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]
+
+
+def seconds(value: float | None) -> str:
+    """A time with three digits and its unit."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value / 1e-9:.0f} ns"
+
+
+def duration(value: float) -> str:
+    """Seconds, hours or years, roughly."""
+    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("h", 3600.0)):
+        if value >= size:
+            return f"{value / size:.2g} {unit}"
+    return seconds(value)
