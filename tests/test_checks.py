@@ -13,7 +13,6 @@ import springcheck
 from springcheck import checks, schemes
 from springcheck.checks import recorded
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
@@ -94,7 +93,7 @@ def test_a_slip_between_two_pieces_shows_in_the_closed_form_of_those_after_it() 
     run = plain(scene, "velocity-verlet")
     late = slice(50, None)
     q = run.q[late] + 1e-11
-    piece = replace(run, t=run.t[late], q=q, p=run.p[late], energy=mechanics.energy(scene, q, run.p[late]))
+    piece = replace(run, t=run.t[late], q=q, p=run.p[late], energy=scene.system.energy(q, run.p[late]))
     assert any(alarm.startswith("closed-form") for alarm in alarms(checks.judge(scene, piece)))
 
 
@@ -119,7 +118,7 @@ def test_the_arithmetic_of_opencl_is_the_one_it_is_said_to_have(
     for seed in range(6):
         scene = clean.random_scene(np.random.default_rng([6, seed]), decades=1.5, steps=steps)
         run = springcheck.run(scene, label) if scene.step > 0 else None
-        if run is None or np.max(mechanics.magnitude(scene.terms)(run.q, run.p)) > run.arithmetic.overflow:
+        if run is None or np.max(scene.system.magnitude()(run.q, run.p)) > run.arithmetic.overflow:
             continue
         verdicts = checks.judge(scene, run)
         assert alarms(verdicts) == [], seed
@@ -237,7 +236,8 @@ def test_the_strongest_force_is_that_of_one_spring_or_of_all_on_a_particle() -> 
     walls = WallSpring(i=np.array([1, 1]), k=np.array([1.3, 1.7]), at=np.zeros(2))
     q = np.array([[-3.0, 0.0, 3.0], [0.5, 1.0, 1.5]])
     # the outer springs of the first state cancel at the middle one; in the second only the walls pull
-    assert mechanics.strongest((pulled, walls), q) == pytest.approx([2.9 * 2.5, 1.3 + 1.7])
+    scene = replace(scenes.load_scene("chain"), terms=(pulled, walls))
+    assert scene.system.strongest(q) == pytest.approx([2.9 * 2.5, 1.3 + 1.7])
 
 
 def overflowing(declared: float) -> tuple[Scene, Trajectory]:
@@ -257,7 +257,7 @@ def overflowing(declared: float) -> tuple[Scene, Trajectory]:
 
 def test_a_step_off_is_the_engine_s_limit_only_where_that_explains_every_step_that_is_off() -> None:
     scene, right = overflowing(np.inf)
-    force = np.abs(mechanics.force(scene.terms)(right.q, right.p))[:, 0]
+    force = np.abs(scene.system.force(right.q, right.p))[:, 0]
     limit = float(np.sort(force[:-1])[-9])
     scene, run = overflowing(limit)
     (verdict,) = checks.judge(scene, run, [recorded.step_defect])

@@ -12,7 +12,6 @@ import pytest
 from springcheck import checks, schemes, simulate
 from springcheck.checks import experiments, laws
 from springcheck.errors import MethodError
-from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults import clean, steppers
@@ -108,13 +107,11 @@ def test_a_power_law_with_its_second_term_is_fitted_to_its_order() -> None:
 
 
 def test_copies_of_a_scene_do_not_act_on_each_other() -> None:
-    from springcheck.checks.bench import replicated
-
     chain = scenes.load_scene("chain")
-    many = replicated(chain, 3)
-    one = mechanics.force(chain.terms)(chain.q, chain.p)
+    many = chain.system.tiled(3)
+    one = chain.system.force(chain.q, chain.p)
     q = np.concatenate([chain.q, chain.q + 0.1, chain.q])
-    three = mechanics.force(many.terms)(q, np.zeros(9))
+    three = many.system.force(q, np.zeros(9))
     assert np.array_equal(three[:3], one)
     assert np.array_equal(three[6:], one)
     assert not np.array_equal(three[3:6], one)

@@ -16,7 +16,6 @@ from springcheck import checks, compare, schemes
 from springcheck.arrays import Floats
 from springcheck.checks import experiments, laws, recorded, verdicts
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import mechanics
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
@@ -279,7 +278,7 @@ def test_the_bound_of_a_solver_on_a_barrier_stays_below_the_motion() -> None:
     q, p = (np.asarray(x, np.float64) for x in recorded.exact.true_motion(scene, np.arange(21), 0.11))
     found = one(scene, replace(run, q=q, p=p, t=np.arange(21) * 0.11), recorded.tolerance)
     assert found.passed is True
-    assert found.bound < 1e-2 * np.max(mechanics.norm(scene)(q, p))
+    assert found.bound < 1e-2 * np.max(scene.system.norm(q, p))
 
 
 def bench(broken: Callable[[Scene, Trajectory], Trajectory]) -> checks.Bench:
@@ -413,12 +412,12 @@ def test_a_bond_without_stiffness_holds_nothing_and_hides_no_error() -> None:
         Spring(a=np.array([0]), b=np.array([1]), k=np.array([0.0]), rest=np.zeros(1)),
     )
     scene = clean.scene(np.ones(2), terms, np.array([0.3, 0.1]), np.array([0.2, 0.4]), step=0.1, steps=50)
-    assert mechanics.norm(scene)(np.array([0.0, 1.0]), np.zeros(2)) > 0.1
+    assert scene.system.norm(np.array([0.0, 1.0]), np.zeros(2)) > 0.1
 
 
 def test_the_sign_of_the_energy_drift_is_that_of_the_gain_whatever_the_start(tmp_path: Path) -> None:
     scene = replace(scenes.load_scene("inverted"), q=np.array([1.1]), p=np.array([0.1]), steps=5)
-    assert mechanics.energy(scene, scene.q, scene.p) < 0
+    assert scene.system.energy(scene.q, scene.p) < 0
     run = plain(scene)
     tally = session._Tally(scene)
     tally.add(replace(run, p=run.p * 2))

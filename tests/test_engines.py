@@ -13,7 +13,7 @@ import pytest
 import springcheck
 from springcheck import checks, engines, simulate
 from springcheck.errors import MethodError
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
@@ -51,7 +51,7 @@ def test_two_engines_of_one_scheme_move_alike(pair: tuple[str, str, float], name
         need(other)
     scene = scenes.load_scene(name)
     (q1, p1), (q2, p2) = states(scene, one), states(scene, other)
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     # relative to the amplitude that a growing motion has reached, and for stiff solvers to n components
     grown = np.maximum.accumulate(np.maximum(norm(q2 - _rest(scene), p2), 1.0))
     assert np.max(norm(q1 - q2, p1 - p2) / grown) <= bound * scene.n

@@ -6,10 +6,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
 
 
 def spring(m: float, k: float, q: float, p: float, h: float) -> Scene:
@@ -60,10 +60,10 @@ def test_a_chain_moves_as_its_equations_solved_in_forty_digits_say() -> None:
     with mpmath.workdps(40):
         m = [mpmath.mpf(float(x)) for x in scene.m]
         zero = np.zeros(scene.n)
-        rows = mechanics.stiffness(scene, zero)
+        rows = scene.system.hessian(zero)
         stiffness = mpmath.matrix([[mpmath.mpf(str(x)) for x in row] for row in rows])
         wide = zero.astype(np.longdouble)
-        pull = [mpmath.mpf(str(x)) for x in mechanics.force(scene.terms)(wide, wide)]
+        pull = [mpmath.mpf(str(x)) for x in scene.system.force(wide, wide)]
         root = mpmath.diag([mpmath.sqrt(x) for x in m])
         values, vectors = mpmath.eigsy(root**-1 * stiffness * root**-1)
         y0 = vectors.T * root * mpmath.matrix(scene.q.tolist())
@@ -104,7 +104,7 @@ def test_particles_of_equal_frequency_that_are_joined_keep_their_modes_apart() -
     inner = found.vectors.T @ found.vectors if found.vectors is not None else np.zeros((3, 3))
     assert np.max(np.abs(inner - np.eye(3))) < 32 * exact.EPS
     q, p = exact.true_motion(scene, np.array([0, 1000]), 0.1)
-    energy = mechanics.energy(scene, q, p)
+    energy = scene.system.energy(q, p)
     assert abs(energy[1] / energy[0] - 1) < 1e-15
     assert np.sum(p[1]) == pytest.approx(0.4, abs=1e-15)
 
@@ -115,8 +115,8 @@ def worked_out(scene: Scene, t: float) -> tuple[list[mpmath.mpf], list[mpmath.mp
     with mpmath.workdps(80):
         a = mpmath.zeros(2 * n + 1, 2 * n + 1)
         zero = np.zeros(n, dtype=np.longdouble)
-        k, pull = mechanics.stiffness(scene, zero), mechanics.force(scene.terms)(zero, zero)
-        rate = mechanics.rates(scene)
+        k, pull = scene.system.hessian(zero), scene.system.force(zero, zero)
+        rate = scene.system.friction_rates
         for i in range(n):
             a[i, n + i] = 1 / mpmath.mpf(float(scene.m[i]))
             a[n + i, n + i] = -wide(rate[i])
@@ -145,8 +145,8 @@ def held(k: list[float], at: list[float]) -> WallSpring:
     return WallSpring(i=np.zeros(len(k), np.int64), k=np.array(k), at=np.array(at))
 
 
-def friction(c: float, m: float) -> Damping:
-    return Damping(i=np.array([0]), c=np.array([c]), m=np.array([m]))
+def friction(c: float) -> Damping:
+    return Damping(i=np.array([0]), c=np.array([c]))
 
 
 BOND = Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.5]), rest=np.array([0.0]))
@@ -155,12 +155,12 @@ LINEAR = {
     "the same, backwards": made([1.0], (held([-1.0], [0.0]),), [1.0], [1.0], -50.0),
     "down a barrier": made([1.7], (held([-2.3], [0.4]),), [0.3], [0.1], 7.0),
     "a constant force against slow friction": made(
-        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(1e-10, 1.3)), [0.3], [0.1], 1.0
+        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(1e-10)), [0.3], [0.1], 1.0
     ),
     "a constant force against friction": made(
-        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(0.9, 1.3)), [0.3], [0.1], 9.0
+        [1.3], (held([1.0, -1.0], [0.7, 0.2]), friction(0.9)), [0.3], [0.1], 9.0
     ),
-    "friction to the end": made([1.3], (friction(0.7, 1.3),), [0.3], [0.1], 60.0),
+    "friction to the end": made([1.3], (friction(0.7),), [0.3], [0.1], 60.0),
     "a constant force on a pair": made(
         [1.0, 2.0], (BOND, held([1.0, -1.0], [0.3, 0.9])), [0.3, -0.2], [0.1, 0.7], 7.0
     ),

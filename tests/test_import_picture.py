@@ -15,10 +15,9 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "errors", "arrays", "physics", "schemes", "engines", "trajectory", "store", "provenance",
+    "interrupts", "errors", "workers", "arrays", "physics", "schemes", "engines", "trajectory", "store",
     "text", "simulate", "checks", "compare", "identify", "figures", "studies", "inspect", "plot", "listing",
-    "cli",
-    "__main__",
+    "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))

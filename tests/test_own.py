@@ -18,9 +18,8 @@ from springcheck.arrays import Floats
 from springcheck.engines import parse
 from springcheck.engines.own import ENGINE, kernels, simulation
 from springcheck.errors import MethodError
-from springcheck.physics import mechanics
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic, Spring, Term, WallSpring
 
 METHODS = tuple(ENGINE.methods)
 LAYOUTS = {"one": kernels.ONE, "many": kernels.MANY, "joined": kernels.JOINED, "chain": kernels.CHAIN}
@@ -130,12 +129,12 @@ def test_every_step_is_the_map_of_its_scheme_up_to_rounding(layout: str, method:
         what = random_scene(layout, seed, linear=linear)
         q, p = run(what, method, compiled=False, frames=20)
         before = np.vstack([what.q, q[:-1]]), np.vstack([what.p, p[:-1]])
-        k = mechanics.stiffness(what, what.q) if linear else None
+        k = what.system.hessian(what.q) if linear else None
         h, m = what.step, what.m
         for old_q, old_p, new_q, new_p in zip(*before, q, p, strict=True):
             wide = old_q.astype(np.longdouble), old_p.astype(np.longdouble)
-            exact = schemes.step(scheme, *wide, h=h, m=m, force=mechanics.force(what.terms), stiffness=k)
-            sizes = mechanics.magnitude(what.terms)
+            exact = schemes.step(scheme, *wide, h=h, m=m, force=what.system.force, stiffness=k)
+            sizes = what.system.magnitude()
             size = schemes.magnitude_step(scheme, old_q, old_p, h=h, m=m, magnitude=sizes, stiffness=k)
             # a joined force is a sum over up to 14 terms: one more rounding for each
             count = schemes.roundings(scheme) + 14
@@ -223,7 +222,7 @@ def test_a_chain_is_solved_as_well_as_by_the_dense_matrix(stiffness: float) -> N
     h = what.step
     lower, inverse, upper = simulation._factors(what, h)
     matrix = (np.eye(n) + np.diag(lower[1:], -1)) @ (np.diag(1 / inverse) + np.diag(upper[:-1], 1))
-    exact = np.eye(n) + h * h * mechanics.stiffness(what, what.q) / m
+    exact = np.eye(n) + h * h * what.system.hessian(what.q) / m
     assert np.max(np.abs(matrix - exact)) <= 8 * 2.0**-53 * np.max(np.abs(exact))
     assert np.allclose(
         simulation._inverse(what, h).T @ matrix, np.eye(n), rtol=0, atol=n * 2.0**-52 * np.max(exact)

@@ -47,8 +47,8 @@ import numpy as np
 from arguments import arguments
 from springcheck.arrays import Floats
 from springcheck.engines.own import simulation
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, Term, WallSpring
 
 METHODS = ("euler", "semi-implicit-euler", "implicit-euler")
 REPEATS = 7

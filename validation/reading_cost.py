@@ -92,7 +92,7 @@ def ase_loop(scene: Scene) -> Callable[[], float]:
 
     def once() -> float:
         atoms = Atoms("X", positions=[[scene.q[0], 0, 0]], masses=scene.m, momenta=[[scene.p[0], 0, 0]])
-        atoms.calc = Springs(scene.terms, 1.0, 1.0)
+        atoms.calc = Springs(scene.system, 1.0, 1.0)
         dynamics = VelocityVerlet(atoms, timestep=scene.step)
         q, p = np.empty(scene.steps), np.empty(scene.steps)
         began = perf_counter()

@@ -26,7 +26,6 @@ import numpy as np
 from arguments import arguments
 from springcheck import compare, load_scene, run
 from springcheck.checks import judge
-from springcheck.physics import mechanics
 from springcheck.studies.run import figure as trajectories
 
 METHODS = [
@@ -49,7 +48,7 @@ def main() -> int:
     runs = {label: run(scene, label) for label in METHODS}
     good = True
 
-    energy = mechanics.energy(scene, runs["own:euler"].q, runs["own:euler"].p)
+    energy = scene.system.energy(runs["own:euler"].q, runs["own:euler"].p)
     growth = float(energy[-1] / energy[0])
     print(f"own:euler: energy x {growth:.4g}, amplitude x {np.sqrt(growth):.4g}")
     good &= abs(growth / 1.01**200 - 1) < 1e-12

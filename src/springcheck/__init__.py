@@ -12,9 +12,10 @@ What they return is described in `springcheck.trajectory`.  Each is imported whe
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # typing takes longer to import than all else here
 if TYPE_CHECKING:
+    from typing import Any
+
     from springcheck.checks import judge
     from springcheck.physics.scenefile import load_scene
     from springcheck.simulate import run

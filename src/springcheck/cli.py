@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from springcheck import interrupts
 from springcheck.errors import SpringcheckError
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study
@@ -26,36 +27,46 @@ if TYPE_CHECKING:
 
     from springcheck.studies.study import Progress
 
-INTERRUPTED = 130
+INTERRUPTED = interrupts.STATUS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 a mistake."""
     options = _parser().parse_args(arguments)
     command: Callable[[argparse.Namespace], int] = options.command
+    kept = "keeps" in options and options.keeps(options)
+    what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
+    interrupts.announce(f"interrupted; {what}")
     try:
         return command(options)
-    except SpringcheckError as error:
-        print(f"springcheck: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt as interrupt:
-        return _interrupted(str(interrupt), kept="keeps" in options and options.keeps(options))
-    except BrokenPipeError:
-        # whoever read our output has closed it; nothing is left to say
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 2
-    except OSError as error:
-        # the library names its files; what is left is our own output, on a full disk for one
-        print(f"springcheck: {error.strerror or error}", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 2
+    except KeyboardInterrupt:
+        return _interrupted(what)
+    except Exception as error:
+        if interrupts.seen():
+            # a library that was interrupted may call it an error of its own
+            return _interrupted(what)
+        if isinstance(error, SpringcheckError | OSError):
+            return _mistake(error)
+        raise
 
 
-def _interrupted(missing: str = "", *, kept: bool) -> int:
+def _interrupted(what: str) -> int:
     """Say what Ctrl-C has left; returns the exit status."""
-    what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
-    print("springcheck: " + "; ".join(filter(None, ("interrupted", missing, what))), file=sys.stderr)
+    print(f"springcheck: interrupted; {what}", file=sys.stderr)
+    interrupts.announce("")
     return INTERRUPTED
+
+
+def _mistake(error: SpringcheckError | OSError) -> int:
+    """Say what went wrong in one line; returns the exit status."""
+    if not isinstance(error, BrokenPipeError):
+        # the library names its files; what is left of OSError is our own output, on a full disk for one
+        said = error.strerror if isinstance(error, OSError) else None
+        print(f"springcheck: {said or error}", file=sys.stderr)
+    if isinstance(error, OSError):
+        # nothing more can be written, by the interpreter's shutdown either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 2
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -162,7 +173,7 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     elif not options.quiet:
         _show(study.lines(found, options))
     if found.status == INTERRUPTED:
-        return _interrupted(kept=True)
+        return _interrupted("what was finished is kept, the same command goes on")
     return found.status
 
 

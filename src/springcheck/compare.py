@@ -9,7 +9,7 @@ import numpy as np
 
 from springcheck import checks
 from springcheck.arrays import Extended, Floats
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Comparison, Trajectory
 
@@ -28,7 +28,7 @@ class Same:
 
 def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
     """Compare trajectories, or pieces of them over the same frames, with each other and the true motion."""
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
     longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)
     if longest is not None and exact.has_true_motion(scene):
@@ -75,7 +75,7 @@ def _telling(scene: Scene, trajectory: Trajectory) -> float:
     """`allowed`, or NaN where it is no small part of the motion: then nothing can be said of it."""
     limit = allowed(scene, trajectory)
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.max(mechanics.norm(scene)(trajectory.q - scene.q, trajectory.p - scene.p))
+        size = np.max(scene.system.norm(trajectory.q - scene.q, trajectory.p - scene.p))
     return limit if np.isfinite(limit) and limit <= 1e-3 * max(float(size), 1.0) else np.nan
 
 

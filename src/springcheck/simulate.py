@@ -17,7 +17,6 @@ from springcheck import engines
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Arithmetic, Label, Simulation, Stopped
 from springcheck.errors import MethodError, SceneError
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
 
@@ -28,9 +27,13 @@ FIRST, QUICK = 256, 0.1
 """Rows of the first chunk, and the seconds below which the next one is four times as long: a slow engine
 reports its progress, and hears Ctrl-C, several times a second."""
 
-PIECE = 1 << 16
-"""Steps that an engine of fixed step takes between two looks at the keyboard, where frames lie further
-apart.  A number, not a time: the numbers of a run must not depend on the speed of the machine."""
+PIECE, WORK = 1 << 16, 1 << 22
+"""Steps, and steps times particles, that an engine of fixed step takes between two looks at the keyboard,
+where frames lie further apart.  Numbers, not times: the numbers of a run must not depend on the speed of
+the machine."""
+
+UNHEARD = 0.25
+"""Seconds that an engine may be deaf for where its numbers are thrown away."""
 
 
 class Sink(Protocol):
@@ -67,8 +70,8 @@ def play(
 ) -> Record:
     """Run a scene and hand every recorded frame, the start first, to `sink`.
 
-    Memory does not grow with the length of the run.  Ctrl-C ends the run with the outcome
-    `interrupted`; the frames before it have been handed over.  For `planned` see `bare`.
+    Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
+    through.  For `planned` see `bare`.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -85,8 +88,8 @@ def play(
 
     with_energy = "energy" in scene.quantities
     rows = max(1, min(CHUNK // scene.n, scene.frames))
-    ready = min(rows, FIRST)
-    piece = scene.every if method.adaptive else min(scene.every, PIECE)
+    piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
+    ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
     q[0], p[0] = scene.q, scene.p
     _hand_over(scene, sink, 0, q[:1], p[:1], with_energy)
@@ -128,7 +131,7 @@ def play(
     )
 
 
-Ending = Literal["complete", "diverged", "stopped", "interrupted"]
+Ending = Literal["complete", "diverged", "stopped"]
 
 
 @dataclass(slots=True)
@@ -154,9 +157,6 @@ class _Part:
                 self._in_pieces(q, p)
         except Stopped as stop:
             status, good, message = "stopped", stop.rows, str(stop)
-        except KeyboardInterrupt:
-            # which rows of the chunk were filled is not known: none of them is kept
-            return "interrupted", 0, "interrupted", perf_counter() - began
         seconds = perf_counter() - began
         finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
         if not finite.all():
@@ -186,7 +186,7 @@ def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, with_
     energy = None
     if with_energy:
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-            energy = np.asarray(mechanics.energy(scene, q, p), dtype=np.float64)
+            energy = np.asarray(scene.system.energy(q, p), dtype=np.float64)
     sink(t, q, p, energy)
 
 
@@ -289,8 +289,12 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     rows = min(CHUNK // scene.n or 1, scene.steps // every)
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
     whole, rest = divmod(scene.steps // every, rows)
+    piece = scene.steps if method.adaptive else PIECE
     began = perf_counter()
     for simulation in simulations:
+        if not read:
+            _advance(simulation, scene.steps, min(piece, scene.steps), q, p)
+            continue
         for _ in range(whole):
             simulation.advance(every, q, p)
         if rest:
@@ -300,3 +304,13 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
         timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
         force_calls=simulations[0].force_calls,
     )
+
+
+def _advance(simulation: Simulation, steps: int, piece: int, q: Floats, p: Floats) -> None:
+    """All steps and one row, in as few calls as Ctrl-C allows: one takes at most about `UNHEARD` seconds."""
+    while steps:
+        began = perf_counter()
+        simulation.advance(min(piece, steps), q, p)
+        steps -= min(piece, steps)
+        if perf_counter() - began < UNHEARD / 4:
+            piece *= 4

@@ -14,7 +14,7 @@ from springcheck.engines.contract import Arithmetic
 class Outcome:
     """How a run ended.  Nothing that is not `complete` passes for a result."""
 
-    status: Literal["complete", "diverged", "stopped", "interrupted"]
+    status: Literal["complete", "diverged", "stopped"]
     step: int
     """Steps done with finite numbers."""
     message: str = ""
@@ -58,7 +58,7 @@ class Trajectory:
 class Comparison:
     """Largest difference of each pair of trajectories over all frames, (l, l), symmetric.
 
-    In units of the start (`mechanics.Norm`); NaN where one of the two runs did not complete.
+    In units of the start (`Norm`); NaN where one of the two runs did not complete.
     """
 
     labels: tuple[str, ...]

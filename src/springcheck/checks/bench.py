@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from springcheck import schemes
 from springcheck.arrays import Floats
 from springcheck.checks import verdicts
 from springcheck.checks.case import Case
-from springcheck.physics import exact, mechanics
-from springcheck.physics.scene import Scene, Term
+from springcheck.physics import exact
+from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory, Verdict
 
 Run: TypeAlias = Callable[[Scene, str], Trajectory]
@@ -59,15 +59,15 @@ class Bench:
         scene, n = self.scene, self.scene.n
         modes = exact.modes(scene)
         rest, _ = modes.out_of(modes.centre(), np.zeros(n, dtype=np.longdouble))
-        k = np.abs(np.diag(mechanics.stiffness(scene, scene.q))).astype(np.float64)
-        unit = float(mechanics.norm(scene).unit) or 1.0
+        k = np.abs(np.diag(scene.system.hessian(scene.q))).astype(np.float64)
+        unit = float(scene.system.norm.unit) or 1.0
         momentum = np.sqrt(2 * scene.m) * unit
         k = np.where(k > 0, k, scene.m / scene.step**2)
         pushes = np.concatenate([np.sqrt(2 / k) * unit, momentum])
         state = np.zeros((2 * n + 1, 2 * n))
         state[:, :n] = rest.astype(np.float64)
         state[1:] += np.diag(pushes)
-        many = replicated(scene, 2 * n + 1)
+        many = scene.system.tiled(2 * n + 1)
         start = replace(many, q=state[:, :n].ravel(), p=state[:, n:].ravel(), steps=1, every=1)
         return Case(trajectory=self.run(start, self.label), scene=start), state[
             np.arange(1, 2 * n + 1), np.arange(2 * n)
@@ -80,29 +80,3 @@ class Bench:
     def not_applicable(self, check: str, why: str) -> Verdict:
         """Reported as what it is, never as passed."""
         return verdicts.not_applicable(self.label, check, why)
-
-
-def replicated(scene: Scene, copies: int) -> Scene:
-    """So many copies of a scene side by side, which do not act on each other."""
-
-    def many(term: Term) -> Any:
-        record: Any = term
-        values = {f.name: getattr(record, f.name) for f in fields(record)}
-        arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
-        return replace(
-            record,
-            **{
-                name: (value + scene.n * np.arange(copies)[:, None]).ravel()
-                if value.dtype.kind == "i"
-                else np.tile(value, copies)
-                for name, value in arrays.items()
-            },
-        )
-
-    return replace(
-        scene,
-        m=np.tile(scene.m, copies),
-        q=np.tile(scene.q, copies),
-        p=np.tile(scene.p, copies),
-        terms=tuple(many(term) for term in scene.terms),
-    )

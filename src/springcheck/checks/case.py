@@ -13,9 +13,10 @@ from springcheck import schemes
 from springcheck.arrays import Extended, Floats, Force, Integers, Reals
 from springcheck.checks import verdicts
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import exact, mechanics
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import particles
+from springcheck.physics import exact
+from springcheck.physics.norm import Norm
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Term
 from springcheck.trajectory import Trajectory, Verdict
 
 SMALLEST = np.longdouble(5e-324)
@@ -38,8 +39,8 @@ class Case:
     def judged(self) -> Scene:
         """The scene with its parameters as the engine's arithmetic keeps them."""
         arithmetic = self.trajectory.arithmetic
-        scene = mechanics.in_single(self.scene) if arithmetic.parameters == "single" else self.scene
-        return mechanics.stiffened(scene, 1 + arithmetic.excess) if arithmetic.excess else scene
+        scene = self.scene.system.in_single if arithmetic.parameters == "single" else self.scene
+        return scene.system.scaled(1 + arithmetic.excess) if arithmetic.excess else scene
 
     @cached_property
     def steps(self) -> Integers:
@@ -53,18 +54,17 @@ class Case:
     @cached_property
     def linear(self) -> bool:
         """Whether each normal mode has a one-step matrix of its own."""
-        return mechanics.has_modes(self.scene) and not self.mixed
+        return self.scene.system.has_modes and not self.mixed
 
     @property
     def mixed(self) -> bool:
         """Whether the scheme acts at different times by slow and by fast springs, and there are both."""
-        slow, _ = mechanics.split(self.scene.terms)
-        return self.scheme.mixes and any(term.key != "damping" for term in slow)
+        return self.scheme.mixes and any(term.is_potential for term in self.scene.system.slow)
 
     @property
     def area_preserving(self) -> bool:
         """Whether every step keeps area: a symplectic scheme, and no friction."""
-        return self.scheme.symplectic and not mechanics.is_damped(self.scene)
+        return self.scheme.symplectic and not self.scene.system.is_damped
 
     @cached_property
     def law(self) -> dict[str, Any]:
@@ -72,9 +72,9 @@ class Case:
         scene = self.judged
         stiff: Extended | None = None
         if self.scheme.implicit:
-            of = mechanics.own_stiffness if mechanics.is_separate(scene) else mechanics.stiffness
-            stiff = of(scene, scene.q)
-        return {"stiffness": stiff, "rate": mechanics.rates(scene) if mechanics.is_damped(scene) else None}
+            system = scene.system
+            stiff = (system.hessian_diagonal if system.is_separate else system.hessian)(scene.q)
+        return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
 
     @cached_property
     def modes(self) -> exact.Modes:
@@ -117,9 +117,11 @@ class Case:
         near, momenta = q.astype(np.longdouble), p.astype(np.longdouble)
         q, p = np.abs(near), np.abs(momenta)
         h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-        sizes = mechanics.magnitude(scene.terms, near)
-        slow, fast = mechanics.split(scene.terms)
-        parts = mechanics.magnitude(slow, near), mechanics.magnitude(fast, near)
+        sizes = scene.system.magnitude(near)
+        parts = (
+            scene.system.magnitude_of(scene.system.slow, near),
+            scene.system.magnitude_of(scene.system.fast, near),
+        )
         kicks = self._kicks(near, momenta) if self.scheme.reach == 2 else []
         size_q, size_p = schemes.magnitude_step(
             self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, kicks=kicks, **self.law
@@ -133,7 +135,7 @@ class Case:
         if rounding.quantum:
             # each term's force on a particle is cut off once a step, not once for every rounding, and a
             # force below the quantum is lost, no more
-            lost = np.minimum(rounding.quantum * _pulls(scene), sizes(q, p))
+            lost = np.minimum(rounding.quantum * scene.system.pulls, sizes(q, p))
             extra += h * lost / self.roundings
         if run.rebuilds_velocity and not rounding.keeps_displacement:
             extra += rounding.state * m * (q + size_q) / h
@@ -170,7 +172,7 @@ class Case:
         """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
 
         One rounding a step, enlarged by the map from the step where it arises, and all of one sign.  The
-        unit is a root of an energy: see `mechanics.Norm.size`.
+        unit is a root of an energy: see `Norm.size`.
         """
         total, grown = schemes.amplification(self.matrices, self.w, self.steps)
         size = self.norm.size(*self.allowance)
@@ -190,18 +192,18 @@ class Case:
         for a scheme with more than kicks and drifts.
         """
         scene, stages = self.judged, self.scheme.stages
-        if mechanics.is_linear(scene) or not {kind for kind, _ in stages} <= {"kick", "drift"}:
+        if scene.system.is_linear or not {kind for kind, _ in stages} <= {"kick", "drift"}:
             return []
         found: list[Force] = []
         m, h = scene.m.astype(np.longdouble), np.longdouble(self.trajectory.step)
-        force = mechanics.force(scene.terms)
+        force = scene.system.force
         with np.errstate(over="ignore", invalid="ignore"):
             for kind, c in stages:
                 ch = schemes.number(c, np.longdouble) * h
                 if kind == "drift":
                     q = np.asarray(q + ch * (p / m), np.longdouble)
                 else:
-                    found.append(mechanics.magnitude(scene.terms, q))
+                    found.append(scene.system.magnitude(q))
                     p = np.asarray(p + ch * force(q, p), np.longdouble)
         return found
 
@@ -213,12 +215,14 @@ class Case:
         """
         peak = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble)
 
+        system = self.judged.system
+
         def watched(terms: Iterable[Term]) -> Force:
             parts = tuple(terms)
-            true = mechanics.force(parts)
+            true = system.force_of(parts)
 
             def force(q: Reals, p: Reals) -> Reals:
-                np.maximum(peak, mechanics.strongest(parts, q), out=peak)
+                np.maximum(peak, system.strongest(q, parts), out=peak)
                 return true(q, p)
 
             return force
@@ -238,20 +242,19 @@ class Case:
         centre = self.modes.centre()
         axes = schemes.condition(self.matrices, self.w)
         reach = np.hypot(self.w * (y - centre), v) * np.where(np.isfinite(axes), axes, 1)
-        spread = np.eye(self.scene.n) if self.modes.vectors is None else np.abs(self.modes.vectors)
         rest, _ = self.modes.out_of(centre, np.zeros_like(centre))
-        q = np.abs(rest) + spread @ (reach / self.w) / self.modes.root_m
-        return np.asarray(q), np.asarray(spread @ reach * self.modes.root_m)
+        q = np.abs(rest) + self.modes.spread(reach / self.w) / self.modes.root_m
+        return np.asarray(q), np.asarray(self.modes.spread(reach) * self.modes.root_m)
 
     @cached_property
     def rest_positions(self) -> Floats:
         """Where springs between particles have their rest lengths, 0 where they cannot agree (n,)."""
-        found = mechanics.rest_positions(self.judged)
+        found = self.judged.system.rest_positions
         return np.zeros(self.scene.n) if found is None else found
 
     @cached_property
-    def norm(self) -> mechanics.Norm:
-        return mechanics.norm(self.judged)
+    def norm(self) -> Norm:
+        return self.judged.system.norm
 
     @cached_property
     def rounding(self) -> float:
@@ -277,15 +280,6 @@ def overflows(how: Arithmetic) -> str:
     return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
 
 
-def _pulls(scene: Scene) -> Integers:
-    """How many terms pull at each particle (n,)."""
-    count = np.zeros(scene.n, dtype=np.int64)
-    for term in scene.terms:
-        for end in particles(term):
-            np.add.at(count, end, 1)
-    return count
-
-
 REPEATED = 1000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""
 
@@ -296,15 +290,15 @@ def advance(
     p: Extended,
     steps: int,
     *,
-    forces: Callable[[Iterable[Term]], Force] = mechanics.force,
+    forces: Callable[[Iterable[Term]], Force] | None = None,
 ) -> tuple[Extended, Extended]:
     """So many steps of the scheme from states (f, n), in extended precision; `forces` makes the forces."""
     if steps > REPEATED and case.linear:
         return _leap(case, q, p, steps)
     scene = case.judged
+    forces = forces or scene.system.force_of
     force = forces(scene.terms)
-    slow, fast = mechanics.split(scene.terms)
-    parts = forces(slow), forces(fast)
+    parts = forces(scene.system.slow), forces(scene.system.fast)
     m = scene.m.astype(np.longdouble)
     a: Reals = q
     b: Reals = p

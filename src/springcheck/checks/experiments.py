@@ -11,7 +11,6 @@ from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.recorded import fastest
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Verdict
 
@@ -20,9 +19,9 @@ def _no_matrix(bench: Bench) -> str | None:
     """Why there is no one-step matrix to recover, or None."""
     if not bench.scheme.one_step:
         return "an adaptive solver has no one-step map; it is judged by its tolerance"
-    if not mechanics.is_linear(bench.scene):
+    if not bench.scene.system.is_linear:
         return "an anharmonic scene's step is no matrix; the step defect judges it"
-    if not mechanics.has_modes(bench.scene):
+    if not bench.scene.system.has_modes:
         return "friction couples the modes; the step defect judges it"
     if bench.scene.n > LARGEST:
         return f"of more than {LARGEST} particles the step defect says as much"
@@ -59,7 +58,7 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     """
     case, pushes = bench.copies
     n = bench.scene.n
-    k = np.abs(np.diag(mechanics.stiffness(bench.scene, bench.scene.q))).astype(np.float64)
+    k = np.abs(np.diag(bench.scene.system.hessian(bench.scene.q))).astype(np.float64)
     k = np.where(k > 0, k, bench.scene.m / bench.scene.step**2)
     root = (bench.scene.m * k) ** 0.25
     scale = np.concatenate([1 / root, root])
@@ -116,7 +115,7 @@ def symplecticity(bench: Bench) -> Verdict:
         return bench.not_applicable("symplecticity", why_not)
     if not bench.scheme.symplectic:
         return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
-    if mechanics.is_damped(bench.scene):
+    if bench.scene.system.is_damped:
         return bench.not_applicable("symplecticity", "friction contracts area")
     if len(bench.copies[0].trajectory.t) < 2:
         return bench.verdict("symplecticity", float("inf"), 0.0, "of an action", ENDED)
@@ -158,7 +157,7 @@ def _shifted(
     q, p = (x.astype(np.longdouble) for x in state)
     h = np.longdouble(sign * scene.step)
     if scheme.stages[0][0] == "kick":
-        p = p + h * mechanics.force(scene.terms)(q, p)
+        p = p + h * scene.system.force(q, p)
     else:
         q = q + h * (p / scene.m)
     return np.asarray(q, np.float64), np.asarray(p, np.float64)
@@ -170,7 +169,7 @@ def reversibility(bench: Bench) -> Verdict:
     two_stage = len(scheme.stages) == 2
     if not scheme.one_step:
         return bench.not_applicable("reversibility", "an adaptive solver chooses other steps on its way back")
-    if mechanics.is_damped(bench.scene):
+    if bench.scene.system.is_damped:
         return bench.not_applicable("reversibility", "friction is not undone by going back")
     if not symmetric(scheme) and not two_stage:
         return bench.not_applicable(
@@ -226,7 +225,7 @@ def mirror(bench: Bench) -> Verdict:
     """A negative step does what flipped momenta do, bit for bit."""
     if not bench.scheme.one_step:
         return bench.not_applicable("mirror", "an adaptive solver is judged by its tolerance")
-    if mechanics.is_damped(bench.scene):
+    if bench.scene.system.is_damped:
         return bench.not_applicable("mirror", "friction knows forwards from backwards")
     steps = min(bench.scene.steps, 20)
     flipped = bench.run(replace(bench.scene, p=-bench.scene.p, steps=steps, every=1), bench.label)

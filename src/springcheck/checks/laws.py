@@ -18,7 +18,7 @@ from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
 from springcheck.checks.experiments import symmetric
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, WallSpring
 from springcheck.trajectory import Trajectory, Verdict
@@ -83,7 +83,7 @@ def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
     if not scheme.one_step:
         return bench.not_applicable(check, "an adaptive solver chooses its order as it goes")
     truth = _truth(where, DURATION)
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     h, error, floor = [], [], []
     for j in range(HALVINGS):
         steps = COARSEST * 2**j
@@ -135,7 +135,7 @@ def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extend
     Velocity Verlet with 24, 48, 72 ... steps; its error has even powers of the step alone, and
     Neville's scheme removes one with each level (Hairer, Lubich & Wanner, V.3; Gragg 1965).
     """
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     rows: list[tuple[Extended, Extended]] = []
     counts = [24 * (j + 1) for j in range(levels)]
     for count in counts:

@@ -11,8 +11,8 @@ from springcheck import schemes
 from springcheck.arrays import Extended, Floats, Reals
 from springcheck.checks.case import REPEATED, Case, overflows
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import exact, mechanics
-from springcheck.physics.terms import particles
+from springcheck.physics import exact
+from springcheck.physics.system import MOST_JOINED
 from springcheck.trajectory import Verdict
 
 CONTRACTED = 1e-3
@@ -134,9 +134,9 @@ def rates_met(case: Case, *states: Reals) -> Floats:
 
     By Gershgorin's circles.
     """
-    rows = [mechanics.steepness(case.judged, q.astype(np.longdouble)) / case.judged.m for q in states]
+    rows = [case.judged.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
     steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
-    return np.asarray(np.sqrt(steepest) + np.max(mechanics.rates(case.judged)), np.float64)
+    return np.asarray(np.sqrt(steepest) + np.max(case.judged.system.friction_rates), np.float64)
 
 
 def fastest(case: Case) -> float:
@@ -153,7 +153,7 @@ def _closed(case: Case) -> str | None:
     if not case.linear:
         return (
             "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
-            f"or more than {mechanics.MOST_JOINED} particles are joined"
+            f"or more than {MOST_JOINED} particles are joined"
         )
     if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
         return "a mode under a constant pull has no closed form here"
@@ -261,7 +261,7 @@ def frequency(case: Case) -> Verdict:
     why_not = _closed(case)
     if why_not:
         return case.not_applicable("frequency", why_not)
-    if mechanics.is_damped(case.scene):
+    if case.scene.system.is_damped:
         return case.not_applicable("frequency", "a phase that decays is seen in the closed form")
     turn = schemes.rotation(case.matrices)
     y0, v0 = case.modes.into(case.scene.q, case.scene.p)
@@ -366,7 +366,7 @@ def energies(case: Case) -> Verdict:
     if run.energy is None:
         return case.not_applicable("energies", "the scene keeps no energies")
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        again = np.asarray(mechanics.energy(case.scene, run.q, run.p), np.float64)
+        again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
     same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
     # the energy of finite states may overflow; states that are no numbers have none
     same &= np.isfinite(run.q).all(axis=1) & np.isfinite(run.p).all(axis=1)
@@ -410,13 +410,13 @@ def tolerance_bound(case: Case) -> float:
     duration = abs(float(run.t[-1]))
     growth = np.longdouble(1)
     states = run.q, run.p
-    if not mechanics.is_linear(case.scene):
+    if not case.scene.system.is_linear:
         growth += fastest(case) * duration / 2
     elif case.linear and np.any(case.modes.w2 < 0):
         turn = np.sqrt(np.max(-case.modes.w2)) * duration
         with np.errstate(over="ignore"):
             growth = np.exp(turn) * max(turn, np.longdouble(1))
-        if mechanics.is_separate(case.scene):
+        if case.scene.system.is_separate:
             # what a state has grown to, an error made there no longer grows: from the start, both together
             states = case.scene.q[None], case.scene.p[None]
     local = _worst_local_error(case, *states)
@@ -428,13 +428,10 @@ def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
     """The largest local error at states (f, n) that passes, in tolerances and in units of the start."""
     scene = case.judged
     # extended: the squares of large states leave the range of a double
-    of_q, of_p = (x.astype(np.longdouble) for x in mechanics.amplitudes(scene))
+    of_q, of_p = (x.astype(np.longdouble) for x in scene.system.amplitudes)
     weight_q, weight_p = np.max(np.abs(q), axis=0) + of_q, np.max(np.abs(p), axis=0) + of_p
-    # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `mechanics.Norm`
-    stiff = np.zeros(scene.n)
-    for term in scene.terms:
-        for end in particles(term):
-            np.add.at(stiff, end, term.rigidity * term.bodies)
+    # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `Norm`
+    stiff = scene.system.rigidity.copy()
     for group in case.norm.groups:
         stiff[group] += scene.m[group] / case.norm.duration**2
     largest = np.max(np.maximum(stiff * weight_q**2, weight_p**2 / scene.m)) / 2

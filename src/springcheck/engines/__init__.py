@@ -23,7 +23,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from typing import Protocol, cast
 
-from springcheck.engines.contract import Arithmetic, Label, Method, Simulation
+from springcheck.engines.contract import ANY_POTENTIAL, Arithmetic, Label, Method, Simulation
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 
@@ -161,11 +161,12 @@ def refusal(scene: Scene, label: Label) -> str | None:
         others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}
         who = "it" if scene.kind in others else engine(label.engine).title
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
-    missing = sorted({term.key for term in scene.terms} - what.terms)
+    unknown = (term for term in scene.terms if not (term.is_potential and ANY_POTENTIAL in what.terms))
+    missing = sorted({term.key for term in unknown} - what.terms)
     if missing:
         return f"it has no {' and no '.join(missing)} term"
     here = {term.key for term in scene.terms}
-    if any(getattr(term, "fast", False) for term in scene.terms):
+    if any(term.fast for term in scene.terms):
         here.add("springs marked fast")
     needed = sorted(what.requires - here)
     if needed:

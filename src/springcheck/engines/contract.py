@@ -7,6 +7,9 @@ from typing import Literal, Protocol
 
 from springcheck.arrays import Floats
 
+ANY_POTENTIAL = "any potential"
+"""Among the terms of a method: it takes the force of every potential as a function, whatever its law."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:

@@ -2,54 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal, TypeAlias
 
-from springcheck.arrays import Floats, Reals
+from springcheck.arrays import Floats
+from springcheck.physics.system import System
+from springcheck.physics.term import Term
 
 Kind: TypeAlias = Literal["particles", "circuit", "rotor"]
 Units: TypeAlias = Literal["reduced", "md", "si"]
 
 
-class Term(Protocol):
-    """One part of a scene's Hamiltonian, or of its friction: arrays of parameters and what they do."""
-
-    @property
-    def key(self) -> str:
-        """The name of its table in a scene file."""
-        ...
-
-    @property
-    def bodies(self) -> int:
-        """1 where it acts on single particles `i`, 2 where it joins pairs `a`, `b`."""
-        ...
-
-    def energy(self, q: Reals) -> Reals:
-        """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
-        ...
-
-    def add_force(self, q: Reals, p: Reals, out: Reals) -> None:
-        """Add the force at (q, p), each (..., n), to out (..., n) [M L/T2]."""
-        ...
-
-    def add_magnitude(self, q: Reals, p: Reals, out: Reals, near: Reals | None) -> None:
-        """Add what bounds the rounding of add_force at states of sizes q, p (see `mechanics.magnitude`)."""
-        ...
-
-    def curvature(self, q: Reals) -> Reals:
-        """Second derivative of each energy by its spring's elongation, at q (..., n) -> (..., s) [M/T2].
-
-        A constant may come back as (s,).
-        """
-        ...
-
-    @property
-    def rigidity(self) -> Floats:
-        """Its absolute value at the term's own rest (s,) [M/T2]: what errors of position are weighed by."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
     """What is to be simulated: a system, its start, its time grid, and what is asked of it."""
 
@@ -79,3 +44,20 @@ class Scene:
     def frames(self) -> int:
         """Number of recorded states, the start among them."""
         return self.steps // self.every + 1
+
+    @cached_property
+    def system(self) -> System:
+        """What follows from the scene: forces, energies, modes and the like, each worked out once."""
+        return System(self)
+
+    def derived(self, **changes: Any) -> Scene:
+        """Like `replace`, for numbers that follow from a scene's own and are not checked again.
+
+        They may be inf, where an engine of single precision would keep them so.
+        """
+        twin = object.__new__(type(self))
+        twin.__dict__.update({field.name: getattr(self, field.name) for field in fields(self)}, **changes)
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}

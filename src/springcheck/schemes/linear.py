@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.arrays import Extended, Floats, Integers, Reals
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.stepping import step
@@ -72,17 +71,16 @@ def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
     """
     n = scene.n
     z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
-    slow, fast = mechanics.split(scene.terms)
     q, p = step(
         scheme,
         z[:, :n],
         z[:, n:],
         h=h,
         m=scene.m.astype(np.longdouble),
-        force=mechanics.force(scene.terms),
-        stiffness=mechanics.stiffness(scene, scene.q) if scheme.implicit else None,
-        rate=mechanics.rates(scene),
-        parts=(mechanics.force(slow), mechanics.force(fast)),
+        force=scene.system.force,
+        stiffness=scene.system.hessian(scene.q) if scheme.implicit else None,
+        rate=scene.system.friction_rates,
+        parts=scene.system.parts,
     )
     after = np.concatenate([q, p], axis=1)
     return np.asarray((after[1:] - after[0]).T, np.longdouble)

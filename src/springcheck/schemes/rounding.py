@@ -26,7 +26,7 @@ def magnitude_step(
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `mechanics.magnitude`; `kicks` are one for each kick of a splitting,
+    `magnitude` and `parts` are made by `System.magnitude`; `kicks` are one for each kick of a splitting,
     near where it takes place, and stand for `magnitude` where they are given.  An implicit scheme's is
     carried through the solution of its equation.
     """

@@ -35,7 +35,7 @@ def step(
 
     Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
     particle is joined to another; double precision is enough, because it only steers an iteration whose
-    residual has the full width.  `rate` is `mechanics.rates`, left out where nothing is damped; `parts`
+    residual has the full width.  `rate` is `System.friction_rates`, left out where nothing is damped; `parts`
     are the forces of the slow and the fast springs, for the schemes that part them.
     """
     width = q.dtype.type

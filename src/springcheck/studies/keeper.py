@@ -161,8 +161,6 @@ class Draft:
 
     def finish(self, record: simulate.Record) -> str:
         """Keep it, with what is known of the run -> digest."""
-        if record.outcome.status == "interrupted":
-            raise KeyboardInterrupt
         empty = np.empty(0)
         return self._draft.finish(store.attributes(simulate.trajectory(record, empty, empty, empty, None)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from springcheck.engines import Engine
-from springcheck.engines.contract import Method
+from springcheck.engines.contract import ANY_POTENTIAL, Method
 
 ENGINE = Engine(
     name="ase",
@@ -16,7 +16,7 @@ ENGINE = Engine(
             name="velocity-verlet",
             scheme="velocity-verlet",
             about="ase.md.verlet.VelocityVerlet",
-            terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "morse"}),
+            terms=frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse"}),
         )
     },
 )

@@ -19,8 +19,8 @@ from ase.md.verlet import VelocityVerlet
 
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Arithmetic, Label, Method, Simulation
-from springcheck.physics import mechanics
-from springcheck.physics.scene import Scene, Term
+from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 
 NANOMETRE = 10.0 * ase.units.Ang
 PICOSECOND = 1000.0 * ase.units.fs
@@ -46,11 +46,10 @@ class Springs(Calculator):  # type: ignore[misc]
 
     implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
 
-    def __init__(self, terms: tuple[Term, ...], length: float, time: float) -> None:
+    def __init__(self, system: System, length: float, time: float) -> None:
         super().__init__()
         self.force_calls = 0
-        self._terms = terms
-        self._force = mechanics.force(terms)
+        self._system = system
         self._length = length
         self._of_force = length / time**2
 
@@ -63,12 +62,12 @@ class Springs(Calculator):  # type: ignore[misc]
         if "forces" in properties:
             self.force_calls += 1
             forces = np.zeros((len(q), 3))
-            forces[:, 0] = self._force(q, q)
+            forces[:, 0] = self._system.force(q, q)
             if self._of_force != 1.0:
                 forces *= self._of_force
             self.results["forces"] = forces
         if "energy" in properties:
-            energy = sum(float(term.energy(q)) for term in self._terms)
+            energy = sum(float(term.energy(q)) for term in self._system.terms)
             self.results["energy"] = energy * self._of_force * self._length
 
 
@@ -80,7 +79,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     momenta = np.zeros((scene.n, 3))
     momenta[:, 0] = scene.p * (length / time)
     atoms = Atoms(numbers=np.zeros(scene.n, dtype=int), positions=positions, masses=scene.m, momenta=momenta)
-    atoms.calc = Springs(scene.terms, length, time)
+    atoms.calc = Springs(scene.system, length, time)
     return _Dynamics(atoms, VelocityVerlet(atoms, timestep=step * time), length, length / time)
 
 

@@ -30,9 +30,8 @@ from springcheck.arrays import Floats, Force
 from springcheck.engines import quiet
 from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
 from springcheck.errors import MethodError
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Morse, Spring, WallSpring
+from springcheck.physics.terms import Morse, Spring, WallSpring
 from springcheck.schemes import SCHEMES
 
 FIXED_POINT = 2.0**-32
@@ -82,6 +81,10 @@ CUSTOM_EXCESS = 2.0**-32
 its forces are too large by 2.3e-10.  springcheck's step defect showed it before the source was read."""
 
 
+ATTENTIVE = 500
+"""Steps in one call, which hears no Ctrl-C: 1.5 ms on Reference, 0.1 s on OpenCL; a call takes 1 us."""
+
+
 def version() -> dict[str, str]:
     """Version of OpenMM."""
     return {"openmm": str(mm.Platform.getOpenMMVersion())}
@@ -110,11 +113,11 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     Raises MethodError where the platform is not here, and for friction backwards in time: OpenMM takes no
     negative step, and friction is not undone by reflecting the momenta.
     """
-    if step < 0 and mechanics.is_damped(scene):
+    if step < 0 and scene.system.is_damped:
         raise MethodError(f"{label}: OpenMM takes no negative step, so friction runs forwards in time only")
     if arithmetic(label).parameters == "single":
         # the half kicks below must be those of the springs that OpenMM feels
-        scene = mechanics.in_single(scene)
+        scene = scene.system.in_single
     origins = _origins(scene, method)
     system, positions = _system(scene, origins)
     integrator = _integrator(scene, method.name, step)
@@ -135,7 +138,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
 
 def _pull(scene: Scene) -> Force:
     """The force that OpenMM computes: all but friction."""
-    return mechanics.force(term for term in scene.terms if not isinstance(term, Damping))
+    return scene.system.potential_force
 
 
 def _origins(scene: Scene, method: Method) -> Floats:
@@ -151,11 +154,11 @@ def _origins(scene: Scene, method: Method) -> Floats:
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
     with np.errstate(over="ignore"):
         # Gershgorin's bound of the squared frequencies
-        w2 = np.max(mechanics.steepness(replace(scene, terms=tuple(springs)), scene.q) / scene.m)
+        w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
     bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
-    energy = float(mechanics.energy(scene, scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
+    energy = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 
     def safe(term: Spring) -> bool:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
@@ -163,7 +166,7 @@ def _origins(scene: Scene, method: Method) -> Floats:
 
     if all(safe(term) for term in pairs):
         return origins
-    rest = mechanics.rest_positions(scene)
+    rest = scene.system.rest_positions
     if rest is None:
         raise MethodError(
             f"{scene.name}: springs in a ring have no common rest, and OpenMM's HarmonicBondForce knows only "
@@ -181,7 +184,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
     for term in scene.terms:
-        bonds = fast if getattr(term, "fast", False) else slow
+        bonds = fast if term.fast else slow
         if isinstance(term, WallSpring):
             anchors: dict[float, int] = {}
             for i, k, at in zip(
@@ -238,7 +241,7 @@ def _morse(term: Morse, origins: Floats) -> mm.CustomBondForce:
 
 def _stays_right_way_round(scene: Scene, term: Morse) -> None:
     """MethodError where a Morse bond could reach length 0: OpenMM's knows its length, not its sign."""
-    energy = 4 * float(mechanics.energy(scene, scene.q, scene.p))
+    energy = 4 * float(scene.system.energy(scene.q, scene.p))
     barrier = term.depth * np.expm1(term.steepness * term.rest) ** 2
     if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
         raise MethodError(
@@ -258,7 +261,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
     if name == "langevin-middle":
-        rate = mechanics.rates(scene).astype(np.float64)
+        rate = scene.system.friction_rates.astype(np.float64)
         if np.ptp(rate) > 2.0**-52 * np.max(rate):
             raise MethodError(
                 "openmm:langevin-middle has one friction rate for all particles, and damping/mass of scene "
@@ -334,7 +337,10 @@ class _Context:
         row = 0
         try:
             for row in range(len(q)):
-                take(every)
+                for _ in range(every // ATTENTIVE):
+                    take(ATTENTIVE)
+                if every % ATTENTIVE:
+                    take(every % ATTENTIVE)
                 state = get(positions=True, velocities=True)
                 state._getVectorAsNumpy(positions, x)
                 state._getVectorAsNumpy(velocities, v)

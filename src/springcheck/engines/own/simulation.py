@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from types import FunctionType
@@ -21,9 +21,9 @@ from springcheck.arrays import Floats
 from springcheck.engines.contract import Arithmetic, Label, Method
 from springcheck.engines.own import kernels
 from springcheck.errors import MethodError
-from springcheck.physics import mechanics
+from springcheck.physics import terms
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, WallSpring
+from springcheck.physics.terms import Damping, Term, WallSpring
 
 WORTH = 1_000_000
 """Spring-steps from which compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
@@ -37,16 +37,6 @@ LANES = 8
 
 STAGGER = 9 * LANES
 """Numbers left free between two rows of `many`; see `_blocks`."""
-
-FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "wall-spring": (("i",), ("k", "at")),
-    "spring": (("a", "b"), ("k", "rest")),
-    "quartic": (("i",), ("b", "at")),
-    "cosine": (("i",), ("depth", "wave", "at")),
-    "morse": (("a", "b"), ("depth", "steepness", "rest")),
-    "damping": (("i",), ("c", "m")),
-}
-"""Indices and parameters of each kind of term, in the order in which its loop in `kernels` takes them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,7 +121,7 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
     implicit = method == "implicit-euler"
     # friction is part of what implicit Euler solves for: 1 + h c/m stands where 1 does without it
-    slowed = 1 + h * mechanics.rates(scene).astype(np.float64)
+    slowed = 1 + h * scene.system.friction_rates.astype(np.float64)
     if implicit:
         scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, Damping)))
     walls = _single_walls(scene)
@@ -161,10 +151,10 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
         )
     keys = frozenset(term.key for term in scene.terms)
     # the types of absent terms differ from those of empty ones: numba tells saved kernels apart by types
-    terms = tuple(_rows(scene, key) if key in keys else () for key in kernels.LAWS)
+    tables = tuple(_rows(scene, key) if key in keys else () for key in kernels.LAWS)
     kernel = kernels.JOINED[method]
     solver: tuple[Floats, ...] = ()
-    work = float(scene.n + sum(len(rows[0]) for rows in terms if rows))
+    work = float(scene.n + sum(len(row[0]) for row in tables if row))
     if implicit and _is_chain(scene):
         kernel, solver = kernels.CHAIN[method], _factors(scene, h, slowed)
         work += scene.n
@@ -176,7 +166,7 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
         kernel=kernel,
         keys=keys,
         n=scene.n,
-        constants=(m, terms, np.zeros(scene.n), *solver),
+        constants=(m, tables, np.zeros(scene.n), *solver),
         q=q,
         p=p,
         work=work,
@@ -217,14 +207,20 @@ def _blocks(rows: Sequence[Floats]) -> list[Floats]:
 
 
 def _rows(scene: Scene, key: str) -> tuple[Any, ...]:
-    """Indices and parameters of all terms of one kind, each (s,); s is 0 where the scene has none."""
-    indices, parameters = FIELDS[key]
+    """Indices and parameters of all terms of one kind, each (s,); s is 0 where the scene has none.
+
+    In the order of the term's columns, as its loop in `kernels` takes them; friction also takes the masses.
+    """
+    kind = terms.known()[key]
     found = [term for term in scene.terms if term.key == key]
-    return tuple(
-        np.concatenate([np.empty(0, kind), *(np.asarray(getattr(term, name), kind) for term in found)])
-        for names, kind in ((indices, np.int64), (parameters, np.float64))
-        for name in names
-    )
+    ends = [np.concatenate([np.empty(0, np.int64), *(x)]) for x in _together(kind.ends, found)]
+    columns = [column.field for column in kind.columns]
+    rows = [np.concatenate([np.empty(0), *(x)]) for x in _together(columns, found)]
+    return (*ends, *rows, scene.m[ends[0]]) if key == "damping" else (*ends, *rows)
+
+
+def _together(names: Sequence[str], found: Sequence[Term]) -> Iterator[list[Any]]:
+    return ([getattr(term, name) for term in found] for name in names)
 
 
 def _is_chain(scene: Scene) -> bool:
@@ -262,7 +258,7 @@ def _inverse(scene: Scene, h: float, slowed: Floats | float = 1.0) -> Floats:
             f"own:implicit-euler serves at most {DENSE} particles joined other than as a chain; "
             f"scene {scene.name!r} has {scene.n}; leave the method out"
         )
-    k = np.asarray(mechanics.stiffness(scene, scene.q), dtype=np.float64)
+    k = np.asarray(scene.system.hessian(scene.q), dtype=np.float64)
     try:
         return np.ascontiguousarray(np.linalg.inv(np.eye(scene.n) * slowed + h * h * (k / scene.m)).T)
     except np.linalg.LinAlgError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from springcheck.engines import Engine
-from springcheck.engines.contract import Method
+from springcheck.engines.contract import ANY_POTENTIAL, Method
 
 
 def _method(name: str, about: str) -> Method:
@@ -13,7 +13,7 @@ def _method(name: str, about: str) -> Method:
         scheme=name,
         about=about,
         adaptive=True,
-        terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "morse", "damping"}),
+        terms=frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse", "damping"}),
         kinds=frozenset({"particles", "circuit", "rotor"}),
     )
 

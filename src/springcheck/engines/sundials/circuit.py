@@ -15,16 +15,15 @@ import numpy as np
 from sksundae.ida import IDA
 
 from springcheck.arrays import Floats
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 
 
 def solver(scene: Scene, atol: Floats, most_steps: int, called: Callable[[float], None]) -> IDA:
     """IDA standing at the start, its vector (q, p, i).  `atol` is of (q, p); `called` gets every t asked."""
     n, m = scene.n, scene.m
-    force = mechanics.force(scene.terms)
-    stiffness = np.asarray(mechanics.stiffness(scene, scene.q), np.float64)
-    resistance = np.asarray(mechanics.rates(scene) * m, np.float64)
+    force = scene.system.force
+    stiffness = np.asarray(scene.system.hessian(scene.q), np.float64)
+    resistance = np.asarray(scene.system.friction_rates * m, np.float64)
     one = np.eye(n)
 
     def residual(t: float, y: Floats, yp: Floats, out: Floats) -> None:

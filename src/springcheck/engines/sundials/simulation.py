@@ -18,7 +18,6 @@ from springcheck.arrays import Floats
 from springcheck.engines import quiet
 from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
@@ -49,7 +48,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
 
 def absolute_tolerance(scene: Scene) -> Floats:
     """`scene.tolerance` times the amplitude of each component of (q, p) at the energy of the start (2n,)."""
-    found = scene.tolerance * np.concatenate(mechanics.amplitudes(scene))
+    found = scene.tolerance * np.concatenate(scene.system.amplitudes)
     # a component that never moves needs a weight too; any will do
     return np.asarray(np.where(found > 0, found, scene.tolerance))
 
@@ -61,9 +60,9 @@ soft spring beside a stiff one would lose more, and is evaluated spring by sprin
 
 def _suits_matrix(scene: Scene) -> bool:
     """Whether the right-hand side may be one matrix product, five times as fast for a few particles."""
-    if not mechanics.is_linear(scene) or scene.n > 32:
+    if not scene.system.is_linear or scene.n > 32:
         return False
-    k = np.abs(np.concatenate([term.k for term in scene.terms if hasattr(term, "k")] or [np.ones(1)]))
+    k = np.abs(np.concatenate([term.rigidity for term in scene.terms if term.is_potential] or [np.ones(1)]))
     return bool(np.max(k) <= MOST_ALIKE * np.min(k))
 
 
@@ -73,9 +72,9 @@ def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     zero = np.zeros(n)
     slope, pull = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     slope[:n, n:] = np.diag(1 / scene.m)
-    slope[n:, :n] = -mechanics.stiffness(scene, zero)
-    slope[n:, n:] = -np.diag(mechanics.rates(scene))
-    pull[n:] = mechanics.force(scene.terms)(zero, zero)
+    slope[n:, :n] = -scene.system.hessian(zero)
+    slope[n:, n:] = -np.diag(scene.system.friction_rates)
+    pull[n:] = scene.system.force(zero, zero)
     return slope, pull
 
 
@@ -115,11 +114,11 @@ class _Solver:
         self.asked: set[float] | None = None
         """Times at which the force was asked for, where somebody counts them."""
         n, m = scene.n, scene.m
-        force = mechanics.force(scene.terms)
+        force = scene.system.force
         as_matrix = _suits_matrix(scene)
         slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
         pulled = bool(np.any(pull))
-        rates = mechanics.rates(scene).astype(np.float64)
+        rates = scene.system.friction_rates.astype(np.float64)
 
         def by_terms(t: float, y: Floats, yp: Floats) -> None:
             self._called(t)
@@ -138,7 +137,7 @@ class _Solver:
                 jacobian[:] = slope
             else:
                 jacobian[:n, n:] = np.diag(1 / m)
-                jacobian[n:, :n] = -mechanics.stiffness(scene, y[:n])
+                jacobian[n:, :n] = -scene.system.hessian(y[:n])
                 jacobian[n:, n:] = -np.diag(rates)
 
         self._n, self._step, self._done = n, step, 0

@@ -9,9 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from springcheck.arrays import Floats, Reals
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import particles
 
 LARGE = 32
 """Particles above which the sparse solver is taken; below, the dense one is faster."""
@@ -22,13 +20,13 @@ def options(scene: Scene) -> dict[str, Any]:
     n = scene.n
     rows, columns = [np.arange(n), n + np.arange(n)], [n + np.arange(n)] * 2
     for term in scene.terms:
-        ends = particles(term)
+        ends = term.particles
         for i in ends:
             for j in ends:
                 rows.append(n + i)
                 columns.append(j)
     where = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
-    constant: list[Reals] = [1 / scene.m, -mechanics.rates(scene).astype(np.float64)]
+    constant: list[Reals] = [1 / scene.m, -scene.system.friction_rates.astype(np.float64)]
 
     def matrix(values: Reals) -> Any:
         # elements of the same place are added up, in the order of columns that SuperLU takes

@@ -9,20 +9,22 @@ each mode by itself too, which is why limits and shadow energies are read off he
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck.arrays import Extended, Integers, Reals
-from springcheck.physics import mechanics
 from springcheck.physics.exact.elliptic import EPS
-from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import Spring
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+    from springcheck.physics.system import System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Modes:
-    """Normal modes: q = M**-1/2 V y.  `vectors` is None where no term joins two particles (V = 1).
+    """Normal modes: q = M**-1/2 V y.  `vectors` is None where V is not kept: 1, or sines (`waves`).
 
     w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2];
     rate (n,): that of its friction, c/m [1/T].
@@ -34,7 +36,7 @@ class Modes:
     root_m: Extended
     vectors: Extended | None
     waves: bool = False
-    """Whether the vectors are sines, so that a fast Fourier transform takes the place of their product."""
+    """Whether V is of sines, sqrt(2/(n+1)) sin(pi r j/(n+1)): a fast Fourier transform takes its place."""
 
     def into(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
         """Mode coordinates y [M1/2 L] and velocities [M1/2 L/T] of states (..., n)."""
@@ -46,11 +48,17 @@ class Modes:
         return self._turned(y, True) / self.root_m, self._turned(v, True) * self.root_m
 
     def _turned(self, y: Extended, back: bool) -> Extended:
-        if self.vectors is None:
-            return y
         if self.waves:
             return _sines(y)
+        if self.vectors is None:
+            return y
         return y @ (self.vectors.T if back else self.vectors)
+
+    def spread(self, reach: Extended) -> Extended:
+        """|V| reach (n,): bound of what modes of these amplitudes add up to on each particle."""
+        if self.waves:
+            return _absolute_sines(reach)
+        return reach if self.vectors is None else np.abs(self.vectors) @ reach
 
     def centre(self) -> Extended:
         """Rest position of each mode, 0 for a mode that nothing holds (w2 = 0)."""
@@ -62,50 +70,50 @@ SMALL = 32
 """Particles up to which modes are found to high relative accuracy, at a cost of about 10 n**3."""
 
 
-def modes(scene: Scene) -> Modes:
-    """Normal modes of a linear scene.
+def normal_modes(system: System) -> Modes:
+    """Normal modes of a linear system.
 
     Errors of w2 are about n EPS of each value itself where no particle is joined to another, and up to
     `SMALL` particles that nothing pushes apart (no negative stiffness); elsewhere n EPS max(w2).
+    ValueError: it has none, or they cannot be had (see `System.has_modes`).
     """
-    if not mechanics.has_modes(scene):
+    if not system.has_modes:
         raise ValueError(
-            f"scene {scene.name!r} has no normal modes here: it is not linear, friction couples them, "
-            f"or more than {mechanics.MOST_JOINED} particles are joined"
+            f"scene {system.scene.name!r} has no normal modes here: it is not linear, friction couples them, "
+            "or more particles are joined than modes are computed for"
         )
-    root_m = np.sqrt(scene.m.astype(np.longdouble))
-    zero = np.zeros(scene.n, dtype=np.longdouble)
-    pull: Extended = np.asarray(mechanics.force(scene.terms)(zero, zero) / root_m, np.longdouble)
-    rate = mechanics.rates(scene)
-    if mechanics.is_separate(scene):
-        k = mechanics.own_stiffness(scene, zero)
-        return Modes(w2=k / scene.m, pull=pull, rate=rate, root_m=root_m, vectors=None)
-    if scene.n > SMALL and mechanics.is_uniform_chain(scene):
-        w2 = _wave_frequencies(scene)
-        vectors = _wave_shapes(scene.n)
-        return Modes(w2=w2, pull=_sines(pull), rate=rate, root_m=root_m, vectors=vectors, waves=True)
-    rows = _spring_rows(scene, root_m) if scene.n <= SMALL else None
+    root_m = np.sqrt(system.m.astype(np.longdouble))
+    zero = np.zeros(system.n, dtype=np.longdouble)
+    pull: Extended = np.asarray(system.force(zero, zero) / root_m, np.longdouble)
+    rate = system.friction_rates
+    if system.is_separate:
+        k = system.hessian_diagonal(zero)
+        return Modes(w2=k / system.m, pull=pull, rate=rate, root_m=root_m, vectors=None)
+    if system.n > SMALL and system.is_uniform_chain:
+        w2 = _wave_frequencies(system)
+        return Modes(w2=w2, pull=_sines(pull), rate=rate, root_m=root_m, vectors=None, waves=True)
+    rows = _spring_rows(system, root_m) if system.n <= SMALL else None
     if rows is not None:
         w2, vectors = _graded(rows)
-        free = len(mechanics.free_groups(scene))
+        free = len(system.free_groups)
         w2[np.argsort(w2)[:free]] = 0
     else:
-        scaled = mechanics.stiffness(scene, zero) / root_m[:, None] / root_m
+        scaled = system.hessian(zero) / root_m[:, None] / root_m
         w2, vectors = _eigen(np.asarray(scaled, np.longdouble))
         # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
-        w2 = np.where(np.abs(w2) <= 8 * scene.n * EPS * np.max(np.abs(w2)), 0, w2)
-    pulls = np.where(w2 == 0, _drag(scene, pull * root_m) @ vectors, pull @ vectors)
+        w2 = np.where(np.abs(w2) <= 8 * system.n * EPS * np.max(np.abs(w2)), 0, w2)
+    pulls = np.where(w2 == 0, _drag(system, pull * root_m) @ vectors, pull @ vectors)
     return Modes(w2=w2, pull=pulls, rate=rate, root_m=root_m, vectors=vectors)
 
 
-def _drag(scene: Scene, force: Extended) -> Extended:
+def _drag(system: System, force: Extended) -> Extended:
     """The part of a force (n,) that moves free groups as a whole, and all of it elsewhere, per root of mass.
 
     Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
     """
-    out: Extended = np.asarray(force / np.sqrt(scene.m.astype(np.longdouble)))
-    for group in mechanics.free_groups(scene):
-        m, total = scene.m[group].astype(np.longdouble), np.sum(force[group])
+    out: Extended = np.asarray(force / np.sqrt(system.m.astype(np.longdouble)))
+    for group in system.free_groups:
+        m, total = system.m[group].astype(np.longdouble), np.sum(force[group])
         moves = abs(total) > len(group) * EPS * np.sum(np.abs(force[group]))
         out[group] = np.sqrt(m) * total / np.sum(m) if moves else 0
     return out
@@ -114,44 +122,53 @@ def _drag(scene: Scene, force: Extended) -> Extended:
 PI = 4 * np.arctan(np.longdouble(1))
 
 
-def _wave_frequencies(scene: Scene) -> Extended:
+def _wave_frequencies(system: System) -> Extended:
     """Squared frequencies of a uniform chain between walls, slowest first (Lagrange 1788)."""
-    k = next(term.k[0] for term in scene.terms if isinstance(term, Spring))
-    half = np.sin(PI * np.arange(1, scene.n + 1) / (2 * (scene.n + 1)))
-    return np.asarray(4 * k / scene.m[0].astype(np.longdouble) * half * half)
+    k = next(term.k[0] for term in system.terms if isinstance(term, Spring))
+    half = np.sin(PI * np.arange(1, system.n + 1) / (2 * (system.n + 1)))
+    return np.asarray(4 * k / system.m[0].astype(np.longdouble) * half * half)
 
 
-@lru_cache(maxsize=4)
-def _wave_shapes(n: int) -> Extended:
-    """sqrt(2/(n+1)) sin(pi r j/(n+1)) (n, n), symmetric."""
-    r = np.arange(1, n + 1)
-    # the phase is a whole number of 1/(n + 1) half turns, and taken modulo whole turns exactly
-    sines = np.sin(PI * np.arange(2 * (n + 1)) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1))
-    return np.asarray(sines[np.outer(r, r) % (2 * (n + 1))])
+def _one_turn(n: int) -> Extended:
+    """sqrt(2/(n+1)) sin(pi j/(n+1)), j = 0 ... 2n + 1: all elements of V, by r j modulo a whole turn."""
+    return np.asarray(np.sin(PI * np.arange(2 * (n + 1)) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1)))
+
+
+MOST_EXACT = 4096
+"""Modes up to which |V| is summed element by element; beyond, every element counts as its largest value."""
+
+
+def _absolute_sines(reach: Extended) -> Extended:
+    """|V| reach (n,) for V of sines, or an upper bound of it for many modes: in memory of O(n)."""
+    n = len(reach)
+    if n > MOST_EXACT:
+        return np.full(n, np.sqrt(np.longdouble(2) / (n + 1)) * np.sum(reach))
+    r, sines = np.arange(1, n + 1), np.abs(_one_turn(n))
+    return np.array([sines[j * r % (2 * (n + 1))] @ reach for j in r])
 
 
 def _sines(y: Extended) -> Extended:
-    """y (..., n) @ `_wave_shapes`, by the Fourier transform of its odd continuation."""
+    """y (..., n) V for V of sines, by the Fourier transform of its odd continuation."""
     n = y.shape[-1]
     none = np.zeros((*y.shape[:-1], 1), dtype=np.longdouble)
     odd = np.concatenate([none, y, none, -y[..., ::-1]], axis=-1)
     return np.asarray(-np.fft.rfft(odd, axis=-1).imag[..., 1 : n + 1] / np.sqrt(2 * np.longdouble(n + 1)))
 
 
-def _spring_rows(scene: Scene, root_m: Extended) -> Extended | None:
+def _spring_rows(system: System, root_m: Extended) -> Extended | None:
     """G (s, n) with M^-1/2 K M^-1/2 = G^T G: one row for each spring.  None where a stiffness is negative."""
     rows: list[Extended] = []
-    for term in scene.terms:
-        if isinstance(term, WallSpring | Spring):
-            if np.any(term.k < 0):
-                return None
-            block = np.zeros((len(term.k), scene.n), dtype=np.longdouble)
-            each = np.arange(len(term.k))
-            if isinstance(term, Spring):
-                block[each, term.a], block[each, term.b] = -1, 1
-            else:
-                block[each, term.i] = 1
-            rows.append(np.sqrt(term.k.astype(np.longdouble))[:, None] * block / root_m)
+    zero = np.zeros(system.n, dtype=np.longdouble)
+    for term in system.terms:
+        if not term.is_potential:
+            continue
+        k = np.broadcast_to(term.curvature(zero), (len(term),)).astype(np.longdouble)
+        if np.any(k < 0):
+            return None
+        block = np.zeros((len(k), system.n), dtype=np.longdouble)
+        for end, sign in zip(reversed(term.particles), (1, -1), strict=False):
+            block[np.arange(len(k)), end] = sign
+        rows.append(np.sqrt(k)[:, None] * block / root_m)
     return np.concatenate(rows)
 
 
@@ -250,12 +267,9 @@ def _clusters(close: np.ndarray) -> list[Integers]:
     return [np.asarray(block) for block in np.split(np.arange(len(close)), breaks)]
 
 
-def motion(scene: Scene, t: Extended, known: Modes | None = None) -> tuple[Extended, Extended]:
-    """True q and p (f, n) of a linear scene at times t (f, 1) [T].
-
-    `known` are the scene's modes, for a caller that asks often.
-    """
-    found = known or modes(scene)
+def motion(scene: Scene, t: Extended) -> tuple[Extended, Extended]:
+    """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
+    found = scene.system.modes
     y0, v0 = found.into(scene.q, scene.p)
     centre = found.centre()
     u0 = y0 - centre

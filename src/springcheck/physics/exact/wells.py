@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.arrays import Extended
 from springcheck.physics.exact.elliptic import argument, jacobi
-from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Morse, Quartic, WallSpring, particles
+from springcheck.physics.terms import Cosine, Morse, Quartic, WallSpring
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
 
 States = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
@@ -136,11 +139,7 @@ def _sn(well: _Duffing, t: Extended) -> States:
 
 def _one_each(scene: Scene) -> bool:
     """Whether one term alone acts on each particle."""
-    count = np.zeros(scene.n, dtype=int)
-    for term in scene.terms:
-        for end in particles(term):
-            np.add.at(count, end, 1)
-    return bool(np.all(count == 1))
+    return bool(np.all(scene.system.pulls == 1))
 
 
 def _swings(scene: Scene) -> bool:

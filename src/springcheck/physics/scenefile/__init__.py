@@ -61,7 +61,7 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
         if not math.isfinite(value):
             raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
     try:
-        table = msgspec.convert(data, tables.SceneTable, strict=True)
+        table = msgspec.convert(data, tables.scene_table(), strict=True)
     except msgspec.ValidationError as error:
         raise SceneError(f"{where}: {_explain(str(error), data)}") from error
     try:
@@ -103,7 +103,7 @@ def _explain(message: str, data: Any) -> str:
     if accepted:
         return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
     if "unknown field" in what or "lacks the field" in what:
-        table = tables.FIELDS.get(re.sub(r"\[.*", "", field))
+        table = tables.named(re.sub(r"\[.*", "", field))
         known = f"; its fields are {', '.join(table.__struct_encode_fields__)}" if table else ""
         return f"{field or 'the scene'}: {what.replace('object', 'it')}{known}"
     return f"{field} = {found!r}: {what}"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.physics.scene import Kind, Scene, Term, Units
+from springcheck.physics.scene import Kind, Scene, Units
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import Damping, Spring, WallSpring
+from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 
 
 class MistakeError(ValueError):
@@ -127,7 +127,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
         yield from _links(table.chain)
     yield from _springs(table.spring, bodies)
     yield from _capacitors(table, bodies)
-    for key, (term, _) in tables.TERMS.items():
+    for key, (term, _) in tables.of_terms().items():
         rows = getattr(table, key.replace("-", "_"))
         if rows:
             yield _by_columns(term, rows, bodies)
@@ -205,7 +205,7 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
     for column in term.columns:
         given = np.array([getattr(row, column.name) for row in rows])
         values[column.field] = 1 / given if column.inverse else given
-    if term.bodies == 1:
+    if len(term.ends) == 1:
         field = f"{term.key}[{{}}].particle"
         chosen = [_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]
         found: Term = term(i=np.array(chosen), **values)
@@ -223,4 +223,4 @@ def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:
     rows += [(row.loop, row.resistance, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
     if rows:
         i = np.array([_number(particle, bodies, field) for particle, _, field in rows])
-        yield Damping(i=i, c=np.array([c for _, c, _ in rows]), m=bodies.m[i])
+        yield Damping(i=i, c=np.array([c for _, c, _ in rows]))

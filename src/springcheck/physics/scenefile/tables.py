@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias, cast, get_args
 
 import msgspec
@@ -140,28 +141,44 @@ class SceneBase(Table, frozen=True):
 
 def _of_term(term: Any) -> type[Table]:
     """The table of a term: the particle or the two ends on which it acts, and its columns."""
-    fields: list[Any] = [("particle", int) if term.bodies == 1 else ("ends", tuple[int, int])]
+    fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     for column in term.columns:
-        kind = Positive if column.positive else float
+        kind = Positive if column.sign == "positive" else float
         fields.append((column.name, kind) if column.default is None else (column.name, kind, column.default))
     table = msgspec.defstruct(f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True)
     return cast(type[Table], table)
 
 
-TERMS: dict[str, tuple[Any, type[Table]]] = {
-    term.key: (term, _of_term(term)) for term in terms.TERMS if term.columns
-}
-"""Terms that are read by their columns alone, with their tables."""
+OTHERWISE = ("wall-spring", "spring", "damping")
+"""Terms that have tables of their own."""
 
-SceneTable = msgspec.defstruct(
-    "SceneTable",
-    [(key.replace("-", "_"), tuple[table, ...], ()) for key, (_, table) in TERMS.items()],  # type: ignore[valid-type]
-    bases=(SceneBase,),
-    frozen=True,
-    kw_only=True,
-    rename=lambda name: name.replace("_", "-"),
-)
-"""A whole scene file."""
+
+def of_terms() -> dict[str, tuple[Any, type[Table]]]:
+    """The terms that are read by their columns alone, with their tables."""
+    return _of_terms(tuple(terms.known().values()))
+
+
+@lru_cache(maxsize=8)
+def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, type[Table]]]:
+    return {term.key: (term, _of_term(term)) for term in known if term.key not in OTHERWISE}
+
+
+def scene_table() -> Any:
+    """The struct of a whole scene file, with a table for every term that is known by now."""
+    return _scene_table(tuple(terms.known().values()))
+
+
+@lru_cache(maxsize=8)
+def _scene_table(known: tuple[type[terms.Term], ...]) -> Any:
+    return msgspec.defstruct(
+        "SceneTable",
+        [(key.replace("-", "_"), tuple[table, ...], ()) for key, (_, table) in _of_terms(known).items()],  # type: ignore[valid-type]
+        bases=(SceneBase,),
+        frozen=True,
+        kw_only=True,
+        rename=lambda name: name.replace("_", "-"),
+    )
+
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "units": get_args(Units),
@@ -170,19 +187,22 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 """What a field of a few words accepts, for messages; of a list, what each of its entries does."""
 
-FIELDS: dict[str, type[Table]] = {
-    "": cast(type[Table], SceneTable),
-    "particle": ParticleTable,
-    "rotor": RotorTable,
-    "inductor": InductorTable,
-    "capacitor": CapacitorTable,
-    "resistor": ResistorTable,
-    "chain": ChainTable,
-    "spring": SpringTable,
-    "damping": DampingTable,
-    "time": TimeTable,
-    "methods": MethodsTable,
-    "record": RecordTable,
-    **{key: table for key, (_, table) in TERMS.items()},
-}
-"""The table of each name, for messages that say which fields there are."""
+
+def named(name: str) -> Any:
+    """The table of a name, for messages that say which fields it has; None for a name that has none."""
+    found = {
+        "": scene_table(),
+        "particle": ParticleTable,
+        "rotor": RotorTable,
+        "inductor": InductorTable,
+        "capacitor": CapacitorTable,
+        "resistor": ResistorTable,
+        "chain": ChainTable,
+        "spring": SpringTable,
+        "damping": DampingTable,
+        "time": TimeTable,
+        "methods": MethodsTable,
+        "record": RecordTable,
+        **{key: table for key, (_, table) in of_terms().items()},
+    }
+    return found.get(name)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.engines.contract import Label
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Damping, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Term, WallSpring
 from springcheck.studies.stability.propagators import MASS, STEP
 
 STEPS = 20
@@ -177,7 +177,7 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[str]) -> Scene:
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):
             c = np.minimum(rate * m, 1e300)
-        terms.append(Damping(i=index, c=np.where(first.block == "force", c, 0.0), m=m))
+        terms.append(Damping(i=index, c=np.where(first.block == "force", c, 0.0)))
     every = max(1, first.steps // 10) if first.block == "length" else 1
     return Scene(
         name="extreme",

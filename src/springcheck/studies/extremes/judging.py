@@ -87,7 +87,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     """
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
-    k = np.abs(_stiffness(scene))
+    k = np.abs(scene.system.hessian_diagonal(scene.q))
     x, y = np.maximum(np.abs(q), np.abs(q2)), np.maximum(np.abs(p), np.abs(p2))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
@@ -99,15 +99,6 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
     return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
-
-
-def _stiffness(scene: Scene) -> Extended:
-    out = np.zeros(scene.n, dtype=np.longdouble)
-    for term in scene.terms:
-        k = getattr(term, "k", None)
-        if k is not None:
-            np.add.at(out, term.i, k)  # type: ignore[attr-defined]
-    return out
 
 
 def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
@@ -212,7 +203,7 @@ def _largest(dq: Extended, dp: Extended, of_q: Extended, of_p: Extended) -> Exte
 
 def growth_of(case: checks.Case, scene: Scene) -> Floats:
     """Logarithm of the spectral radius of each cell's own one-step matrix."""
-    k = _stiffness(scene)
+    k = scene.system.hessian_diagonal(scene.q)
     w = np.sqrt(np.abs(k) / scene.m.astype(np.longdouble))
     # in units of the period, so that no entry leaves the range
     turn = np.abs(np.longdouble(scene.step)) * w

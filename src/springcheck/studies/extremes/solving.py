@@ -56,7 +56,7 @@ def solve(label: Label, spec: Spec) -> Cell:
 def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]:
     """Global error at the end and its bound, both in units of the start, and why there are none."""
     q, p = np.stack([scene.q, done.q]), np.stack([scene.p, done.p])
-    if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.terms[0].k)):  # type: ignore[attr-defined]
+    if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.system.rigidity)):
         # nothing moves, and nothing may
         return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0])), ""
     ends = replace(scene, every=scene.steps)

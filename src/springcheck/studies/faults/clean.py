@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.physics import mechanics
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, Term, WallSpring
 
 
 def scene(
@@ -95,7 +94,7 @@ def _chain(rng: np.random.Generator, steps: int, *, free: bool) -> Scene:
         terms = (WallSpring(i=ends, k=_spread(rng, 1, 2), at=at), *terms)
     q = np.concatenate([[0.0], np.cumsum(rest)]) + 0.1 * size * rng.normal(size=n)
     made = scene(m, terms, q, np.zeros(n), step=1.0, steps=steps)
-    stiff = mechanics.stiffness(made, q).astype(np.float64)
+    stiff = made.system.hessian(q).astype(np.float64)
     w = float(np.sqrt(np.max(np.linalg.eigvalsh(stiff / np.sqrt(m)[:, None] / np.sqrt(m)))))
     p = 0.1 * size * w * m * rng.normal(size=n)
     return replace(made, p=p, step=_hw(rng) / w)

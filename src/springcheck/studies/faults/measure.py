@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import cache, partial
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.study import Progress
 from springcheck.trajectory import Trajectory
+from springcheck.workers import carried_out
 
 
 @cache
@@ -225,10 +225,11 @@ def study(
             for first in range(0, BY_ENGINES, _BATCH)
         ]
     done: list[Result | Clean] = []
-    for part in _carried_out(parts, workers):
-        done.append(part)
-        if progress:
-            progress(len(done), len(parts))
+    with closing(carried_out(parts, workers)) as found:
+        for part in found:
+            done.append(part)
+            if progress:
+                progress(len(done), len(parts))
     cleans = [part for part in done if isinstance(part, Clean)]
     order = [fault.name for fault in FAULTS]
     results = sorted((part for part in done if isinstance(part, Result)), key=lambda r: order.index(r.name))
@@ -256,13 +257,3 @@ def _together(parts: Sequence[Clean]) -> Clean:
         verdicts=sum(part.verdicts for part in parts),
         alarms=tuple(alarm for part in parts for alarm in part.alarms),
     )
-
-
-def _carried_out(parts: Sequence[Callable[[], Result | Clean]], workers: int) -> Iterator[Result | Clean]:
-    if workers <= 1:
-        for part in parts:
-            yield part()
-        return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(part) for part in parts]):
-            yield future.result()

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from springcheck import schemes
 from springcheck.arrays import Floats, Reals
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.trajectory import Trajectory
 
@@ -74,7 +73,7 @@ def pulling(change: Callable[[float, float, Reals], Reals]) -> Make:
     """Another force: change(largest force, size, right force)."""
 
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-        right = mechanics.force(scene.terms)
+        right = scene.system.force
         largest = reach(scene)
         return textbook(scene, scheme, force=lambda q, p: change(largest, size, right(q, p)))
 
@@ -106,39 +105,25 @@ def reported_start(change: Callable[[Scene, float], Scene]) -> Make:
 
 def reach(scene: Scene) -> float:
     """The largest force that the energy of the start allows [M L/T2]."""
-    energy = float(mechanics.energy(scene, scene.q, scene.p))
-    stiff = float(np.max(np.abs(np.diag(mechanics.stiffness(scene, scene.q)))))
+    energy = float(scene.system.energy(scene.q, scene.p))
+    stiff = float(np.max(np.abs(np.diag(scene.system.hessian(scene.q)))))
     return float(np.sqrt(2 * energy * stiff)) or 1.0
-
-
-def _springs(scene: Scene, change: Callable[[Any], Any]) -> Scene:
-    return replace(scene, terms=tuple(change(term) for term in scene.terms))
 
 
 def stiffer(scene: Scene, factor: float) -> Scene:
     """Every stiffness or coefficient times a factor."""
-
-    def term(t: Any) -> Any:
-        return replace(t, b=t.b * factor) if isinstance(t, Quartic) else replace(t, k=t.k * factor)
-
-    return _springs(scene, term)
+    return scene.system.scaled(factor)
 
 
 def shifted(scene: Scene, size: float) -> Scene:
     """Rest points moved by a fraction of the amplitude."""
     reach = float(np.max(np.abs(scene.q)) + np.max(np.abs(scene.p)))
-
-    def term(t: Any) -> Any:
-        return (
-            replace(t, at=t.at + size * reach) if hasattr(t, "at") else replace(t, rest=t.rest + size * reach)
-        )
-
-    return _springs(scene, term)
+    return replace(scene, terms=tuple(term.shifted(size * reach) for term in scene.terms))
 
 
 def mass_of_drift(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """dq/dt = p: a velocity taken for a momentum."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     h = scene.step
 
     def step(i: int, q: Floats, p: Floats) -> State:
@@ -153,7 +138,7 @@ def verlet(
     scene: Scene, *, first: float = 0.5, drift: float = 1.0, second: float = 0.5
 ) -> Callable[[int, Floats, Floats], State]:
     """Velocity Verlet with other coefficients."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     h, m = scene.step, scene.m
 
     def step(i: int, q: Floats, p: Floats) -> State:
@@ -166,7 +151,7 @@ def verlet(
 
 def swapped_halves(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """h/2 where h*h/2 belongs, in the position form of velocity Verlet."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     h, m = scene.step, scene.m
 
     def step(i: int, q: Floats, p: Floats) -> State:
@@ -179,7 +164,7 @@ def swapped_halves(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 def old_second_kick(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """The second half kick with the force of the old position."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     h, m = scene.step, scene.m
 
     def step(i: int, q: Floats, p: Floats) -> State:
@@ -193,7 +178,7 @@ def old_second_kick(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 def stale_force(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """Forces come from a buffer one step old."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     buffer = [force(scene.q, scene.p)]
 
     def stale(q: Reals, p: Reals) -> Reals:
@@ -251,7 +236,7 @@ def significant(x: Floats, size: float) -> Floats:
 
 def towards_zero(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """Every result is cut off instead of rounded: no step is off by more than one rounding."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     m = scene.m.astype(np.longdouble)
 
     def cut(x: Reals) -> Floats:
@@ -269,7 +254,7 @@ def towards_zero(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 def half_step(scene: Scene, sign: int, run: Trajectory) -> Trajectory:
     """Momenta half a step early (-1) or late (1), the start's as asked for."""
-    force = mechanics.force(scene.terms)(run.q, run.p)
+    force = scene.system.force(run.q, run.p)
     p = np.asarray(run.p + sign * scene.step / 2 * force, np.float64)
     p[0] = scene.p
     return replace(run, p=p)
@@ -301,7 +286,7 @@ def half_step_energy(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 
 
 def _early_energy(scene: Scene, run: Trajectory) -> Floats:
-    force = mechanics.force(scene.terms)(run.q, run.p)
+    force = scene.system.force(run.q, run.p)
     return energies(scene, run.q, np.asarray(run.p - scene.step / 2 * force, np.float64))
 
 
@@ -313,16 +298,13 @@ def late_start(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
 
 def unpaired(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """Action is not reaction: what springs do to their second particle is too large."""
-    right = mechanics.force(scene.terms)
+    right = scene.system.force
 
     def force(q: Reals, p: Reals) -> Reals:
         out = right(q, p)
         for term in scene.terms:
-            if isinstance(term, Spring):
-                tension = term.k * (q[..., term.b] - q[..., term.a] - term.rest)
-                np.subtract.at(out, term.b, size * tension)
-            elif isinstance(term, WallSpring):
-                np.subtract.at(out, term.i, size * term.k * (q[..., term.i] - term.at))
+            if term.is_potential:
+                np.subtract.at(out, term.particles[-1], size * term.pull(q))
         return out
 
     return textbook(scene, scheme, force=force)
@@ -331,9 +313,9 @@ def unpaired(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 def rescaled(scene: Scene, size: float, i: int, state: State) -> State:
     """A thermostat left on: momenta scaled so that the energy stays what it was."""
     q, p = state
-    start = mechanics.energy(scene, scene.q, scene.p)
-    kinetic = mechanics.kinetic_energy(scene, p)
-    wanted = start - (mechanics.energy(scene, q, p) - kinetic)
+    start = scene.system.energy(scene.q, scene.p)
+    kinetic = scene.system.kinetic_energy(p)
+    wanted = start - (scene.system.energy(q, p) - kinetic)
     return (q, p * float(np.sqrt(wanted / kinetic))) if kinetic > 0 and wanted > 0 else (q, p)
 
 
@@ -358,7 +340,7 @@ def restarted(scene: Scene, size: float, i: int, state: State) -> State:
 
 def one_iteration(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     """Implicit Euler by one fixed-point iteration instead of a solution."""
-    force = mechanics.force(scene.terms)
+    force = scene.system.force
     h, m = scene.step, scene.m
 
     def step(i: int, q: Floats, p: Floats) -> State:

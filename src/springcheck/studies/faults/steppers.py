@@ -13,7 +13,6 @@ import numpy as np
 from springcheck import schemes
 from springcheck.arrays import Floats, Force
 from springcheck.engines.contract import Arithmetic
-from springcheck.physics import mechanics
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
 
@@ -24,7 +23,7 @@ Step: TypeAlias = Callable[[int, Floats, Floats], State]
 
 def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None) -> Step:
     """The scheme's own step in double precision, with the scene's force or another."""
-    pull = force or mechanics.force(scene.terms)
+    pull = force or scene.system.force
     m, h = scene.m, scene.step
     if scheme.stages and {kind for kind, _ in scheme.stages} <= {"kick", "drift"}:
         stages = [(kind == "kick", float(schemes.number(c, np.float64)) * h) for kind, c in scheme.stages]
@@ -38,9 +37,8 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
             return q, p
 
         return split
-    stiff = mechanics.stiffness(scene, scene.q).astype(np.float64) if scheme.implicit else None
-    slow, fast = mechanics.split(scene.terms)
-    parts = mechanics.force(slow), mechanics.force(fast)
+    stiff = scene.system.hessian(scene.q).astype(np.float64) if scheme.implicit else None
+    parts = scene.system.parts
 
     def tableau(i: int, q: Floats, p: Floats) -> State:
         a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts)
@@ -107,4 +105,4 @@ def trajectory(
 def energies(scene: Scene, q: Floats, p: Floats) -> Floats:
     """Total energy of each frame (f,)."""
     with np.errstate(all="ignore"):
-        return np.asarray(mechanics.energy(scene, q, p), np.float64)
+        return np.asarray(scene.system.energy(q, p), np.float64)

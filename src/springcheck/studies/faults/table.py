@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.physics import mechanics
 from springcheck.studies.faults import seeded
 from springcheck.studies.faults.seeded import Fault
 
@@ -76,7 +75,7 @@ PARAMETERS = (
         name="stiffness-in-single",
         about="stiffness kept in single precision: 2.9 becomes 2.9000000954",
         caught_by=STEP,
-        make=seeded.moving(lambda s, x: mechanics.in_single(s)),
+        make=seeded.moving(lambda s, x: s.system.in_single),
     ),
     Fault(
         name="unsigned-step",

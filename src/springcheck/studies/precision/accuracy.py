@@ -14,7 +14,8 @@ from springcheck import schemes
 from springcheck.arrays import Extended, Floats, Integers, Reals
 from springcheck.checks.recorded import CONTRACTED
 from springcheck.errors import SceneError
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
+from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.studies.tables import column
@@ -32,7 +33,7 @@ period as long as the run has fewer than 16, and every finer step meets the same
 class Accuracy:
     """Errors of one run, over its whole trajectory unless it says otherwise.
 
-    `largest` and `end` are in the energy norm (`mechanics.norm`), in units of the start; `phase` is the
+    `largest` and `end` are in the energy norm (`System.norm`), in units of the start; `phase` is the
     angle [rad] that a mode is ahead (> 0) or behind where that is largest, None where nothing turns;
     `energy` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
     `rounding` is the largest distance from the scheme's own motion in exact arithmetic, None where that
@@ -51,7 +52,7 @@ class Truth:
     """The true motion of a scene, and what is worth computing once for all runs of it."""
 
     scene: Scene
-    norm: mechanics.Norm
+    norm: Norm
     modes: exact.Modes | None
     """Modes of a scene that has them."""
     turning: exact.Modes
@@ -67,7 +68,7 @@ class Truth:
 
     def at(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
         """True q and p (f, n) after so many steps of h."""
-        return exact.true_motion(self.scene, steps, h, self.modes)
+        return exact.true_motion(self.scene, steps, h)
 
 
 def truth(scene: Scene) -> Truth:
@@ -81,10 +82,10 @@ def truth(scene: Scene) -> Truth:
             f"scene {scene.name}: its true motion is not known, so errors cannot be measured; "
             "a study of precision needs springs, or stiffening wells without couplings"
         )
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     if not norm.unit > 0:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
-    known = exact.modes(scene) if mechanics.has_modes(scene) else None
+    known = exact.modes(scene) if scene.system.has_modes else None
     springs = (WallSpring, Spring)
     turning = exact.modes(
         replace(scene, terms=tuple(term for term in scene.terms if isinstance(term, springs)))
@@ -107,7 +108,7 @@ def _frequency(scene: Scene, modes: exact.Modes | None) -> float:
     q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
     root = np.sqrt(scene.m)
     w2 = [
-        np.linalg.eigvalsh(np.asarray(mechanics.stiffness(scene, row), np.float64) / root[:, None] / root)
+        np.linalg.eigvalsh(np.asarray(scene.system.hessian(row), np.float64) / root[:, None] / root)
         for row in q
     ]
     return float(np.sqrt(max(float(np.max(w2)), 0.0)))
@@ -141,9 +142,7 @@ class Errors:
         with np.errstate(over="ignore", invalid="ignore"):
             error = known.norm(q - true_q, p - true_p)
             wide_q, wide_p = q.astype(np.longdouble), p.astype(np.longdouble)
-            energy_off = mechanics.energy(known.scene, wide_q, wide_p) - mechanics.energy(
-                known.scene, true_q, true_p
-            )
+            energy_off = known.scene.system.energy(wide_q, wide_p) - known.scene.system.energy(true_q, true_p)
             off = np.abs(energy_off) / known.norm.unit**2
             if self._rounding is not None:
                 own_q, own_p = self._rounding.at(steps)
@@ -199,7 +198,7 @@ class _Rounding:
     @classmethod
     def of(cls, scene: Scene, scheme: schemes.Scheme, h: float) -> _Rounding | None:
         """None for an adaptive solver and where the discrete motion has no closed form."""
-        if not scheme.one_step or scheme.mixes or not mechanics.has_modes(scene):
+        if not scheme.one_step or scheme.mixes or not scene.system.has_modes:
             return None
         modes = exact.modes(scene)
         if np.any((modes.w2 == 0) & (modes.pull != 0)):
@@ -208,7 +207,7 @@ class _Rounding:
         # below that, friction contracts area in one step more than extended precision has digits for
         if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
             return None
-        symplectic = scheme.symplectic and not mechanics.is_damped(scene)
+        symplectic = scheme.symplectic and not scene.system.is_damped
         return cls(scene=scene, modes=modes, matrices=matrices, symplectic=symplectic)
 
     def at(self, steps: Integers) -> tuple[Extended, Extended]:

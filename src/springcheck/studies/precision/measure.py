@@ -24,7 +24,7 @@ import numpy as np
 from springcheck import engines, simulate
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import SpringcheckError
-from springcheck.physics import mechanics, scenefile
+from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
 from springcheck.studies import keeper
@@ -211,12 +211,10 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         scene.step,
         scene.every,
         scheme=SCHEMES[sweep.method.scheme],
-        judged=mechanics.in_single(known.scene) if sweep.arithmetic.parameters == "single" else None,
+        judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
-    if outcome.status == "interrupted":
-        raise KeyboardInterrupt
     if outcome.status != "complete":
         message = f"after {outcome.step} steps: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)

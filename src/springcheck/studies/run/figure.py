@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from springcheck.arrays import Floats, Reals
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
 from springcheck.studies.run.result import Stored
@@ -235,15 +235,15 @@ def _energy(scene: Scene, groups: Sequence[Group]) -> Figure:
     _, _, t_unit, e_unit = _units(scene)
     figure = Figure(figsize=(7.6, 6.2), layout="constrained")
     upper, lower = figure.subplots(2, sharex=True)
-    start = float(mechanics.energy(scene, scene.q, scene.p))
+    start = float(scene.system.energy(scene.q, scene.p))
     unit = abs(start) or 1.0
 
-    damped = mechanics.is_damped(scene)
+    damped = scene.system.is_damped
     truth = true_motion(scene, _all(groups)) if damped else None
 
     def energies(q: Reals, p: Reals) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(mechanics.energy(scene, q, p), np.float64)
+            return np.asarray(scene.system.energy(q, p), np.float64)
 
     def right(run: Trajectory) -> Floats | float:
         if truth is None:

@@ -17,7 +17,7 @@ from springcheck import checks, compare, engines, simulate
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import exact, mechanics, scenefile
+from springcheck.physics import exact, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose
@@ -204,9 +204,9 @@ class _Tally:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._norm = mechanics.norm(scene)
+        self._norm = scene.system.norm
         self._known = exact.has_true_motion(scene)
-        self._start = float(mechanics.energy(scene, scene.q, scene.p))
+        self._start = float(scene.system.energy(scene.q, scene.p))
         self.error = 0.0 if self._known else np.nan
         self.drift = 0.0
 
@@ -220,7 +220,7 @@ class _Tally:
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
         with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(mechanics.energy(scene, piece.q, piece.p), np.float64) - self._start
+            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - self._start
         worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
@@ -286,7 +286,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
 
 
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
-    norm = mechanics.norm(scene)
+    norm = scene.system.norm
     worst = 0.0
     rows = max(2, PIECE // scene.n)
     for a, b in zip_longest(keeper.windows(one, label, rows), keeper.windows(other, label, rows)):

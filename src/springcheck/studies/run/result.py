@@ -26,7 +26,7 @@ class MethodRun:
     """Steps that were taken."""
     message: str
     max_error: float
-    """Largest distance from the exact solution (`mechanics.Norm`); NaN where that is not known."""
+    """Largest distance from the exact solution (`Norm`); NaN where that is not known."""
     energy_drift: float
     """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
     start_seconds: float

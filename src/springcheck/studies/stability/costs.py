@@ -16,7 +16,7 @@ import numpy as np
 from springcheck import engines, schemes, simulate
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
-from springcheck.physics import exact, mechanics
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 
@@ -81,9 +81,9 @@ def step_for(found: Scene, label: Label) -> float:
     if np.isfinite(scheme.limit):
         fastest = float(np.sqrt(np.max(exact.modes(found).w2)))
         held = min(held, (scheme.limit / 2 or 0.1) / fastest)
-        if scheme.name != "langevin-middle" and mechanics.is_damped(found):
+        if scheme.name != "langevin-middle" and found.system.is_damped:
             # friction in the force of an explicit method: h c/m < 2
-            held = min(held, 0.5 / float(np.max(mechanics.rates(found))))
+            held = min(held, 0.5 / float(np.max(found.system.friction_rates)))
     return held
 
 
@@ -152,11 +152,11 @@ def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
     modes = exact.modes(found)
     j = int(np.argmin(modes.w2))
     w = np.sqrt(modes.w2[j])
-    true = modes.into(*exact.true_motion(found, np.array([steps]), found.step, modes))
+    true = modes.into(*exact.true_motion(found, np.array([steps]), found.step))
     here = modes.into(np.asarray(q), np.asarray(p))
     y, v = (here[i][j] - true[i][0, j] for i in range(2))
     # the mass in honey has its slow motion in q alone: its momentum is slaved to it
-    if mechanics.is_damped(found):
+    if found.system.is_damped:
         return float(abs(y) / np.max(np.abs(modes.into(found.q, found.p)[0])))
     start = modes.into(found.q, found.p)
     return float(np.hypot(w * y, v) / np.hypot(w * start[0][j], start[1][j]))

@@ -17,7 +17,7 @@ from typing import Any
 from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
-from springcheck.physics import mechanics, scenefile
+from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
@@ -55,7 +55,7 @@ def measure(
             left_out.append(LeftOut(method=str(label), reason=absent))
         else:
             usable.append(label)
-    damped = regions.labels(tuple(usable)) if mechanics.is_damped(scene) else ()
+    damped = regions.labels(tuple(usable)) if scene.system.is_damped else ()
     resonant = [label for label in usable if resonance.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
     stiff = [label for label in chosen if family and costs.serves(label, family)]

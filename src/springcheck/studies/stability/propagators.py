@@ -16,8 +16,8 @@ from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats
 from springcheck.engines.contract import Arithmetic, Label
 from springcheck.errors import MethodError
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Damping, WallSpring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Term, WallSpring
 
 FORCE = 1024.0
 """Largest force on a scanned spring, in the scene's unit of force."""
@@ -77,7 +77,7 @@ def scene(
     terms: list[Term] = [WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
     if np.any(springs.brake) or "damping" in requires:
         c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
-        terms.append(Damping(i=np.arange(n), c=c, m=np.full(n, MASS)))
+        terms.append(Damping(i=np.arange(n), c=c))
     return Scene(
         name="scan",
         title="springs side by side",

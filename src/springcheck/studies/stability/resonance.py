@@ -17,9 +17,8 @@ from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats, Reals
 from springcheck.engines.contract import Label
 from springcheck.errors import SceneError
-from springcheck.physics import exact, mechanics
-from springcheck.physics.scene import Scene, Term
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics import exact
+from springcheck.physics.scene import Scene
 from springcheck.studies.tables import column
 
 TURN = (1.0, 7.0)
@@ -48,13 +47,12 @@ class Resonance:
 
 def fast_frequency(scene: Scene) -> float:
     """Angular frequency of the scene's fastest mode with its fast springs alone [1/T]."""
-    _, fast = mechanics.split(scene.terms)
-    return float(np.sqrt(np.max(exact.modes(replace(scene, terms=fast)).w2)))
+    return float(np.sqrt(np.max(exact.modes(replace(scene, terms=scene.system.fast)).w2)))
 
 
 def serves(scene: Scene, label: Label) -> bool:
     """Whether a method takes the scene's fast springs in steps of their own."""
-    fast = mechanics.split(scene.terms)[1]
+    fast = scene.system.fast
     marked = engines.method(label).requires == {"springs marked fast"}
     return bool(fast) and marked and not engines.refusal(scene, label)
 
@@ -83,6 +81,8 @@ Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
 
 def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
     """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
+    if not scene.system.is_linear or scene.system.is_damped:
+        raise SceneError(f"scene {scene.name}: a scan of resonances knows springs only")
     n, copies = scene.n, len(turn)
     scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
     # one set of copies for each unit vector, in coordinates in which q and p/(m w) are alike
@@ -92,12 +92,14 @@ def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
         q[i, :, i] = 1
         p[n + i, :, i] = scene.m[i] * w
     size = 2 * n * copies
+    # a displacement from equilibrium moves as if every spring were at rest in 0
+    linear = replace(scene, terms=tuple(term.centred() for term in scene.terms))
+    many = linear.system.tiled(size)
     many = replace(
-        scene,
-        m=np.tile(scene.m, size),
+        many,
         q=q.ravel(),
         p=p.ravel(),
-        terms=tuple(_copied(term, n, np.tile(scale, 2 * n)) for term in scene.terms),
+        terms=tuple(term.scaled(np.repeat(np.tile(scale, 2 * n), len(term) // size)) for term in many.terms),
         steps=1,
         every=1,
     )
@@ -108,33 +110,20 @@ def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
     return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices.astype(np.float64))), axis=-1))
 
 
-def _copied(term: Term, n: int, scale: Floats) -> Term:
-    """A term's springs once for each copy, the j-th with its stiffness times scale[j], at rest in 0."""
-    shift = n * np.arange(len(scale))[:, None]
-    if isinstance(term, WallSpring):
-        i = (term.i + shift).ravel()
-        return replace(term, i=i, k=np.outer(scale, term.k).ravel(), at=np.zeros(len(i)))
-    if isinstance(term, Spring):
-        a, b = (term.a + shift).ravel(), (term.b + shift).ravel()
-        return replace(term, a=a, b=b, k=np.outer(scale, term.k).ravel(), rest=np.zeros(len(a)))
-    raise SceneError(f"a scan of resonances knows springs only, not {term.key!r}")
-
-
 def _by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
     run = simulate.run(scene, label)
     return run.q[1], run.p[1]
 
 
 def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
-    slow, fast = mechanics.split(scene.terms)
-    law: dict[str, Any] = {"parts": (mechanics.force(slow), mechanics.force(fast))}
+    law: dict[str, Any] = {"parts": scene.system.parts}
     q, p = schemes.step(
         schemes.SCHEMES[engines.method(label).scheme],
         scene.q.astype(np.longdouble),
         scene.p.astype(np.longdouble),
         h=scene.step,
         m=scene.m,
-        force=mechanics.force(scene.terms),
+        force=scene.system.force,
         **law,
     )
     return np.asarray(q, np.longdouble), np.asarray(p, np.longdouble)

@@ -1,0 +1,146 @@
+"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.
+
+Only the program's entry point installs this: a library leaves signals to the program that imports it.
+What is imported here is what the interpreter has loaded by itself, so that no moment is left without it.
+"""
+
+from __future__ import annotations
+
+import _thread
+import os
+import signal
+import sys
+import time
+
+STATUS = 130
+"""Exit status of a program that was interrupted, as shells expect it."""
+
+GRACE = 1.5
+"""Seconds from the signal to the end of the process, whatever it is doing: native code that does not return,
+a library that has swallowed the exception, a terminal that takes no more output."""
+
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class _State:
+    """What this process knows of its signals; they belong to the process, so there is one of it."""
+
+    seen = False
+    """A signal has come."""
+    raised = False
+    """Its KeyboardInterrupt is on its way; further signals hurry nothing and spoil nothing."""
+    held = 0
+    message = "interrupted"
+
+
+def install() -> None:
+    """Turn the first signal into a KeyboardInterrupt; ignore the next ones; end the process in time."""
+    sys.excepthook, sys.unraisablehook = _uncaught, _unraisable
+    for name in SIGNALS:
+        number = getattr(signal, name, None)
+        # nohup and shells that start a command in the background have signals ignored
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _raise)
+    if os.name == "posix":
+        read, write = os.pipe()
+        os.set_blocking(write, False)
+        signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+        _thread.start_new_thread(_watch, (read,))
+
+
+def seen() -> bool:
+    """Whether a signal has come: whatever the program has found since then is no result."""
+    return _State.seen
+
+
+def announce(message: str) -> None:
+    """What is said of an interrupt from here on, in one line; nothing once it has been said."""
+    _State.message = message
+
+
+def finish() -> None:
+    """Nothing is left that could be interrupted: ignore signals while the interpreter shuts down."""
+    for name in SIGNALS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+
+
+def leave() -> None:
+    """End an interrupted process now, with one line and none from the interpreter's shutdown."""
+    _say()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError, AttributeError):
+            continue
+    os._exit(STATUS)
+
+
+class held:  # noqa: N801  (a context manager reads as a word)
+    """Let an interrupt wait while files are made or removed that must not be left half done; be brief."""
+
+    def __enter__(self) -> None:
+        _State.held += 1
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+        _State.held -= 1
+        if _State.seen and not (_State.held or _State.raised) and kind is None:
+            _State.raised = True
+            raise KeyboardInterrupt
+
+
+def _raise(number: int, frame: object) -> None:
+    _State.seen = True
+    if not (_State.held or _State.raised):
+        _State.raised = True
+        raise KeyboardInterrupt
+
+
+def _watch(wakeup: int) -> None:
+    """Wait for a signal in a thread, which native code that has released the interpreter cannot stop."""
+    numbers = {getattr(signal, name, -1) for name in SIGNALS}
+    while os.read(wakeup, 1)[0] not in numbers:
+        pass
+    time.sleep(GRACE)
+    leave()
+
+
+def _say() -> None:
+    if not _State.message:
+        return
+    # a progress bar may have hidden the cursor
+    shown = "\x1b[?25h" if os.isatty(2) else ""
+    try:
+        os.write(2, f"{shown}springcheck: {_State.message}\n".encode(errors="backslashreplace"))
+    except OSError:
+        return
+
+
+def _uncaught(kind: type[BaseException], error: BaseException, trace: object) -> None:
+    """Cython reports here what it had to swallow in a callback."""
+    if issubclass(kind, KeyboardInterrupt):
+        _again()
+    else:
+        sys.__excepthook__(kind, error, trace)  # type: ignore[arg-type]
+
+
+def _unraisable(found: sys.UnraisableHookArgs) -> None:
+    """Where no exception can be raised (callbacks from C, destructors) the interrupt would be lost."""
+    if issubclass(found.exc_type, KeyboardInterrupt):
+        _again()
+    else:
+        sys.__unraisablehook__(found)
+
+
+def _again() -> None:
+    """Raise the interrupt once more, outside of the place that has swallowed it."""
+    _State.raised = False
+    _thread.start_new_thread(_once_more, ())
+
+
+def _once_more() -> None:
+    time.sleep(0.01)
+    for name in SIGNALS:
+        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is _raise:
+            _thread.interrupt_main(getattr(signal, name))
+            return

@@ -1,0 +1,78 @@
+"""The exact solution of a system: normal modes, and closed forms of groups that nothing joins to others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from springcheck.arrays import Extended, Integers
+from springcheck.physics.exact import linear, wells
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+    from springcheck.physics.system import System
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Group:
+    """Particles (s,) of a scene, the scene of these alone, and the closed form of their motion."""
+
+    particles: Integers
+    scene: Scene
+    motion: Callable[[Scene, Extended], tuple[Extended, Extended]]
+    """A scene and times t (f, 1) [T] -> q and p (f, s)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution:
+    """The exact motion of n particles, in groups that move by themselves."""
+
+    n: int
+    groups: tuple[_Group, ...]
+
+    def __call__(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
+        """q and p (f, n) after these numbers of steps of h, in extended precision.
+
+        Motion that leaves even the extended range comes back infinite.
+        """
+        t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
+        if len(self.groups) == 1:
+            with np.errstate(all="ignore"):
+                return self.groups[0].motion(self.groups[0].scene, t)
+        q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
+        with np.errstate(all="ignore"):
+            for group in self.groups:
+                q[:, group.particles], p[:, group.particles] = group.motion(group.scene, t)
+        return q, p
+
+
+def solution(system: System) -> Solution | None:
+    """The exact motion of a system, None where some particles have no closed form here."""
+    everything = np.arange(system.n)
+    if system.has_modes:
+        whole = _Group(particles=everything, scene=system.scene, motion=linear.motion)
+        return Solution(n=system.n, groups=(whole,))
+    found: list[_Group] = []
+    nothing = np.zeros(system.n, dtype=bool)
+    left = ~nothing
+    with np.errstate(all="ignore"):
+        for well in wells.WELLS:
+            others = (here for key, here in system.acting.items() if key not in well.terms)
+            other = np.any([nothing, *others], axis=0)
+            chosen = np.flatnonzero(system.acting.get(well.key, nothing) & ~other)
+            if len(chosen):
+                part = system.part(chosen)
+                if not well.is_known(part):
+                    return None
+                found.append(_Group(particles=chosen, scene=part, motion=well.motion))
+                left[chosen] = False
+        chosen = np.flatnonzero(left)
+        if len(chosen):
+            part = system.part(chosen)
+            if not part.system.has_modes:
+                return None
+            found.append(_Group(particles=chosen, scene=part, motion=linear.motion))
+    return Solution(n=system.n, groups=tuple(found))

@@ -1,0 +1,86 @@
+"""Which particles are joined, and where they stand when nothing is stretched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from springcheck.arrays import Floats, Integers
+from springcheck.physics.term import Term
+from springcheck.physics.terms import Spring
+
+
+def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:
+    """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
+    held = np.zeros(n, dtype=bool)
+    for term in terms:
+        if term.bodies == 1:
+            held[term.particles[0][term.rigidity > 0]] = True
+    if np.all(held):
+        return ()
+    lowest = _lowest_joined(n, terms)
+    loose = np.setdiff1d(lowest, lowest[held])
+    return tuple(np.flatnonzero(lowest == r) for r in loose)
+
+
+def _lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
+    """The lowest particle to which each is joined, through however many others (n,)."""
+    lowest = np.arange(n)
+    # a bond without stiffness joins nothing
+    bonds = [[end[term.rigidity > 0] for end in term.particles] for term in terms if term.bodies == 2]
+    while True:
+        before = lowest.copy()
+        for a, b in bonds:
+            low = np.minimum(lowest[a], lowest[b])
+            for end in (a, b):
+                np.minimum.at(lowest, lowest[end], low)
+        # what a particle points to points further: every round halves the way
+        while np.any(lowest[lowest] != lowest):
+            lowest = lowest[lowest]
+        if np.array_equal(lowest, before):
+            return lowest
+
+
+def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
+    """Positions (n,) [L] at which every spring between particles has its rest length.
+
+    The lowest particle of each connected group stands at 0.  None where springs in a ring disagree.
+    """
+    springs = [term for term in terms if isinstance(term, Spring)]
+    if not any(np.any(term.rest) for term in springs):
+        return np.zeros(n)
+    if len(springs) == 1 and np.all(springs[0].b == springs[0].a + 1) and np.all(np.diff(springs[0].a) > 0):
+        return _in_a_row(n, springs[0])
+    neighbours: dict[int, list[tuple[int, float]]] = {}
+    for term in springs:
+        for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
+            neighbours.setdefault(a, []).append((b, rest))
+            neighbours.setdefault(b, []).append((a, -rest))
+    found = np.zeros(n)
+    seen: set[int] = set()
+    for root in sorted(neighbours):
+        if root in seen:
+            continue
+        seen.add(root)
+        front = [root]
+        while front:
+            a = front.pop()
+            for b, rest in neighbours[a]:
+                if b not in seen:
+                    seen.add(b)
+                    found[b] = found[a] + rest
+                    front.append(b)
+                elif found[b] != found[a] + rest and found[a] != found[b] - rest:
+                    return None
+    return found
+
+
+def _in_a_row(n: int, springs: Spring) -> Floats:
+    """Where each particle is joined to the next or not: sums of rest lengths from the last break on."""
+    found = np.zeros(n)
+    # a sum begins anew after every break, so that each is rounded as if it stood alone
+    starts = np.flatnonzero(np.append(True, np.diff(springs.a) > 1))
+    for first, last in zip(starts, [*starts[1:], len(springs.a)], strict=True):
+        found[springs.b[first:last]] = np.cumsum(springs.rest[first:last])
+    return found

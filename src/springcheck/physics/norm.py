@@ -1,0 +1,59 @@
+"""The size of an error: the square root of an energy, in units of the start's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.physics.term import Term
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Norm:
+    """The size of a difference between states, relative to the initial energy norm.
+
+    The square root of the sum of dp**2 / 2m and of |k| du**2 / 2 over the rows of all terms, u their
+    elongation and |k| their absolute curvature at rest, divided by that of the kinetic plus the absolute
+    potential energy of the start.  For one spring it is the distance in the phase plane in units of the
+    amplitude.  A group of particles that nothing holds would have no size in position: there the kinetic
+    energy counts that makes up the difference of its centre within the duration of the run.
+    """
+
+    m: Floats
+    terms: Sequence[Term]
+    groups: tuple[Integers, ...]
+    duration: float
+    unit: np.longdouble
+    """The initial energy norm, a root of an energy."""
+
+    def __call__(self, dq: Reals, dp: Reals) -> Floats:
+        """(..., n) and (..., n) -> (...).  At rest in equilibrium the unit is 0 and any error infinite."""
+        size = self.size(dq, dp)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return np.asarray(np.where(size == 0, 0, size / self.unit), dtype=np.float64)
+
+    def size(self, dq: Reals, dp: Reals) -> Extended:
+        """The same, not divided by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            wide = np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble)
+            return np.asarray(np.sqrt(self._energy(*wide)), np.longdouble)
+
+    def _energy(self, dq: Reals, dp: Reals) -> Reals:
+        total = kinetic_energy(self.m, dp)
+        for term in self.terms:
+            du = term.stretch(dq)
+            total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
+        for group in self.groups:
+            m = self.m[group]
+            centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)
+            total = total + 0.5 * np.sum(m) * (centre / self.duration) ** 2
+        return np.asarray(total)
+
+
+def kinetic_energy(m: Floats, p: Reals) -> Reals:
+    """Sum of p**2 / 2m of momenta p (..., n) -> (...) [M L2/T2]."""
+    # 2 m would overflow from half the largest number on
+    return np.asarray(np.sum(0.5 * (p * p) / m, axis=-1))

@@ -1,0 +1,330 @@
+"""What follows from a scene, each fact worked out once: forces, curvature, energies, sizes, modes, variants.
+
+`scene.system` is the one `System` of a scene.  Its functions take any width of float, and a trajectory as
+well as one state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Extended, Floats, Force, Integers, Reals
+from springcheck.physics import graph
+from springcheck.physics.exact.linear import Modes, normal_modes
+from springcheck.physics.exact.solution import Solution, solution
+from springcheck.physics.norm import Norm, kinetic_energy
+from springcheck.physics.term import Term
+from springcheck.physics.terms import Damping, Spring, WallSpring
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+MOST_JOINED = 256
+"""Joined particles up to which normal modes are computed: their cost in extended precision grows with the
+cube, 5 s here.  The modes of a uniform chain are known at any length."""
+
+
+class System:
+    """The facts of one scene.  m, q, p (n,) and terms are the scene's own."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.n, self.m, self.terms = scene.n, scene.m, scene.terms
+        self.duration = abs(scene.step) * scene.steps
+
+    # what kind of system it is
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Whether every force is linear in q and p, so that steps are matrices."""
+        return all(term.is_linear for term in self.terms)
+
+    @cached_property
+    def is_separate(self) -> bool:
+        """Whether no term joins two particles: n independent systems side by side."""
+        return all(term.bodies == 1 for term in self.terms)
+
+    @cached_property
+    def is_damped(self) -> bool:
+        """Whether any friction acts."""
+        return bool(np.any(self.friction_rates != 0))
+
+    @cached_property
+    def is_uniform_chain(self) -> bool:
+        """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
+        walls = [term for term in self.terms if isinstance(term, WallSpring)]
+        links = [term for term in self.terms if isinstance(term, Spring)]
+        if len(walls) != 1 or len(links) != 1 or self.n < 2 or np.any(self.m != self.m[0]):
+            return False
+        wall, link = walls[0], links[0]
+        row = np.arange(self.n - 1)
+        return bool(
+            np.array_equal(wall.i, [0, self.n - 1])
+            and np.array_equal(link.a, row)
+            and np.array_equal(link.b, row + 1)
+            and np.all(wall.k == wall.k[0])
+            and np.all(link.k == wall.k[0])
+        )
+
+    @cached_property
+    def has_modes(self) -> bool:
+        """Whether the motion falls apart into modes: linear, uncoupled by friction, and they can be had.
+
+        Friction does not couple modes where no term joins two particles, or where every particle is slowed
+        down at the same rate (to a rounding of c/m).
+        """
+        if not self.is_linear:
+            return False
+        if self.is_separate:
+            return True
+        rate = self.friction_rates
+        alike = bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
+        return alike and (self.n <= MOST_JOINED or self.is_uniform_chain)
+
+    @cached_property
+    def acting(self) -> dict[str, NDArray[np.bool_]]:
+        """For the key of each term, on which particles such a term acts (n,)."""
+        out: dict[str, NDArray[np.bool_]] = {}
+        for term in self.terms:
+            for index in term.particles:
+                out.setdefault(term.key, np.zeros(self.n, dtype=bool))[index] = True
+        return out
+
+    @cached_property
+    def pulls(self) -> Integers:
+        """How many rows of terms act on each particle (n,)."""
+        count = np.zeros(self.n)
+        for term in self.terms:
+            term.scatter(np.ones(len(term)), count)
+        return count.astype(np.int64)
+
+    @cached_property
+    def free_groups(self) -> tuple[Integers, ...]:
+        """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
+        return graph.free_groups(self.n, self.terms)
+
+    @cached_property
+    def rest_positions(self) -> Floats | None:
+        """Positions (n,) [L] at which every spring between particles has its rest length.
+
+        The lowest particle of each connected group stands at 0.  None where springs in a ring disagree.
+        """
+        return graph.rest_positions(self.n, self.terms)
+
+    # forces
+
+    @cached_property
+    def slow(self) -> tuple[Term, ...]:
+        """The terms that a method of multiple time steps takes in its long step."""
+        return tuple(term for term in self.terms if not term.fast)
+
+    @cached_property
+    def fast(self) -> tuple[Term, ...]:
+        """The terms that the scene marks as fast."""
+        return tuple(term for term in self.terms if term.fast)
+
+    @cached_property
+    def force(self) -> Force:
+        """The force of all terms as a function of (q, p), each (..., n) -> (..., n) [M L/T2]."""
+        return self.force_of(self.terms)
+
+    @cached_property
+    def potential_force(self) -> Force:
+        """The force of the potential: all but friction."""
+        return self.force_of(term for term in self.terms if term.is_potential)
+
+    @cached_property
+    def parts(self) -> tuple[Force, Force]:
+        """The forces of the slow and of the fast terms."""
+        return self.force_of(self.slow), self.force_of(self.fast)
+
+    def force_of(self, terms: Iterable[Term]) -> Force:
+        """The force of some terms on the scene's particles."""
+        parts = tuple(terms)
+        needs_velocity = not all(term.is_potential for term in parts)
+
+        def total(q: Reals, p: Reals) -> Reals:
+            out = np.zeros_like(q)
+            v = p / self.m if needs_velocity else p
+            for term in parts:
+                term.add_force(q, v, out)
+            return out
+
+        return total
+
+    def magnitude(self, near: Reals | None = None) -> Force:
+        """Like `force`, with every product and difference taken as a sum of absolute values.
+
+        Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  It takes sizes
+        of positions and momenta.  Nonlinear laws are evaluated at the states `near` (..., n), a step away
+        at most, or where these are not given at the worst place within the sizes.
+        """
+        return self.magnitude_of(self.terms, near)
+
+    def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None) -> Force:
+        """The magnitude of some terms' force."""
+        parts = tuple(terms)
+        needs_velocity = not all(term.is_potential for term in parts)
+
+        def total(q: Reals, p: Reals) -> Reals:
+            out = np.zeros_like(q)
+            v = p / self.m if needs_velocity else p
+            for term in parts:
+                term.add_rounding(q, v, out, near)
+            return out
+
+        return total
+
+    def strongest(self, q: Reals, terms: Iterable[Term] | None = None) -> Reals:
+        """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""
+        parts = tuple(self.terms if terms is None else terms)
+        each = ((parts, q), *(((alone,), where) for alone, where in (term.separated(q) for term in parts)))
+        found = []
+        for some, where in each:
+            out = np.zeros_like(where)
+            for term in some:
+                term.add_force(where, np.zeros_like(where), out)
+            found.append(np.abs(out))
+        return np.asarray(np.max(np.concatenate(found, axis=-1), axis=-1))
+
+    @cached_property
+    def friction_rates(self) -> Extended:
+        """Rates at which friction alone would slow each particle down, c/m (n,) [1/T], extended precision."""
+        out = np.zeros(self.n, dtype=np.longdouble)
+        for term in self.terms:
+            if isinstance(term, Damping):
+                term.scatter(term.c / self.m[term.i].astype(np.longdouble), out)
+        return out
+
+    # curvature of the potential
+
+    def hessian(self, q: Reals) -> Extended:
+        """Second derivatives of the potential energy at q (n,) -> (n, n) [M/T2], extended precision."""
+        out = np.zeros((self.n, self.n), dtype=np.longdouble)
+        wide = np.asarray(q, dtype=np.longdouble)
+        for term in self.terms:
+            ends, k = term.particles, term.curvature(wide)
+            for end in ends:
+                np.add.at(out, (end, end), k)
+            if len(ends) == 2:
+                np.add.at(out, ends, -k)
+                np.add.at(out, ends[::-1], -k)
+        return out
+
+    def hessian_diagonal(self, q: Reals) -> Extended:
+        """Diagonal of `hessian` (n,), all of it where nothing joins two particles."""
+        out = np.zeros(self.n, dtype=np.longdouble)
+        wide = np.asarray(q, dtype=np.longdouble)
+        for term in self.terms:
+            term.scatter(np.broadcast_to(term.curvature(wide), (len(term),)), out)
+        return out
+
+    def gershgorin(self, q: Reals) -> Reals:
+        """Bound on the sum of |elements| in each row of the Hessian at q (..., n) -> (..., n) [M/T2]."""
+        out = np.zeros_like(q)
+        for term in self.terms:
+            k = np.maximum(np.abs(term.curvature(q)), term.rigidity)
+            term.scatter(np.broadcast_to(k * term.bodies, (*q.shape[:-1], len(term))), out)
+        return out
+
+    @cached_property
+    def rigidity(self) -> Floats:
+        """The same from the terms' rigidities at rest alone (n,) [M/T2]."""
+        out = np.zeros(self.n)
+        for term in self.terms:
+            term.scatter(term.rigidity * term.bodies, out)
+        return out
+
+    # energies and sizes
+
+    def kinetic_energy(self, p: Reals) -> Reals:
+        """Sum of p**2 / 2m of momenta p (..., n) -> (...) [M L2/T2]."""
+        return kinetic_energy(self.m, p)
+
+    def energy(self, q: Reals, p: Reals) -> Reals:
+        """Total energy of states q, p (..., n) -> (...) [M L2/T2]."""
+        total = self.kinetic_energy(p)
+        for term in self.terms:
+            total = total + term.energy(q)
+        return np.asarray(total)
+
+    @cached_property
+    def initial_energy(self) -> float:
+        """Total energy of the start [M L2/T2]."""
+        return float(self.energy(self.scene.q, self.scene.p))
+
+    @cached_property
+    def norm(self) -> Norm:
+        """The measure of errors of this scene (see `Norm`)."""
+        q, p = self.scene.q.astype(np.longdouble), self.scene.p.astype(np.longdouble)
+        unit = self.kinetic_energy(p)
+        for term in self.terms:
+            unit = unit + np.abs(term.energy(q))
+        return Norm(
+            m=self.m,
+            terms=self.terms,
+            groups=self.free_groups,
+            duration=self.duration,
+            unit=np.longdouble(np.sqrt(unit)),
+        )
+
+    @cached_property
+    def amplitudes(self) -> tuple[Floats, Floats]:
+        """How far each position and momentum could go (n,) if it had all of the initial energy to itself.
+
+        A particle that nothing holds is as far as it could get within the run.
+        """
+        unit = float(self.norm.unit)
+        k = np.zeros(self.n)
+        for term in self.terms:
+            term.scatter(np.maximum(np.abs(term.curvature(self.scene.q)), term.rigidity), k)
+        held = k > 0
+        with np.errstate(over="ignore"):
+            p = np.sqrt(2.0) * np.sqrt(self.m) * unit
+            q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / self.m * self.duration)
+        return q, p
+
+    # the exact motion
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Normal modes.  ValueError where there are none (see `has_modes`)."""
+        return normal_modes(self)
+
+    @cached_property
+    def solution(self) -> Solution | None:
+        """The exact (analytic) solution, None where no closed form is known."""
+        return solution(self)
+
+    # other scenes made of this one
+
+    @cached_property
+    def in_single(self) -> Scene:
+        """The scene as an engine keeps it that holds the parameters of its potential in single precision."""
+        return self._with(term.in_single() for term in self.terms)
+
+    def scaled(self, factor: float) -> Scene:
+        """The scene with every force of its potential multiplied by a factor."""
+        return self._with(term.scaled(factor) for term in self.terms)
+
+    def _with(self, terms: Iterable[Term]) -> Scene:
+        return self.scene.derived(terms=tuple(terms))
+
+    def tiled(self, copies: int) -> Scene:
+        """So many copies of the scene side by side, which do not act on each other."""
+        m, q, p = (np.tile(x, copies) for x in (self.m, self.scene.q, self.scene.p))
+        terms = tuple(term.tiled(copies, self.n) for term in self.terms)
+        return self.scene.derived(m=m, q=q, p=p, terms=terms)
+
+    def part(self, chosen: Integers) -> Scene:
+        """These particles (s,) alone, renumbered, with the rows of terms that act on nothing else."""
+        number = np.full(self.n, -1)
+        number[chosen] = np.arange(len(chosen))
+        m, q, p = (x[chosen] for x in (self.m, self.scene.q, self.scene.p))
+        terms = (term.restricted(number) for term in self.terms)
+        return self.scene.derived(m=m, q=q, p=p, terms=tuple(term for term in terms if len(term)))

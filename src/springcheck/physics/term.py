@@ -1,0 +1,295 @@
+"""What a term of a scene is: rows of parameters on particles, their law, and all that is done to them.
+
+A term is a frozen dataclass of arrays, one entry a row, derived from `OnParticles` or `OnPairs`.  It states
+its law as four functions of the elongation u of its rows and of its parameters; everything else (energy
+and force of a whole state, hardening, single precision, copies, parts of a scene) follows from them here.
+A formula is written once for every width of float, for one state and for a whole trajectory alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Literal, Self, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Floats, Integers, Reals
+from springcheck.errors import SceneError
+
+Where: TypeAlias = "slice | Integers"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A parameter of a term: its name in a scene file, the field that holds it, and what it may be."""
+
+    name: str
+    field: str
+    default: float | None = None
+    sign: Literal["any", "positive", "nonnegative"] = "any"
+    inverse: bool = False
+    """The file gives the inverse of what the field holds."""
+    single: bool = True
+    """Whether an engine that keeps parameters in single precision keeps this one so."""
+
+
+class Term:
+    """Rows (s,) of parameters of one law.  Terms derive from `OnParticles` or `OnPairs`."""
+
+    key: ClassVar[str]
+    """The name of its table in a scene file."""
+    formula: ClassVar[str]
+    """The energy of a row in the names of its fields, for readers."""
+    columns: ClassVar[tuple[Column, ...]]
+    """Its parameters.  The first is the strength, to which energy and force are proportional."""
+    ends: ClassVar[tuple[str, ...]]
+    """The fields that hold the particles of each row: one, or two that the row joins."""
+    origin: ClassVar[str] = ""
+    """The field that is subtracted from the elongation, and so is no argument of the law."""
+    is_linear: ClassVar[bool] = False
+    """Whether the force is linear in positions and velocities."""
+    is_potential: ClassVar[bool] = True
+    """Whether it is a part of the potential energy; friction is not."""
+    fast: bool = False
+    """Whether a method of multiple time steps takes these rows in its short step."""
+
+    # functions of u (..., s) and of the parameters but the origin, in the order of the columns, (s,) each
+    potential: ClassVar[Any]
+    """Energy of each row (..., s) [M L2/T2], 0 at rest."""
+    slope: ClassVar[Any]
+    """First derivative of the energy by u: what pulls u back, (..., s) [M L/T2]."""
+    second: ClassVar[Any]
+    """Second derivative of the energy by u, (..., s) or, where it is constant, (s,) [M/T2]."""
+    rounding: ClassVar[Any]
+    """rounding(size, u, *parameters): the rounding of `slope` at u, in units of one rounding.
+
+    Every product and difference in it is taken as a sum of absolute values; `size` is the sum of those
+    whose difference is u.
+    """
+
+    def __post_init__(self) -> None:
+        rows: int | None = None
+        for name in self.ends:
+            given = np.atleast_1d(getattr(self, name))
+            object.__setattr__(self, name, frozen(given, np.int64, rows, f"{self.key}: {name}"))
+            rows = len(getattr(self, name))
+        for column in self.columns:
+            values = frozen(getattr(self, column.field), np.float64, rows, f"{self.key}: {column.field}")
+            object.__setattr__(self, column.field, values)
+
+    def check(self, n: int) -> None:
+        """SceneError unless every parameter is finite and of its sign, and on particles 0 to n - 1."""
+        for name, index in zip(self.ends, self.particles, strict=True):
+            bad = np.flatnonzero((index < 0) | (index >= n))
+            if len(bad):
+                raise SceneError(
+                    f"{self.key}: {name}[{bad[0]}] = {index[bad[0]]}: particles are numbered 0 to {n - 1}"
+                )
+        if self.bodies == 2 and np.any(self.particles[0] == self.particles[1]):
+            row = int(np.argmax(self.particles[0] == self.particles[1]))
+            raise SceneError(f"{self.key}: row {row}: the two ends are the same particle")
+        for column in self.columns:
+            check_sign(getattr(self, column.field), column.sign, f"{self.key}: {column.field}")
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.particles[0])
+
+    @property
+    def bodies(self) -> int:
+        """1 where a row acts on one particle, 2 where it joins two."""
+        return len(self.ends)
+
+    @property
+    def particles(self) -> tuple[Integers, ...]:
+        """The particles on which each row acts: (i,), or both ends (a, b), each (s,)."""
+        return tuple(getattr(self, name) for name in self.ends)
+
+    @property
+    def parameters(self) -> tuple[Floats, ...]:
+        """What the functions of the law take after u, each (s,)."""
+        return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)
+
+    @cached_property
+    def _places(self) -> tuple[tuple[Where, bool], ...]:
+        """Where each end stands in a row of all particles, and whether that names some particle twice."""
+        return tuple(_place(index) for index in self.particles)
+
+    def stretch(self, q: Reals) -> Reals:
+        """Change of each row's elongation for a displacement q (..., n) -> (..., s) [L]."""
+        first, last = self._places[0][0], self._places[-1][0]
+        return _taken(q, last) - _taken(q, first) if self.bodies == 2 else _taken(q, last)
+
+    def elongation(self, q: Reals) -> Reals:
+        """The coordinate u of each row at positions q (..., n) -> (..., s) [L]: 0 at rest."""
+        u = self.stretch(q)
+        return u - getattr(self, self.origin) if self.origin else u
+
+    def scatter(self, values: Reals, out: Reals) -> None:
+        """Add values (..., s) to every end's particle in out (..., n)."""
+        for place in self._places:
+            _scatter(np.add, out, place, values)
+
+    def energy(self, q: Reals) -> Reals:
+        """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
+        return np.asarray(np.sum(self.potential(self.elongation(q), *self.parameters), axis=-1))
+
+    def pull(self, q: Reals) -> Reals:
+        """What shortens the elongation of each row at positions q (..., n) -> (..., s) [M L/T2]."""
+        return np.asarray(self.slope(self.elongation(q), *self.parameters))
+
+    def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
+        """Add the force at positions q and velocities v, each (..., n), to out (..., n) [M L/T2]."""
+        pull = self.pull(q)
+        if self.bodies == 2:
+            _scatter(np.add, out, self._places[0], pull)
+        _scatter(np.subtract, out, self._places[-1], pull)
+
+    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None) -> None:
+        """Add what bounds the rounding of add_force at states of sizes q, v (see `System.magnitude`)."""
+        size = np.abs(_taken(q, self._places[-1][0]))
+        if self.bodies == 2:
+            size = size + np.abs(_taken(q, self._places[0][0]))
+        if self.origin:
+            size = size + np.abs(getattr(self, self.origin))
+        u = -size if near is None else self.elongation(near)
+        self.scatter(np.abs(self.rounding(size, u, *self.parameters)), out)
+
+    def curvature(self, q: Reals) -> Reals:
+        """Second derivative of each row's energy by u, at q (..., n) -> (..., s) or (s,) [M/T2]."""
+        return np.asarray(self.second(self.elongation(q), *self.parameters))
+
+    @cached_property
+    def rigidity(self) -> Floats:
+        """Absolute curvature of each row at rest (s,) [M/T2]: what errors of position are weighed by."""
+        zero = np.zeros(len(self))
+        return np.asarray(np.abs(self.second(zero, *self.parameters)) + zero)
+
+    def scaled(self, factor: float | Floats) -> Self:
+        """With energy and force multiplied by a factor: one number, or one for each row (s,)."""
+        strength = self.columns[0].field
+        return self._changed(**{strength: getattr(self, strength) * factor})
+
+    def shifted(self, length: float) -> Self:
+        """With the origin of every row's elongation moved [L]; friction has none."""
+        return self._changed(**{self.origin: getattr(self, self.origin) + length}) if self.origin else self
+
+    def centred(self) -> Self:
+        """With every row at rest where positions are 0."""
+        return self._changed(**{self.origin: np.zeros(len(self))}) if self.origin else self
+
+    def in_single(self) -> Self:
+        """With the parameters rounded that an engine of single precision keeps so; inf beyond its range."""
+        names = [column.field for column in self.columns if column.single]
+        with np.errstate(over="ignore", under="ignore"):
+            kept = {name: getattr(self, name).astype(np.float32).astype(np.float64) for name in names}
+        return self._changed(**kept)
+
+    def tiled(self, copies: int, n: int) -> Self:
+        """So many copies of its rows, the j-th on particles n j places further."""
+        shift = n * np.arange(copies)[:, None]
+        return self._changed(
+            **{name: (getattr(self, name) + shift).ravel() for name in self.ends},
+            **{c.field: np.tile(getattr(self, c.field), copies) for c in self.columns},
+        )
+
+    def restricted(self, number: Integers) -> Self:
+        """The rows on kept particles alone; number (n,) is the new number of each, -1 for one left out."""
+        here = np.all([number[index] >= 0 for index in self.particles], axis=0)
+        return self._changed(
+            **{name: number[getattr(self, name)[here]] for name in self.ends},
+            **{c.field: getattr(self, c.field)[here] for c in self.columns},
+        )
+
+    def joined(self, other: Self) -> Self:
+        """The rows of both in one term, these first."""
+        names = [*self.ends, *(column.field for column in self.columns)]
+        return self._changed(**{name: np.append(getattr(self, name), getattr(other, name)) for name in names})
+
+    def separated(self, q: Reals) -> tuple[Self, Reals]:
+        """The term with particles of its own for each row, and their positions for q (..., n)."""
+        own = np.arange(self.bodies * len(self)).reshape(self.bodies, -1)
+        where = np.concatenate([np.take(q, index, axis=-1) for index in self.particles], axis=-1)
+        return self._changed(**dict(zip(self.ends, own, strict=True))), where
+
+    def _changed(self, **values: Any) -> Self:
+        record: Any = self
+        return replace(record, **values)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OnParticles(Term):
+    """A term on single particles i (s,): u = q[i] - at."""
+
+    ends: ClassVar[tuple[str, ...]] = ("i",)
+    origin: ClassVar[str] = "at"
+    i: Integers
+    at: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OnPairs(Term):
+    """A term between particles a and b (s,): u = q[b] - q[a] - rest."""
+
+    ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    origin: ClassVar[str] = "rest"
+    a: Integers
+    b: Integers
+    rest: Floats
+
+
+def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]:
+    """A read-only copy (s,) of int64 or float64; one number stands for all rows.  Raises SceneError."""
+    is_mine = isinstance(values, np.ndarray) and not values.flags.writeable and values.base is None
+    if is_mine and values.dtype == kind and values.ndim == 1 and rows in (None, len(values)):
+        return cast(NDArray[Any], values)
+    try:
+        found = np.asarray(values)
+        if found.size and found.dtype.kind not in ("iu" if kind is np.int64 else "iuf"):
+            raise ValueError(found.dtype)
+        out: NDArray[Any] = np.array(
+            np.broadcast_to(found, (rows,)) if found.ndim == 0 and rows else found, dtype=kind
+        )
+    except (TypeError, ValueError, OverflowError):
+        numbers = "whole numbers" if kind is np.int64 else "real numbers"
+        raise SceneError(f"{what}: {numbers} are needed, in one row") from None
+    if out.ndim != 1 or rows not in (None, len(out)):
+        wanted = "one row of numbers" if rows is None else f"one number for each of {rows}"
+        raise SceneError(f"{what} has the shape {out.shape}: {wanted} is needed")
+    out.setflags(write=False)
+    return out
+
+
+def check_sign(values: Floats, sign: str, what: str) -> None:
+    """SceneError, naming the first that is wrong, unless all values are finite and of this sign."""
+    right, wanted = np.isfinite(values), "a finite number"
+    if np.all(right) and sign == "positive":
+        right, wanted = values > 0, "a number > 0"
+    elif np.all(right) and sign == "nonnegative":
+        right, wanted = values >= 0, "a number >= 0"
+    if not np.all(right):
+        row = int(np.argmin(right))
+        raise SceneError(f"{what}[{row}] = {values[row]}: {wanted} is needed")
+
+
+def _place(index: Integers) -> tuple[Where, bool]:
+    n = len(index)
+    if n and index[-1] - index[0] == n - 1 and np.all(np.diff(index) == 1):
+        return slice(int(index[0]), int(index[-1]) + 1), False
+    return index, len(np.unique(index)) < n
+
+
+def _taken(q: Reals, where: Where) -> Reals:
+    # take, because the layout of q[..., index] makes the order of a later sum depend on the number of states
+    return q[..., where] if isinstance(where, slice) else np.take(q, where, axis=-1)
+
+
+def _scatter(how: np.ufunc, out: Reals, place: tuple[Where, bool], values: Reals) -> None:
+    where, is_repeated = place
+    at: Any = (..., where)
+    if is_repeated:
+        how.at(out, at, values)
+    else:
+        out[at] = how(out[at], values)

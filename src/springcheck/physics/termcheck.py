@@ -1,0 +1,74 @@
+"""Whether the functions of a new term's law agree with each other: it is asked as the term is registered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Reals
+from springcheck.physics.term import Term
+
+STEP = 2.0**-7
+"""Distance of the points of a difference quotient of eighth order [L]."""
+SLOPE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280], np.longdouble)
+PRECISION = 1e-9
+"""Relative agreement that is asked for: the quotient's own error is (STEP/length)**8, 1e-17 for a law that
+changes over a unit of length and 1e-9 for one that changes over a tenth of it."""
+ROUNDINGS = 32
+"""Operations in one formula at most."""
+
+
+def check(term: type[Term]) -> None:
+    """Raise TypeError where the class lacks a part, ValueError where its functions contradict each other.
+
+    Tried at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
+    the derivatives of potential and slope, potential and slope are proportional to the first parameter and
+    0 at rest, and slope computed in single precision is off by no more than `rounding` says.
+    """
+    _check_parts(term)
+    rng = np.random.default_rng(1)
+    count = len([column for column in term.columns if column.field != term.origin])
+    parameters = [x.astype(np.float32).astype(np.longdouble) for x in rng.uniform(0.5, 1.5, (count, 64))]
+    u = rng.uniform(-0.5, 0.5, 64).astype(np.float32).astype(np.longdouble)
+    functions: Any = term
+    for lower, upper in (("potential", "slope"), ("slope", "second")):
+        of, slope = getattr(functions, lower), getattr(functions, upper)
+        points = u + STEP * np.arange(-4, 5)[:, None]
+        quotient = SLOPE @ np.stack([of(row, *parameters) + 0 * row for row in points]) / STEP
+        _agree(term, f"{upper} is not the derivative of {lower}", slope(u, *parameters), quotient)
+    double = [2 * parameters[0], *parameters[1:]]
+    for name in ("potential", "slope"):
+        of = getattr(functions, name)
+        wrong = f"{name} is not proportional to its first parameter, the strength"
+        _agree(term, wrong, of(u, *double), 2 * of(u, *parameters))
+        _agree(term, f"{name} is not 0 at rest", of(0 * u, *parameters), 0 * u)
+    narrow = functions.slope(u.astype(np.float32), *(x.astype(np.float32) for x in parameters))
+    bound = ROUNDINGS * 2.0**-24 * np.abs(functions.rounding(np.abs(u), u, *parameters))
+    if not np.all(np.abs(narrow - functions.slope(u, *parameters)) <= bound):
+        raise ValueError(f"{term.__name__}: slope rounds more than rounding(size, u, ...) says")
+
+
+def _check_parts(term: type[Term]) -> None:
+    for name in ("key", "formula", "columns", "ends", "potential", "slope", "second", "rounding"):
+        if not hasattr(term, name):
+            raise TypeError(f"{term.__name__} lacks {name!r}, which a term needs")
+    fields = [column.field for column in term.columns]
+    given = getattr(term, "__dataclass_fields__", {})
+    unknown = [name for name in (*fields, *term.ends) if name not in given]
+    if unknown:
+        raise TypeError(
+            f"{term.__name__} has no field {unknown[0]!r}: it is a dataclass with one for each column"
+        )
+    if not fields or fields[0] == term.origin:
+        raise TypeError(
+            f"{term.__name__}: the first of its columns is the strength, to which the energy is proportional"
+        )
+    if term.origin and term.origin not in fields:
+        raise TypeError(f"{term.__name__}: its columns need one of the field {term.origin!r}")
+
+
+def _agree(term: type[Term], wrong: str, one: Reals, other: Reals) -> None:
+    size = np.max(np.abs(other))
+    if not np.all(np.abs(one - other) <= PRECISION * (size or 1)):
+        raise ValueError(f"{term.__name__}: {wrong}")

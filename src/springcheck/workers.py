@@ -1,0 +1,104 @@
+"""Parts of a computation in processes of their own, which end with the program, however that ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar
+
+from springcheck import interrupts
+from springcheck.errors import SpringcheckError
+
+T = TypeVar("T")
+
+
+def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, None, None]:
+    """What the parts return, as they finish; with one worker here, else in so many processes.
+
+    Parts must be functions that another process can import.  Close the iterator where it is left early.
+    An exception of a part is raised here.  SpringcheckError: a process has ended without an answer.
+    """
+    if workers <= 1:
+        for part in parts:
+            yield part()
+        return
+    ahead = list(reversed(parts))
+    team: dict[Any, Any] = {}
+    try:
+        for _ in range(min(workers, len(parts))):
+            with interrupts.held(), _deaf():
+                ours, theirs = get_context("spawn").Pipe()
+                process = get_context("spawn").Process(target=_work, args=(theirs,), daemon=True)
+                process.start()
+                theirs.close()
+                team[ours] = process
+            ours.send(ahead.pop())
+        while team:
+            ready: list[Any] = wait(list(team))
+            for ours in ready:
+                yield _answer(ours, team)
+                if ahead:
+                    ours.send(ahead.pop())
+                else:
+                    ours.close()
+                    team.pop(ours).join()
+    finally:
+        with interrupts.held():
+            for process in team.values():
+                process.kill()
+            for ours, process in team.items():
+                process.join()
+                ours.close()
+
+
+def _answer(ours: Any, team: dict[Any, Any]) -> Any:
+    try:
+        good, found = ours.recv()
+    except EOFError:
+        team[ours].join()
+        raise SpringcheckError(
+            f"a worker process has ended by itself (exit status {team[ours].exitcode}): is memory short?"
+        ) from None
+    if not good:
+        raise found
+    return found
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that are started in here do not hear Ctrl-C: their parent stops them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _work(theirs: Connection) -> None:
+    """A worker: parts in, answers out, until there are no more or the parent has gone."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            part = theirs.recv()
+        except EOFError:
+            return
+        try:
+            answer = True, part()
+        except Exception as error:
+            answer = False, error
+        theirs.send(answer)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,276 @@
+"""Ctrl-C and SIGTERM go through everything: no outcome, no verdict, no traceback, nothing left behind.
+
+`validation/interrupts.py` sends hundreds of signals to every command; here are a few of each.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, cli, engines, interrupts, simulate, store, workers
+from springcheck.engines.own import simulation
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.studies.run import measure as session
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "validation"))
+_spec = importlib.util.spec_from_file_location("interrupting", ROOT / "validation" / "interrupts.py")
+assert _spec is not None
+assert _spec.loader is not None
+interrupting = importlib.util.module_from_spec(_spec)
+sys.modules["interrupting"] = interrupting
+_spec.loader.exec_module(interrupting)
+
+posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+
+
+class Interrupted:
+    """A simulation that Ctrl-C meets in its third call."""
+
+    def __init__(self, inner: Any) -> None:
+        self._inner, self._calls = inner, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+    def advance(self, every: int, q: Any, p: Any) -> None:
+        self._calls += 1
+        if self._calls == 3:
+            raise KeyboardInterrupt
+        self._inner.advance(every, q, p)
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second own method of a run is interrupted within its chunks."""
+    start = simulation.start
+
+    def wrapped(scene: Any, method: Any, label: Any, step: float) -> Any:
+        begun = start(scene, method, label, step)
+        return Interrupted(begun) if label.method == "semi-implicit-euler" else begun
+
+    monkeypatch.setattr(simulation, "start", wrapped)
+    monkeypatch.setattr(simulate, "FIRST", 2)
+    monkeypatch.setattr(simulate, "QUICK", 0.0)
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_ctrl_c_in_an_engine_is_no_outcome() -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    with pytest.raises(KeyboardInterrupt):
+        springcheck.run(scene, "own:semi-implicit-euler")
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_ctrl_c_in_an_engine_leaves_no_verdict_and_keeps_what_was_finished(tmp_path: Path) -> None:
+    scene, path = scenefile.load_scene("spring-uneven"), tmp_path / "run.h5"
+    with pytest.raises(KeyboardInterrupt):
+        session.run(scene, path, methods=["own:*"], thorough=True)
+    assert not path.exists()
+    assert [run.label for run in store.summary(path).runs] == ["own:euler"]
+    assert not list(tmp_path.rglob("*.new*"))
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_ctrl_c_in_an_experiment_is_no_failed_verdict() -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    with pytest.raises(KeyboardInterrupt):
+        checks.judge_thoroughly(scene, "own:semi-implicit-euler", simulate.run)
+
+
+def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[int] = []
+
+    class Counting:
+        force_calls = 0
+
+        def advance(self, every: int, q: Any, p: Any) -> None:
+            calls.append(every * len(q))
+            q[:], p[:] = 0.0, 0.0
+
+    monkeypatch.setattr(simulation, "start", lambda *_: Counting())
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=10**9, every=10**8)
+    assert springcheck.run(scene, "own:euler").outcome.step == sum(calls) == 10**9
+    assert max(calls) <= simulate.PIECE
+    calls.clear()
+    label = engines.parse("own:euler")
+    simulate.bare(scene, label)
+    assert sum(calls) == 10**9
+    assert calls[0] <= simulate.PIECE
+    monkeypatch.setattr(simulate, "UNHEARD", 0.0)
+    simulate.bare(scene, label)
+    assert max(calls[-(10**4) :]) <= simulate.PIECE
+
+
+def test_openmm_moves_in_pieces_as_it_does_in_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    if engines.absence("openmm") is not None:
+        pytest.skip("OpenMM is not installed")
+    from springcheck.engines.openmm import simulation as openmm
+
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=2100, every=1050)
+    for method in ("verlet", "leapfrog", "euler", "semi-implicit-euler"):
+        pieces = springcheck.run(scene, f"openmm:{method}")
+        with monkeypatch.context() as patch:
+            patch.setattr(openmm, "ATTENTIVE", 10**6)
+            whole = springcheck.run(scene, f"openmm:{method}")
+        assert np.array_equal(pieces.q, whole.q)
+        assert np.array_equal(pieces.p, whole.p)
+
+
+def test_an_error_after_the_interrupt_is_the_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As where NumPy turns an interrupted import into an ImportError, or HDF5 into a RuntimeError."""
+
+    def fails(_: object) -> int:
+        raise SpringcheckError("cannot be imported")
+
+    monkeypatch.setattr(cli, "_list", fails)
+    assert cli.main(["list"]) == 2
+    monkeypatch.setattr(interrupts._State, "seen", True)
+    assert cli.main(["list"]) == interrupts.STATUS
+    assert capsys.readouterr().err.endswith("springcheck: interrupted; nothing is kept\n")
+
+
+SCRIPT = """
+import sys, time
+from springcheck import interrupts
+interrupts.install()
+try:
+    {body}
+except BaseException as error:
+    if not interrupts.seen():
+        raise
+    interrupts.leave()
+print("went on")
+"""
+
+
+def signalled(body: str, *numbers: int) -> tuple[int, str, str]:
+    """Run a program that says when it is ready, and send it signals -> status, output, errors."""
+    with subprocess.Popen(
+        [sys.executable, "-c", SCRIPT.format(body=body)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        for number in numbers:
+            process.send_signal(number)
+            time.sleep(0.02)
+        out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+READY = "print('ready', flush=True); "
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_program_with_one_line(number: int) -> None:
+    assert signalled(READY + "time.sleep(60)", number) == (130, "", "springcheck: interrupted\n")
+
+
+@posix
+def test_a_second_signal_prints_nothing_and_spoils_no_tidying_up() -> None:
+    body = READY + "\n    try: time.sleep(60)\n    finally:\n        time.sleep(0.3); print('tidied up')"
+    assert signalled(body, *[signal.SIGINT] * 5) == (130, "tidied up\n", "springcheck: interrupted\n")
+
+
+@posix
+def test_a_program_that_swallows_the_interrupt_ends_all_the_same() -> None:
+    body = READY + "\n    while True:\n        try: time.sleep(60)\n        except BaseException: pass"
+    assert signalled(body, signal.SIGINT) == (130, "", "springcheck: interrupted\n")
+
+
+@posix
+def test_an_interrupt_in_a_destructor_is_raised_outside_of_it() -> None:
+    body = (
+        "class Slow:\n        def __del__(self):\n            " + READY + "time.sleep(60)\n"
+        "    slow = Slow(); del slow\n    time.sleep(60)"
+    )
+    assert signalled(body, signal.SIGINT) == (130, "", "springcheck: interrupted\n")
+
+
+@posix
+def test_an_interrupt_waits_where_files_must_not_be_left_half_done() -> None:
+    body = "\n    with interrupts.held(): " + READY + "time.sleep(0.3); print('done')\n    time.sleep(60)"
+    assert signalled(body, signal.SIGTERM) == (130, "done\n", "springcheck: interrupted\n")
+
+
+@posix
+def test_a_signal_that_the_shell_has_ignored_stays_ignored() -> None:
+    body = READY + "time.sleep(0.2)"
+    script = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN){SCRIPT.format(body=body)}"
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60)[0] == "went on\n"
+
+
+def doubled(number: int) -> int:
+    return 2 * number
+
+
+def failing() -> int:
+    raise SpringcheckError("a part went wrong")
+
+
+def test_workers_carry_out_every_part_once() -> None:
+    parts = [partial(doubled, i) for i in range(9)]
+    assert sorted(workers.carried_out(parts, 1)) == sorted(workers.carried_out(parts, 2))
+    with pytest.raises(SpringcheckError, match="a part went wrong"):
+        list(workers.carried_out([failing, *parts], 2))
+
+
+def test_a_worker_that_dies_is_an_error() -> None:
+    with pytest.raises(SpringcheckError, match="exit status 7"):
+        list(workers.carried_out([partial(os._exit, 7), partial(doubled, 1)], 2))
+
+
+@posix
+def test_workers_end_when_they_are_left() -> None:
+    found = workers.carried_out([partial(time.sleep, 600), partial(doubled, 1), partial(doubled, 2)], 2)
+    next(found)
+    began = time.process_time()
+    found.close()
+    assert time.process_time() - began < 60
+
+
+LIMITED = {
+    "run --thorough": ("run", "spring-uneven", "--thorough", "--method", "own:*"),
+    "run --from": ("run", "--from", "input.h5"),
+    "stability": ("stability", "spring-uneven", "--method", "own:*"),
+    "extremes": ("extremes", "--quick", "--method", "own:euler"),
+    "faults": ("faults",),
+    "plot": ("plot", "input.h5", "-o", "figures"),
+    "identify": ("identify", "input.h5"),
+}
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes in")
+@pytest.mark.parametrize("name", LIMITED)
+def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path) -> None:
+    """Everything but the two seconds, which a loaded machine may not have."""
+    rng = random.Random(f"{name} 20261121")
+    session.run(scenefile.load_scene("spring-uneven"), tmp_path / "input.h5", methods=["own:*"])
+    for again in (0.0, 0.1):
+        trial = interrupting.interrupted(
+            LIMITED[name], tmp_path, rng.uniform(0.3, 2.0), number=signal.SIGINT, again=again
+        )
+        assert [what for what in trial.wrong if not what.endswith(" s")] == []

@@ -1,0 +1,252 @@
+"""Ctrl-C and SIGTERM at random moments of every command: no result, no traceback, nothing left behind.
+
+    python validation/interrupts.py [interrupts] [seed]
+
+Every command is started in an empty folder, with an empty folder for temporary files and a session of its
+own, and gets SIGINT or SIGTERM at a random moment between its start and its usual end; every third one gets
+a second signal shortly after.  Then:
+
+* it has ended with exit status 130, within two seconds, with one line on standard error and no traceback;
+* no process of its session is left, no temporary file, and in its folder nothing but what it is known to
+  write; a journal there can be taken up, and holds no half-written file;
+* nothing was judged: no verdict on standard output, no store that claims to be complete.
+
+In the end each command is given once more in the folder of its last interrupt, and must end as it does
+undisturbed, with the same files.  Signals before the first line of springcheck meet the interpreter, which
+starts in some 50 ms and has its own way with them; they are counted apart, as are those that came too late.
+
+Expected, in about half an hour on two cores for 500 interrupts: every line ends in "0 wrong".
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from arguments import arguments
+from springcheck import interrupts
+
+WITHIN = 2.0
+"""Seconds from the signal to the end."""
+
+LONGEST = 15.0
+"""Seconds of a command in which it is interrupted."""
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "run": ("run", "spring-uneven"),
+    "run --thorough": ("run", "spring-uneven", "--thorough"),
+    "run --force": ("run", "spring-uneven", "--force", "-o", "input.h5"),
+    "run --json": ("run", "anharmonic", "--json"),
+    "run --from": ("run", "--from", "input.h5"),
+    "precision": ("precision", "spring-uneven", "--budget", "5"),
+    "stability": ("stability", "spring-uneven"),
+    "extremes": ("extremes", "--quick"),
+    "faults": ("faults",),
+    "inspect": ("inspect", "input.h5", "--verdicts"),
+    "plot": ("plot", "input.h5", "-o", "figures"),
+    "identify": ("identify", "input.h5"),
+    "check": ("check", "input.h5"),
+    "export": ("export", "input.h5", "own:euler", "out.h5md"),
+    "list": ("list",),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One interrupted command."""
+
+    arguments: tuple[str, ...]
+    moment: float
+    """Seconds from its start to the first signal."""
+    status: int
+    seconds: float
+    """From the signal to its end."""
+    out: str
+    err: str
+    processes: int
+    """Of its session, that outlived it."""
+    files: tuple[str, ...]
+    """In its folder, without what it was given."""
+    temporary: tuple[str, ...]
+    too_late: bool
+    """It had ended by itself."""
+
+    @property
+    def before(self) -> bool:
+        """Whether the signal met the interpreter, before our first line or after our last."""
+        ours = "springcheck: " in self.err or "springcheck/cli" in self.err
+        return not self.too_late and self.status != interrupts.STATUS and not ours
+
+    @property
+    def wrong(self) -> list[str]:
+        """What should not be."""
+        if self.before or self.too_late:
+            return []
+        found = []
+        if self.status != interrupts.STATUS:
+            found.append(f"exit status {self.status}")
+        if self.seconds > WITHIN:
+            found.append(f"{self.seconds:.1f} s")
+        if not self.err.startswith("springcheck: interrupted") or self.err.count("\n") != 1:
+            found.append(f"said {self.err!r}")
+        if "verdicts passed" in self.out or "FAILED" in self.out:
+            found.append("judged")
+        if self.processes:
+            found.append(f"{self.processes} processes left")
+        if self.temporary:
+            found.append(f"temporary files left: {', '.join(self.temporary)}")
+        stray = [name for name in self.files if not _known(name)]
+        if stray:
+            found.append(f"files left: {', '.join(stray)}")
+        return found
+
+
+def _known(name: str) -> bool:
+    """Whether an interrupted command may leave this: a figure, a whole store, a journal with its claim."""
+    path = Path(name)
+    if ".new" in name:
+        return False
+    return name.startswith(("figures", "out.h5md")) or path.suffix == ".h5" or ".h5.parts" in name
+
+
+def interrupted(command: tuple[str, ...], folder: Path, moment: float, *, number: int, again: float) -> Trial:
+    """Start a command in a folder and send the signal after so many seconds, and SIGINT `again` after it."""
+    given = {path.name for path in folder.iterdir()}
+    with tempfile.TemporaryDirectory() as temporary:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "springcheck", *command],
+            cwd=folder,
+            env=os.environ | {"TMPDIR": temporary},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        time.sleep(moment)
+        too_late = process.poll() is not None
+        began = time.perf_counter()
+        if not too_late:
+            process.send_signal(number)
+            if again:
+                time.sleep(again)
+                process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+        seconds = time.perf_counter() - began
+        return Trial(
+            arguments=command,
+            moment=moment,
+            status=process.returncode,
+            seconds=seconds,
+            out=out,
+            err=err,
+            processes=_left(process.pid),
+            files=tuple(
+                sorted(
+                    str(path.relative_to(folder))
+                    for path in folder.rglob("*")
+                    if path.relative_to(folder).parts[0] not in given and not path.is_dir()
+                )
+            ),
+            temporary=tuple(sorted(os.listdir(temporary))),
+            too_late=too_late or process.returncode in (0, 1),
+        )
+
+
+def _left(session: int) -> int:
+    """Processes of a session, once those that end with their parent have had a second for it."""
+    ends = time.perf_counter() + 1
+    while (found := _of_session(session)) and time.perf_counter() < ends:
+        time.sleep(0.02)
+    return found
+
+
+def _of_session(session: int) -> int:
+    found = 0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        # state, parent, group, session; a zombie has ended
+        found += fields[0] != "Z" and int(fields[3]) == session
+    return found
+
+
+def undisturbed(command: tuple[str, ...], folder: Path) -> tuple[int, float]:
+    """Exit status and seconds of a command that nobody interrupts."""
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "springcheck", *command], cwd=folder, capture_output=True, check=False
+    )
+    return done.returncode, time.perf_counter() - began
+
+
+def names(folder: Path) -> set[str]:
+    """All files of a folder."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def campaign(name: str, count: int, store: Path, rng: random.Random) -> list[str]:
+    """So many interrupts of one command; prints a line, returns what was wrong."""
+    command, wrong, counts = COMMANDS[name], [], {"interrupted": 0, "before": 0, "too late": 0}
+    slowest = 0.0
+    with tempfile.TemporaryDirectory() as home:
+        whole = _fresh(Path(home) / "whole", store)
+        status, usual = undisturbed(command, whole)
+        folder = whole
+        for i in range(count):
+            folder = _fresh(Path(home) / str(i), store)
+            trial = interrupted(
+                command,
+                folder,
+                rng.uniform(0, min(usual, LONGEST)),
+                number=rng.choice([signal.SIGINT, signal.SIGTERM]),
+                again=0.0 if i % 3 else rng.uniform(0.001, 0.3),
+            )
+            counts["before" if trial.before else "too late" if trial.too_late else "interrupted"] += 1
+            if not trial.before and not trial.too_late:
+                slowest = max(slowest, trial.seconds)
+            wrong += [f"{name}, signal at {trial.moment:.3f} s: {what}" for what in trial.wrong]
+            if i < count - 1:
+                shutil.rmtree(folder)
+        again, _ = undisturbed(command, folder)
+        if again != status and "--force" not in command and folder != whole:
+            wrong.append(f"{name}: given again it ends with exit status {again}, undisturbed with {status}")
+        if names(folder) != names(whole):
+            wrong.append(f"{name}: given again it leaves {sorted(names(folder) ^ names(whole))}")
+    said = ", ".join(f"{number} {what}" for what, number in counts.items())
+    print(f"{name:16} {usual:5.1f} s  {said}; slowest end {slowest:.2f} s; {len(wrong)} wrong", flush=True)
+    return wrong
+
+
+def _fresh(folder: Path, store: Path) -> Path:
+    folder.mkdir()
+    shutil.copy(store, folder / "input.h5")
+    return folder
+
+
+def main() -> int:
+    """Run the campaign."""
+    given = arguments(__doc__, interrupts=500, seed=11)
+    rng = random.Random(given.seed)
+    wrong: list[str] = []
+    with tempfile.TemporaryDirectory() as home:
+        undisturbed(("run", "spring-uneven", "-o", "input.h5"), Path(home))
+        for name in COMMANDS:
+            wrong += campaign(name, -(-given.interrupts // len(COMMANDS)), Path(home) / "input.h5", rng)
+    for line in wrong:
+        print(line)
+    print(f"{given.interrupts} interrupts, {len(wrong)} wrong")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
