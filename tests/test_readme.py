@@ -1,4 +1,4 @@
-"""What the README shows works when it is pasted, and its links to the project are there."""
+"""What the README and the documents beside it show works when pasted, and their links lead somewhere."""
 
 from __future__ import annotations
 
@@ -13,16 +13,27 @@ import springcheck
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+DATA = (ROOT / "data" / "README.md").read_text()
+DOCUMENTS = sorted(
+    path
+    for path in (
+        ROOT / "README.md",
+        *ROOT.glob("*/README.md"),
+        *ROOT.glob(".github/*.md"),
+        *ROOT.glob("src/**/README.md"),
+    )
+    if path.exists()
+)
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.S)
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.S)
 
 
 def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> None:
-    (term,) = (block for block in blocks("python") if "class Sextic" in block)
+    (term,) = (block for block in blocks("python", DATA) if "class Sextic" in block)
     (tmp_path / "sextic.py").write_text(term)
-    (scene,) = (block for block in blocks("toml") if "sextic" in block)
+    (scene,) = (block for block in blocks("toml", DATA) if "sextic" in block)
     (tmp_path / "well.toml").write_text(scene)
     arguments = ["run", "well.toml", "--method", "ase:*", "--method", "sundials:*"]
     done = subprocess.run(
@@ -35,7 +46,7 @@ def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> N
 
 
 def test_the_scene_of_the_readme_is_read(tmp_path: Path) -> None:
-    scene = next(block for block in blocks("toml") if "R. Ghosh" in block)
+    scene = next(block for block in blocks("toml", DATA) if "R. Ghosh" in block)
     (tmp_path / "shown.toml").write_text(scene)
     assert springcheck.load_scene(tmp_path / "shown.toml").steps == 200
 
@@ -45,13 +56,19 @@ def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monke
 
     monkeypatch.chdir(tmp_path)
     assert main(["run", "spring", "--method", "own:*", "--method", "openmm:verlet", "--quiet"]) == 0
-    for block in blocks("python"):
+    for block in (*blocks("python"), *blocks("python", DATA)):
         if "class Sextic" not in block:
             exec(compile(block, "README", "exec"), {})
 
 
-@pytest.mark.parametrize(
-    "path", sorted(set(re.findall(r"`((?:validation|data|src|tests)/[\w/.-]+)`", README)))
-)
-def test_what_the_readme_names_is_there(path: str) -> None:
-    assert (ROOT / path).exists()
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_what_a_document_names_is_there(document: Path) -> None:
+    text = document.read_text()
+    for path in re.findall(r"`((?:validation|data|src|tests)/[\w/.-]+)`", text):
+        assert (ROOT / path).exists(), path
+    for link in re.findall(r"\]\((?!https?:)([^)#]+)\)", text):
+        assert (document.parent / link).exists(), link
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= 150

@@ -58,7 +58,7 @@ def test_a_kick_that_is_a_hundred_thousandth_too_strong_moves_the_limit_out_of_i
     def strong(springs: Springs) -> Extended:
         off = schemes.Scheme(
             name="off", title="", order=1, limit=2.0, symplectic=True,
-            stages=(("kick", "1.00001"), ("drift", schemes.ONE)),
+            stages=(("kick", "1.00001"), ("drift", "1")),
         )  # fmt: skip
         k, w = springs.k.astype(np.longdouble), springs.true_turn / propagators.STEP
         out = schemes.matrix(off, h=propagators.STEP, m=np.full(len(k), propagators.MASS), k=k)
