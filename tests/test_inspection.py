@@ -96,7 +96,7 @@ def test_the_atlas_is_read_back_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def stores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def stores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steady_clock: object) -> Path:
     """A folder with a store of every study."""
     monkeypatch.chdir(tmp_path)
     main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "stability.h5"])
@@ -323,6 +323,7 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(
     assert {path.name for path in tmp_path.iterdir()} == {"picture.png", "picture.svg"}
 
 
+@pytest.mark.usefixtures("steady_clock")
 def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points(
     tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str]
 ) -> None:

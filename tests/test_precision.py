@@ -21,6 +21,8 @@ from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import Point
 
+pytestmark = pytest.mark.usefixtures("steady_clock")
+
 FIXED = [str(label) for label in engines.match(("*",)) if not engines.method(label).adaptive]
 SINGLE = [name for name in scenes.names() if name in ("spring", "spring-uneven", "anharmonic")]
 KNOWN = [name for name in scenes.names() if exact.has_true_motion(scenes.load_scene(name))]
@@ -232,7 +234,6 @@ def test_the_same_study_twice_gives_the_same_errors_and_force_calls() -> None:
     known = {(p.method, p.step, p.tolerance): p for p in other.points if p.complete}
     for point in one.points:
         twin = known.get((point.method, point.step, point.tolerance))
-        # how far a sweep comes depends on the machine; what it finds on the way does not
         if point.complete and twin:
             compared += 1
             assert point.accuracy == twin.accuracy
