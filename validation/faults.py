@@ -21,6 +21,7 @@ from arguments import arguments
 from springcheck import engines, simulate
 from springcheck.studies.faults.measure import ENGINES, study
 from springcheck.studies.faults.result import FaultReport
+from springcheck.studies.team import Processes
 
 
 def table(found: FaultReport) -> list[str]:
@@ -38,7 +39,7 @@ def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
     arguments(__doc__)
     labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
-    found = study(simulate.run, labels, workers=2)
+    found = study(simulate.run, labels, team=Processes(2))
     for line in table(found):
         print(line)
     clean = found.clean

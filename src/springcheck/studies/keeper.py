@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,6 +19,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
+from springcheck.studies.team import ALONE, Team
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 __all__ = [
@@ -52,6 +53,8 @@ class Piece:
     """Its name for people."""
     measure: Callable[[], Any]
     form: Form[Any]
+    cost: float = 0.0
+    """About how long it takes, beside the others."""
 
     @property
     def name(self) -> str:
@@ -73,8 +76,13 @@ class Keeper:
     Without a journal nothing was finished and nothing is kept.
     """
 
-    def __init__(self, journal: store.Journal | None = None, progress: Progress | None = None) -> None:
-        self._journal = journal
+    def __init__(
+        self,
+        journal: store.Journal | None = None,
+        progress: Progress | None = None,
+        team: Team = ALONE,
+    ) -> None:
+        self._journal, self.team = journal, team
         self._finished = journal.tables() if journal else {}
         self.progress = progress
         self.names: list[str] = []
@@ -102,19 +110,25 @@ class Keeper:
 
     def results(self, pieces: Sequence[Piece]) -> list[Any]:
         """The results of these pieces, in their order: taken up where finished, else measured and kept."""
-        found = []
-        for done, piece in enumerate(pieces):
-            if self.progress:
-                self.progress(done, len(pieces), piece.what)
-            self.names.append(piece.name)
-            result = self.finished(piece.form, piece.key)
-            if result is None:
-                result = piece.measure()
-                self.keep(piece.form, piece.key, result)
-            else:
-                self.taken_up += 1
-            found.append(result)
-        return found
+        self.names += [piece.name for piece in pieces]
+        found = {i: self.finished(piece.form, piece.key) for i, piece in enumerate(pieces)}
+        found = {i: result for i, result in found.items() if result is not None}
+        self.taken_up += len(found)
+        # the longest first: whoever comes last is then not waited for long
+        left = [i for i in range(len(pieces)) if i not in found]
+        if self.team.workers > 1:
+            left.sort(key=lambda i: -pieces[i].cost)
+        with closing(self.team.carried_out([pieces[i].measure for i in left])) as measured:
+            self._tell(len(found), pieces, left[:1])
+            for j, result in measured:
+                found[left[j]] = result
+                self.keep(pieces[left[j]].form, pieces[left[j]].key, result)
+                self._tell(len(found), pieces, left[j + 1 : j + 2])
+        return [found[i] for i in range(len(pieces))]
+
+    def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[int]) -> None:
+        if self.progress:
+            self.progress(done, len(pieces), *(pieces[i].what for i in following))
 
     def runs(self) -> tuple[str, ...]:
         """Labels of the trajectories that are finished."""
@@ -167,14 +181,19 @@ class Draft:
 
 @contextmanager
 def kept(
-    path: str | Path, command: str, *, force: bool = False, progress: Progress | None = None
+    path: str | Path,
+    command: str,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+    team: Team = ALONE,
 ) -> Iterator[Keeper]:
     """A study that is kept in a store; an unfinished one of the same command is taken up.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
     with store.open_new(path, command, force=force) as journal:
-        yield Keeper(journal, progress)
+        yield Keeper(journal, progress, team)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

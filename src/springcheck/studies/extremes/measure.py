@@ -19,6 +19,7 @@ from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.studies import keeper
+from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
@@ -26,6 +27,7 @@ from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import Keeper, Piece, each
 from springcheck.studies.stability import propagators
 from springcheck.studies.study import Progress
+from springcheck.studies.team import ALONE, Team
 
 ALL = ("*", "openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
        "openmm:verlet@OpenCL-double")  # fmt: skip
@@ -87,6 +89,7 @@ def record(
     quick: bool = False,
     force: bool = False,
     progress: Progress | None = None,
+    team: Team = ALONE,
 ) -> Atlas:
     """Like `measure`, kept in a store: one table of cells for each method as it is finished, the document.
 
@@ -96,7 +99,7 @@ def record(
     labels = engines.match(tuple(methods) or ALL)
     size = "quick" if quick else "whole"
     command = keeper.command("extremes", labels, size)
-    with keeper.kept(path, command, force=force, progress=progress) as kept:
+    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
         atlas = measure(methods, quick=quick, kept=kept)
         known = {"tables": kept.names, **atlas.document(cells=False)}
         kept.commit("extremes", known)
@@ -106,7 +109,14 @@ def record(
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
     """What `springcheck extremes` does."""
     path = Path(options.output or "extremes.h5")
-    atlas = record(path, options.method, quick=options.quick, force=options.force, progress=progress)
+    atlas = record(
+        path,
+        options.method,
+        quick=options.quick,
+        force=options.force,
+        progress=progress,
+        team=teams.of(options),
+    )
     return replace(atlas, path=path)
 
 

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import os
+from argparse import ArgumentParser
+
+from springcheck.studies import team
 from springcheck.studies.study import Study, report_options
+
+
+def _options(parser: ArgumentParser) -> None:
+    team.options(parser, default=min(2, os.cpu_count() or 1))
+    report_options(parser)
+
 
 STUDY = Study(
     name="faults",
     about="engines broken on purpose: what sees them, how small",
-    options=report_options,
+    options=_options,
     keeps=lambda options: False,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -16,13 +15,14 @@ from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
+from springcheck.studies import team as teams
 from springcheck.studies.faults import clean, steppers
 from springcheck.studies.faults.result import Clean, FaultReport, Result
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.study import Progress
+from springcheck.studies.team import ALONE, Team
 from springcheck.trajectory import Trajectory
-from springcheck.workers import carried_out
 
 
 @cache
@@ -200,20 +200,19 @@ def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Ex
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
     labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
-    return study(simulate.run, labels, workers=min(2, os.cpu_count() or 1), progress=progress)
+    return study(simulate.run, labels, team=teams.of(options), progress=progress)
 
 
 def study(
     run: Run | None = None,
     labels: Sequence[str] = (),
     *,
-    workers: int = 1,
+    team: Team = ALONE,
     progress: Progress | None = None,
 ) -> FaultReport:
     """All faults, their limits, and the clean runs; `run` and `labels` add those of the engines.
 
-    `progress(done, all)` is called as parts finish.  With more than one worker, parts are computed in
-    processes of their own, and `run` must be a function that they can import.
+    `run` must be a function that another process can import.
     """
     parts: list[Callable[[], Result | Clean]] = [partial(_examine, fault.name) for fault in FAULTS]
     parts += [partial(clean_laws, name) for name in _FIXED]
@@ -225,8 +224,8 @@ def study(
             for first in range(0, BY_ENGINES, _BATCH)
         ]
     done: list[Result | Clean] = []
-    with closing(carried_out(parts, workers)) as found:
-        for part in found:
+    with closing(team.carried_out(parts)) as found:
+        for _, part in found:
             done.append(part)
             if progress:
                 progress(len(done), len(parts))

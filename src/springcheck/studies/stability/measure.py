@@ -20,12 +20,14 @@ from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
+from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Keeper, each
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
 from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
+from springcheck.studies.team import ALONE, Team
 
 
 def measure(
@@ -89,6 +91,7 @@ def record(
     *,
     force: bool = False,
     progress: Progress | None = None,
+    team: Team = ALONE,
 ) -> Stability:
     """Like `measure`, kept in a store: tables under /stability as they are finished, and the document.
 
@@ -97,7 +100,7 @@ def record(
     """
     labels = engines.match(tuple(methods) or ("*",))
     command = keeper.command("stability", labels, scene.text)
-    with keeper.kept(path, command, force=force, progress=progress) as kept:
+    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
         study = measure(scene, methods, kept=kept)
         kept.commit("stability", study.document(), scene)
     return study
@@ -107,7 +110,10 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
     """What `springcheck stability` does."""
     scene = scenefile.load_scene(options.scene)
     path = Path(options.output or f"{scene.name}-stability.h5")
-    return replace(record(scene, path, options.method, force=options.force, progress=progress), path=path)
+    study = record(
+        scene, path, options.method, force=options.force, progress=progress, team=teams.of(options)
+    )
+    return replace(study, path=path)
 
 
 def stored(path: str | Path) -> Stability:

@@ -1,0 +1,70 @@
+"""Who measures the pieces of a study: this process, processes beside it, or the workers of a cluster.
+
+The parent alone writes.  A piece is a function that another process can import, and what it returns travels
+back; so the numbers are the same whoever measures them.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from springcheck.workers import carried_out
+
+T = TypeVar("T")
+
+
+class Team(Protocol):
+    """Carries out pieces of work."""
+
+    @property
+    def workers(self) -> int:
+        """How many pieces are measured at the same time."""
+        ...
+
+    def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
+        """Numbers and results of the parts, as they finish.  Close the iterator where it is left early."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Processes:
+    """Processes of this machine; one is the program itself."""
+
+    workers: int = 1
+
+    def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
+        """Numbers and results of the parts, as they finish."""
+        return carried_out([partial(_numbered, i, part) for i, part in enumerate(parts)], self.workers)
+
+
+def _numbered(i: int, part: Callable[[], Any]) -> tuple[int, Any]:
+    return i, part()
+
+
+ALONE = Processes()
+
+
+def options(parser: ArgumentParser, default: int = 1) -> None:
+    """The options of a study that can be measured by many."""
+    parser.add_argument(
+        "--workers",
+        type=_count,
+        default=default,
+        metavar="N",
+        help=f"processes that measure at the same time (default {default})",
+    )
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and 0 < int(text) <= 4096):
+        raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to 4096 is needed")
+    return int(text)
+
+
+def of(options: Namespace) -> Team:
+    """Those that the command line asks for."""
+    return Processes(options.workers)

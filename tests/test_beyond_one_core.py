@@ -1,0 +1,75 @@
+"""A study measured by several processes is the study measured by one: every number, bit for bit, and every
+piece is kept as it is finished."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springcheck import cli, store
+from springcheck.physics import scenefile
+from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.stability import measure as stability
+from springcheck.studies.team import Processes
+
+OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
+
+
+def values(path: Path) -> dict[str, Any]:
+    """Every number and text of the tables of a store, NaN equal to NaN."""
+    found = {}
+    for name, table in store.read_tables(path).items():
+        columns = {key: repr(np.asarray(column).tolist()) for key, column in table.columns.items()}
+        found[name] = (columns, repr(sorted(table.attributes.items())), table.signal, table.axes)
+    return found
+
+
+@pytest.mark.parametrize("name", ["extremes", "stability"])
+def test_the_stores_of_one_and_of_two_workers_are_equal_value_for_value(name: str, tmp_path: Path) -> None:
+    one, two = tmp_path / "one.h5", tmp_path / "two.h5"
+    for path, team in ((one, Processes(1)), (two, Processes(2))):
+        if name == "extremes":
+            extremes.record(path, OWN, quick=True, team=team)
+        else:
+            stability.record(scenefile.load_scene("overdamped"), path, OWN, team=team)
+        assert store.check(path) == []
+    assert values(one) == values(two)
+    assert len(values(one)) >= 3
+    assert json.loads(store.document(one, name)) == json.loads(store.document(two, name))
+
+
+def raising(after: int) -> Callable[..., None]:
+    """A progress callback that is Ctrl-C at its `after`-th call."""
+    calls: list[object] = []
+
+    def told(*what: object) -> None:
+        calls.append(what)
+        if len(calls) == after:
+            raise KeyboardInterrupt
+
+    return told
+
+
+def test_what_workers_have_finished_is_taken_up_by_one_alone(tmp_path: Path) -> None:
+    path = tmp_path / "extremes.h5"
+    with pytest.raises(KeyboardInterrupt):
+        extremes.record(path, OWN, quick=True, team=Processes(2), progress=raising(2))
+    kept = values(path)
+    assert len(kept) == 1
+    atlas = extremes.record(path, OWN, quick=True)
+    assert atlas.taken_up == 1
+    whole = values(path)
+    assert {name: whole[name] for name in kept} == kept
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "two", "1.5", "9999"])
+def test_a_senseless_number_of_workers_is_refused(number: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as refused:
+        cli.main(["extremes", "--workers", number])
+    assert refused.value.code == 2
+    assert "from 1 to 4096" in capsys.readouterr().err
