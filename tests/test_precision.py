@@ -19,7 +19,7 @@ from springcheck.schemes import SCHEMES
 from springcheck.studies.precision import accuracy, figure, fits, sweeps
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.points import POINTS, Point
 
 pytestmark = pytest.mark.usefixtures("steady_clock")
 
@@ -279,7 +279,7 @@ def test_a_budget_that_ends_is_said() -> None:
     assert method.floor is None
 
 
-def test_an_interrupted_study_keeps_every_finished_point() -> None:
+def test_an_interrupted_study_keeps_every_finished_point(tmp_path: Path) -> None:
     scene = scenes.load_scene("spring-uneven")
     told: list[str] = []
 
@@ -288,12 +288,15 @@ def test_an_interrupted_study_keeps_every_finished_point() -> None:
         if len(told) == 12:
             raise KeyboardInterrupt
 
-    found = precision.study(scene, list(engines.match(("own:*",))), budget=5.0, progress=interrupt)
-    assert found.interrupted
+    path = tmp_path / "study.h5"
+    labels = list(engines.match(("own:euler", "own:semi-implicit-euler", "own:implicit-euler")))
+    with pytest.raises(KeyboardInterrupt):
+        precision.record(scene, labels, path, budget=5.0, progress=interrupt)
+    assert not path.exists()
+    kept = [point for table in store.read_tables(path).values() for point in POINTS.found(table)]
     # three methods and one round of timings a level: 12 calls are three levels less one timing
-    assert sum(point.complete for point in found.points) == 6
-    assert all(point.run_repeats for point in found.points if point.complete)
-    assert [point.message for point in found.points if not point.complete] == ["interrupted before it"] * 3
+    assert len(kept) == 6
+    assert all(point.complete and point.run_repeats for point in kept)
 
 
 def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:

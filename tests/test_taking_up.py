@@ -111,7 +111,7 @@ def test_a_killed_study_of_precision_keeps_its_points(
     for name, points in kept.items():
         assert whole[name][: len(points)] == points
         assert len(whole[name]) > len(points)
-    assert json.loads(capsys.readouterr().out)["interrupted"] is False
+    assert len(json.loads(capsys.readouterr().out)["points"]) == sum(map(len, whole.values()))
     assert store.summary(path).complete
 
 
@@ -124,26 +124,19 @@ def test_points_are_read_back_as_they_were() -> None:
         assert POINTS.found(points_of(scene).table(method.method, points)) == list(points)
 
 
-def test_an_interrupted_study_of_precision_is_a_store_and_goes_on(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupted_study_of_precision_goes_on(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = list(map(engines.parse, OWN))
-    first = precision.record(scene, labels, path, budget=2.0, progress=raising(12))
-    assert first.interrupted
+    with pytest.raises(KeyboardInterrupt):
+        precision.record(scene, labels, path, budget=2.0, progress=raising(12))
+    assert not path.exists()
     assert not store.summary(path).complete
-    assert json.loads(store.document(path, "precision")) == first.document()
-    assert cli.main(["check", str(path)]) == 0
-    assert "unfinished" in capsys.readouterr().out
-    done = [point for point in first.points if point.complete]
+    done = [point for table in store.read_tables(path).values() for point in POINTS.found(table)]
     with pytest.raises(StoreError, match=r"another command, or of other versions"):
         precision.record(scene, labels[:2], path, budget=2.0)
     second = precision.record(scene, labels, path, budget=2.0)
-    assert not second.interrupted
-    # how many there are by the twelfth call depends on the time that each took
     assert second.taken_up == len(done) > 0
     assert set(done) < set(second.points)
-    assert second.seconds > first.seconds
     assert store.summary(path).complete
     assert store.check(path) == []
 
@@ -247,4 +240,19 @@ def test_a_study_of_stability_can_be_forced_to_start_over(tmp_path: Path) -> Non
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     with pytest.raises(KeyboardInterrupt):
         stability.record(scene, path, ["own:*"], progress=raising(3))
+    assert stability.record(scene, path, ["own:*"], force=True).taken_up == 0
+
+
+def test_a_forced_study_goes_on_with_what_it_has_finished_itself(tmp_path: Path) -> None:
+    scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
+    old = stability.record(scene, path, ["own:euler"])
+    before = path.read_bytes()
+    for piece in (2, 3):
+        with pytest.raises(KeyboardInterrupt):
+            stability.record(scene, path, ["own:*"], force=True, progress=raising(piece))
+        assert path.read_bytes() == before
+    whole = stability.record(scene, path, ["own:*"], force=True)
+    assert whole.taken_up >= 2
+    assert len(whole.limits) > len(old.limits)
+    # finished: the next one starts over
     assert stability.record(scene, path, ["own:*"], force=True).taken_up == 0

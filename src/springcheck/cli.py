@@ -172,8 +172,6 @@ def _study(study: Study, options: argparse.Namespace) -> int:
         _document(found.document())
     elif not options.quiet:
         _show(study.lines(found, options))
-    if found.status == INTERRUPTED:
-        return _interrupted("what was finished is kept, the same command goes on")
     return found.status
 
 

@@ -36,8 +36,8 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
 
     `command` says all that decides the results (scene text, methods, options): it is how a journal is
     recognised.  Raises StoreError when the path exists and is no unfinished store of this command
-    (`force` starts over; the old file stays until the new one is complete), when another process is
-    writing it, and when the folder is missing or cannot be written.
+    (`force` starts over, or takes up what it has started over itself; the old file stays until the new one is
+    complete), when another process is writing it, and when the folder is missing or cannot be written.
     """
     path = Path(path)
     if path.is_symlink():
@@ -75,23 +75,24 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal that is taken up or started."""
     known = reading.claim(parts)
-    if known is not None and not force:
+    if known is not None and (not force or known["forced"]):
         if known["command"] == command:
             adopt.recover(parts, parts / COLLECTION)
             for left in parts.glob("*.new*"):
                 left.unlink()
             return known["run"]
-        raise StoreError(
-            f"{parts} holds finished work of another command, or of other versions of what it runs: "
-            "give that command again to complete it, or --force to discard it"
-        )
+        if not force:
+            raise StoreError(
+                f"{parts} holds finished work of another command, or of other versions of what it runs: "
+                "give that command again to complete it, or --force to discard it"
+            )
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     for old in parts.iterdir():
         if old.name != "lock":
             old.unlink()
     run = uuid.uuid4().hex
-    files.put_bytes(json.dumps({"run": run, "command": command}).encode(), parts / "command")
+    files.put_bytes(json.dumps({"run": run, "command": command, "forced": force}).encode(), parts / "command")
     files.sync_folder(path.absolute().parent)
     return run
 

@@ -34,10 +34,11 @@ def parts_folder(path: Path) -> Path:
 
 
 def claim(parts: Path) -> dict[str, str] | None:
-    """Run id and command of a journal; None where there is no journal."""
+    """Run id and command of a journal, and whether --force began it; None where there is no journal."""
     try:
         found = json.loads((parts / "command").read_bytes())
-        return {"run": str(found["run"]), "command": str(found["command"])}
+        forced = "forced" if found.get("forced") else ""
+        return {"run": str(found["run"]), "command": str(found["command"]), "forced": forced}
     except FileNotFoundError:
         return None
     except (ValueError, KeyError, TypeError, OSError) as error:

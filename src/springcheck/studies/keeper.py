@@ -157,13 +157,11 @@ class Keeper:
         assert self._journal is not None, "trajectories are kept in a store"
         return self._journal
 
-    def commit(
-        self, name: str, document: Mapping[str, Any], scene: Scene | None = None, *, final: bool = True
-    ) -> None:
+    def commit(self, name: str, document: Mapping[str, Any], scene: Scene | None = None) -> None:
         """Put everything that was kept, and the study's document, into the store."""
         if self._journal is not None:
             text = json.dumps(document, allow_nan=False)
-            self._journal.commit(scene, documents={name: text}, final=final)
+            self._journal.commit(scene, documents={name: text})
 
 
 class Draft:

@@ -29,7 +29,7 @@ class Result(Protocol):
 
     @property
     def status(self) -> int:
-        """Exit status: 0 passed, 1 a verdict or a control failed, 2 nothing was measured, 130 interrupted."""
+        """Exit status: 0 passed, 1 a verdict or a control failed, 2 nothing was measured."""
         ...
 
     def document(self) -> dict[str, Any]:

@@ -79,9 +79,9 @@ def study(
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
-    A method that cannot run, a run that diverges and a sweep that is cut off are points with their
-    reason.  Ctrl-C ends the study early; every point that was finished is in what it returns.  Points
-    that an earlier call has finished (`kept`) are taken up, and what they took counts for the budget.
+    A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with
+    their reason.  Points that an earlier call has finished (`kept`) are taken up, and what they took counts
+    for the budget.
 
     Raises:
         SceneError: the true motion of the scene is not known, or nothing moves in it.
@@ -94,30 +94,24 @@ def study(
     taken_up = sum(len(sweep.points) for sweep in able)
     # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
     began = perf_counter() - max(before, default=0.0)
-    interrupted = False
 
     def tell(what: str) -> None:
         if kept.progress:
             kept.progress(min(perf_counter() - began, budget), budget, what)
 
-    try:
-        while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
-            _level(ready, known, tell)
-            for sweep in ready:
-                form = points_of(scene)
-                kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
-    except KeyboardInterrupt:
-        interrupted = True
-    why = "interrupted before it" if interrupted else f"the budget of {budget:g} s ends before it"
+    while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
+        _level(ready, known, tell)
+        for sweep in ready:
+            form = points_of(scene)
+            kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
     for sweep in _open(sweeps):
-        sweep.points.append(blank(sweep, CUT_OFF, why))
+        sweep.points.append(blank(sweep, CUT_OFF, f"the budget of {budget:g} s ends before it"))
     return _put_together(
         scene,
         [point for sweep in sweeps for point in sweep.points],
         [_summary(scene, x.label, x.points, x.condition, x.first_start) for x in sweeps],
         budget=budget,
         seconds=perf_counter() - began,
-        interrupted=interrupted,
         machine=keeper.origin([sweep.label for sweep in sweeps]),
         tick=tick(),
         taken_up=taken_up,
@@ -147,8 +141,7 @@ def record(
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
-    Points are kept as they are finished, and an unfinished study of the same command is taken up.  After
-    Ctrl-C the store holds what there is, and the same command goes on from it.
+    Points are kept as they are finished, and an unfinished study of the same command is taken up.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
@@ -159,7 +152,7 @@ def record(
             form = points_of(scene)
             kept.keep(form, summary.method, found.of(summary.method), study_seconds=found.seconds)
         kept.add(found.summary())
-        kept.commit("precision", found.document(), scene, final=not found.interrupted)
+        kept.commit("precision", found.document(), scene)
     return found
 
 
@@ -327,7 +320,6 @@ def _restored(kept: keeper.Kept) -> PrecisionStudy:
         methods,
         budget=known["budget_seconds"],
         seconds=known["seconds"],
-        interrupted=known["interrupted"],
         machine=known["machine"],
         tick=known["clock_seconds"],
     )

@@ -64,7 +64,6 @@ class PrecisionStudy:
     scene: Scene
     budget: float
     seconds: float
-    interrupted: bool
     points: tuple[Point, ...]
     methods: tuple[MethodSummary, ...]
     front: tuple[Point, ...]
@@ -80,10 +79,8 @@ class PrecisionStudy:
     """Where it was stored."""
 
     @property
-    def status(self) -> Literal[0, 2, 130]:
-        """Exit status: 2 nothing was measured, 130 interrupted."""
-        if self.interrupted:
-            return 130
+    def status(self) -> Literal[0, 2]:
+        """Exit status: 2 nothing was measured."""
         return 0 if any(point.complete for point in self.points) else 2
 
     def of(self, method: str) -> tuple[Point, ...]:
@@ -97,7 +94,6 @@ class PrecisionStudy:
                 "scene": self.scene.name,
                 "budget_seconds": self.budget,
                 "seconds": self.seconds,
-                "interrupted": self.interrupted,
                 "machine": self.machine,
                 "clock_seconds": self.tick,
                 "points": [point.document() for point in self.points],
@@ -123,7 +119,6 @@ class PrecisionStudy:
             attributes={
                 **{f"machine_{name}": text for name, text in self.machine.items()},
                 "budget_seconds": self.budget,
-                "interrupted": self.interrupted,
                 "clock_seconds": self.tick,
             },
         )

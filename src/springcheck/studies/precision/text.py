@@ -43,8 +43,6 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     ]
     if getattr(options, "points", False):
         out += [plain(), _points(study.points)]
-    if study.interrupted:
-        out.append(plain("Interrupted: every point that was finished is here.", "bold red"))
     out += left_out(study.left_out)
     return [*out, plain(f"Stored in {study.path}")] if study.path else out
 
