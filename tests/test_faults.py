@@ -36,7 +36,7 @@ def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) ->
 
 def test_every_check_rejects_a_fault_that_it_must_reject() -> None:
     named = {check for fault in FAULTS for check in fault.caught_by}
-    every = {checks.name(check) for check in (*checks.CHECKS, *checks.THOROUGH)}
+    every = {check.name for check in (*checks.CHECKS, *checks.THOROUGH)}
     assert named == every
 
 

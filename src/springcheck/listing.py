@@ -14,10 +14,7 @@ def listing() -> dict[str, Any]:
     return {
         "scenes": [{"name": name, "title": scenes.load_scene(name).title} for name in scenes.names()],
         "engines": [_engine(name) for name in engines.names()],
-        "checks": [
-            {"name": check.__name__.replace("_", "-"), "sentence": (check.__doc__ or "").partition("\n")[0]}
-            for check in (*checks.CHECKS, *checks.THOROUGH)
-        ],
+        "checks": [{"name": check.name, "sentence": check.sentence} for check in checks.ALL],
     }
 
 

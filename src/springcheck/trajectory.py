@@ -14,7 +14,8 @@ from springcheck.engines.contract import Arithmetic
 class Outcome:
     """How a run ended.  Nothing that is not `complete` passes for a result."""
 
-    status: Literal["complete", "diverged", "stopped"]
+    status: Literal["complete", "diverged", "stopped", "continued"]
+    """`continued`: a piece of a run that goes on after it."""
     step: int
     """Steps done with finite numbers."""
     message: str = ""

@@ -1,11 +1,12 @@
-"""The checks: one function each, one number against one bound, and the bound's reason.
+"""The checks: each holds one number against one bound, and gives the bound's reason.
 
-A check looks at a recorded trajectory, or at a piece of one.  The first line of its docstring is its
-sentence in the report.  Bounds are formulas: roundings counted along one step, times what the map can
-make of them.  Values and bounds of the rounding checks are in units of one rounding of what was added
-up, so that "4.1 of 19" reads: four roundings were seen where nineteen take place.
+A check looks at a recorded trajectory, or at a piece of one.  Bounds are formulas: roundings counted along
+one step, times what the map can make of them.  Values and bounds of the rounding checks are in units of one
+rounding of what was added up, so that "4.1 of 19" reads: four roundings were seen where nineteen take
+place.
 
-`recorded` holds the checks of a trajectory, `experiments` those that need runs of their own.
+`record`, `steps`, `motion` and `solver` hold the checks of a trajectory, `experiments` and `laws` those
+that need runs of their own.  A check is an object (see `Check`); the two lists here are the only ones.
 
 Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
 Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need
@@ -15,43 +16,23 @@ the solution and holds for nonlinear scenes too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from springcheck.checks import check, experiments, laws
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
-from springcheck.checks.experiments import (
-    determinant,
-    mirror,
-    propagator,
-    repeatability,
-    reversibility,
-    symplecticity,
-)
-from springcheck.checks.laws import convergence, order, order_anharmonic, rounding_bias, rounding_growth
-from springcheck.checks.recorded import (
-    CONTRACTED,
-    arithmetic,
-    closed_form,
-    energies,
-    fastest,
-    frequency,
-    growth_bound,
-    line,
-    momentum,
-    shadow_energy,
-    start,
-    step_defect,
-    times,
-    tolerance,
-    tolerance_bound,
-)
+from springcheck.checks.motion import closed_form, frequency, growth_bound, momentum, shadow_energy
+from springcheck.checks.record import energies, grid, line, start, times
+from springcheck.checks.solver import tolerance, tolerance_bound
+from springcheck.checks.steps import CONTRACTED, arithmetic, fastest, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory, Verdict
 
 __all__ = [
+    "ALL",
     "CHECKS",
     "CONTRACTED",
     "THOROUGH",
@@ -60,21 +41,33 @@ __all__ = [
     "Check",
     "Experiment",
     "Run",
+    "arithmetic",
+    "closed_form",
+    "energies",
     "fastest",
+    "frequency",
+    "grid",
     "growth_bound",
     "judge",
     "judge_thoroughly",
-    "name",
+    "line",
+    "momentum",
+    "shadow_energy",
+    "start",
+    "step_defect",
+    "times",
+    "tolerance",
     "tolerance_bound",
     "worst",
 ]
 
-Check: TypeAlias = Callable[[Case], Verdict]
-Experiment: TypeAlias = Callable[[Bench], Verdict]
+Check: TypeAlias = check.Check[Case]
+Experiment: TypeAlias = check.Check[Bench]
 
 CHECKS: tuple[Check, ...] = (
     start,
     times,
+    grid,
     line,
     step_defect,
     arithmetic,
@@ -86,25 +79,21 @@ CHECKS: tuple[Check, ...] = (
     tolerance,
 )
 
-
 THOROUGH: tuple[Experiment, ...] = (
-    propagator,
-    determinant,
-    symplecticity,
-    reversibility,
-    mirror,
-    repeatability,
-    order,
-    order_anharmonic,
-    rounding_bias,
-    rounding_growth,
-    convergence,
+    experiments.propagator,
+    experiments.determinant,
+    experiments.symplecticity,
+    experiments.reversibility,
+    experiments.mirror,
+    experiments.repeatability,
+    laws.order,
+    laws.order_anharmonic,
+    laws.rounding_bias,
+    laws.rounding_growth,
+    laws.convergence,
 )
 
-
-def name(check: Check | Experiment) -> str:
-    """What a check is called in a report."""
-    return check.__name__.replace("_", "-")
+ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
 
 
 def judge_thoroughly(
@@ -127,7 +116,7 @@ def judge_thoroughly(
         try:
             verdicts.append(experiment(bench))
         except MethodError as error:
-            verdicts.append(bench.not_applicable(name(experiment), str(error)))
+            verdicts.append(bench.not_applicable(experiment.name, str(error)))
         if progress:
             progress(1)
     return verdicts

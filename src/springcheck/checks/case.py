@@ -11,16 +11,15 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.arrays import Extended, Floats, Force, Integers, Reals
-from springcheck.checks import verdicts
+from springcheck.checks import rounding, verdicts
+from springcheck.checks.stretch import JOINED, Stretch, follow
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
 from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Term
+from springcheck.physics.term import Term
+from springcheck.schemes.stepping import Slope
 from springcheck.trajectory import Trajectory, Verdict
-
-SMALLEST = np.longdouble(5e-324)
-"""What an operation can lose to underflow: one unit of a subnormal double."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,13 +67,22 @@ class Case:
 
     @cached_property
     def law(self) -> dict[str, Any]:
-        """What `schemes.step` and `schemes.magnitude_step` need beside the forces."""
+        """What `schemes.step` needs beside the forces."""
         scene = self.judged
-        stiff: Extended | None = None
-        if self.scheme.implicit:
-            system = scene.system
-            stiff = (system.hessian_diagonal if system.is_separate else system.hessian)(scene.q)
+        stiff: Extended | Slope | None = None
+        if self.scheme.implicit and not self.straight:
+            stiff = self._slope
+        elif self.scheme.implicit:
+            stiff = (scene.system.hessian if self.joined else scene.system.hessian_diagonal)(scene.q)
         return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
+
+    def _slope(self, q: Reals) -> tuple[Extended, bool]:
+        return rounding.stiffness_at(self.judged, q, joined=self.joined), self.joined
+
+    @property
+    def joined(self) -> bool:
+        """Whether some term joins two particles."""
+        return not self.judged.system.is_separate
 
     @cached_property
     def modes(self) -> exact.Modes:
@@ -94,59 +102,86 @@ class Case:
         return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
 
     @cached_property
+    def straight(self) -> bool:
+        """Whether every force is linear: one tangent map serves every step, and sizes need no place."""
+        return self.judged.system.is_linear
+
+    def step(
+        self,
+        q: Extended,
+        p: Extended,
+        *,
+        forces: Callable[[Iterable[Term]], Force] | None = None,
+        met: list[Reals] | None = None,
+        slope: Slope | None = None,
+    ) -> tuple[Extended, Extended]:
+        """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
+
+        `slope` stands for the scene's own where the states are not positions.
+        """
+        scene = self.judged
+        forces = forces or scene.system.force_of
+        law = self.law | ({"stiffness": slope} if slope and callable(self.law["stiffness"]) else {})
+        with np.errstate(all="ignore"):
+            a, b = schemes.step(
+                self.scheme,
+                q,
+                p,
+                h=self.trajectory.step,
+                m=scene.m,
+                force=forces(scene.terms),
+                parts=(forces(scene.system.slow), forces(scene.system.fast)),
+                met=met,
+                **law,
+            )
+        return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
+
+    @cached_property
+    def ahead(self) -> Stretch | None:
+        """The scheme's own next frame after each frame but the last, and what rounding may do to it.
+
+        None where so many steps, or so many joined particles, are only judged by the energy norm.
+        """
+        every, scene = self.trajectory.every, self.judged
+        if every > 1 and (every > REPEATED or (scene.n > JOINED and self.joined)):
+            return None
+        return follow(self, *self._starts, every)
+
+    @property
+    def _starts(self) -> tuple[Extended, Extended]:
+        return self.trajectory.q[:-1].astype(np.longdouble), self.trajectory.p[:-1].astype(np.longdouble)
+
+    @cached_property
     def next_states(self) -> tuple[Extended, Extended]:
         """The scheme's own next state after each frame but the last, in extended precision."""
-        q = self.trajectory.q[:-1].astype(np.longdouble)
-        p = self.trajectory.p[:-1].astype(np.longdouble)
-        return advance(self, q, p, self.trajectory.every)
+        if self.ahead is not None:
+            return self.ahead.q, self.ahead.p
+        return advance(self, *self._starts, self.trajectory.every)
 
     @cached_property
     def allowance(self) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
+        if self.trajectory.every == 1 and self.ahead is not None:
+            return self.ahead.of_q, self.ahead.of_p
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 
     def allowance_at(
-        self, q: Reals, p: Reals, *, smallest: np.longdouble = SMALLEST
+        self, q: Reals, p: Reals, *, smallest: np.longdouble = rounding.SMALLEST
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
         `smallest` is what an operation may lose to underflow.
         """
-        run, scene = self.trajectory, self.judged
-        rounding = run.arithmetic
-        near, momenta = q.astype(np.longdouble), p.astype(np.longdouble)
-        q, p = np.abs(near), np.abs(momenta)
-        h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-        sizes = scene.system.magnitude(near)
-        parts = (
-            scene.system.magnitude_of(scene.system.slow, near),
-            scene.system.magnitude_of(scene.system.fast, near),
-        )
-        kicks = self._kicks(near, momenta) if self.scheme.reach == 2 else []
-        size_q, size_p = schemes.magnitude_step(
-            self.scheme, q, p, h=run.step, m=m, magnitude=sizes, parts=parts, kicks=kicks, **self.law
-        )
-        # an engine may count positions from where the springs rest, and so round those
-        size_q = size_q + np.abs(self.rest_positions)
-        of_q, of_p = rounding.state * size_q, rounding.state * size_p
-        extra = np.zeros_like(p)
-        if rounding.force > rounding.state:
-            extra += rounding.force * h * sizes(q, p)
-        if rounding.quantum:
-            # each term's force on a particle is cut off once a step, not once for every rounding, and a
-            # force below the quantum is lost, no more
-            lost = np.minimum(rounding.quantum * scene.system.pulls, sizes(q, p))
-            extra += h * lost / self.roundings
-        if run.rebuilds_velocity and not rounding.keeps_displacement:
-            extra += rounding.state * m * (q + size_q) / h
-        extra += smallest * (1 + m)
-        # carried on as far as the scheme carries it and no farther: beyond stability what a later force
-        # feels is larger than the force itself
-        reach = self.scheme.reach
-        shift = h / m * (extra if reach else smallest * (1 + m)) + smallest
-        later = kicks[-1] if kicks else sizes
-        felt = h * (later(q + shift, p) - later(q, p)) if reach == 2 else 0
-        return np.asarray(of_q + shift), np.asarray(of_p + extra + felt)
+        places: list[Reals] | None = [] if self.placed else None
+        if self.placed:
+            self.step(q.astype(np.longdouble), p.astype(np.longdouble), met=places)
+        with np.errstate(all="ignore"):
+            return rounding.of_step(self, q, p, places, smallest=smallest)
+
+    @property
+    def placed(self) -> bool:
+        """Whether it matters for rounding at which positions a step evaluates the force."""
+        return self.scheme.implicit or not self.straight
 
     @cached_property
     def allowance_of_stretches(self) -> Extended:
@@ -184,28 +219,6 @@ class Case:
             before = self.envelope, (self.scene.q, self.scene.p)
             first = np.max([self.norm.size(*self.allowance_at(*x)) for x in before])
         return np.asarray(self.roundings * total), np.asarray(np.maximum(size, first * grown))
-
-    def _kicks(self, q: Extended, p: Extended) -> list[Force]:
-        """The magnitude of each kick of a splitting, near where the scheme from (q, p) takes it.
-
-        In a motion that explodes the last force of a step dwarfs the first.  Empty where no law bends, and
-        for a scheme with more than kicks and drifts.
-        """
-        scene, stages = self.judged, self.scheme.stages
-        if scene.system.is_linear or not {kind for kind, _ in stages} <= {"kick", "drift"}:
-            return []
-        found: list[Force] = []
-        m, h = scene.m.astype(np.longdouble), np.longdouble(self.trajectory.step)
-        force = scene.system.force
-        with np.errstate(over="ignore", invalid="ignore"):
-            for kind, c in stages:
-                ch = schemes.number(c, np.longdouble) * h
-                if kind == "drift":
-                    q = np.asarray(q + ch * (p / m), np.longdouble)
-                else:
-                    found.append(scene.system.magnitude(q))
-                    p = np.asarray(p + ch * force(q, p), np.longdouble)
-        return found
 
     @cached_property
     def strongest(self) -> Reals:
@@ -280,7 +293,7 @@ def overflows(how: Arithmetic) -> str:
     return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
 
 
-REPEATED = 1000
+REPEATED = 2000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""
 
 
@@ -295,19 +308,9 @@ def advance(
     """So many steps of the scheme from states (f, n), in extended precision; `forces` makes the forces."""
     if steps > REPEATED and case.linear:
         return _leap(case, q, p, steps)
-    scene = case.judged
-    forces = forces or scene.system.force_of
-    force = forces(scene.terms)
-    parts = forces(scene.system.slow), forces(scene.system.fast)
-    m = scene.m.astype(np.longdouble)
-    a: Reals = q
-    b: Reals = p
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(steps):
-            a, b = schemes.step(
-                case.scheme, a, b, h=case.trajectory.step, m=m, force=force, parts=parts, **case.law
-            )
-    return np.asarray(a), np.asarray(b)
+    for _ in range(steps):
+        q, p = case.step(q, p, forces=forces)
+    return q, p
 
 
 def _leap(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:

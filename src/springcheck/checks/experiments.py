@@ -10,7 +10,8 @@ from springcheck import schemes
 from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
-from springcheck.checks.recorded import fastest
+from springcheck.checks.check import check
+from springcheck.checks.steps import fastest
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Verdict
 
@@ -28,6 +29,7 @@ def _no_matrix(bench: Bench) -> str | None:
     return None
 
 
+@check("matrix", family="map", needs="a linear scene of few particles")
 def propagator(bench: Bench) -> Verdict:
     """The one-step matrix, recovered from single steps, is the scheme's."""
     why_not = _no_matrix(bench)
@@ -79,6 +81,7 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     return scaled(ideal), scaled(departure), scaled(allowed), scale
 
 
+@check("det", family="map", needs="a linear scene of few particles")
 def determinant(bench: Bench) -> Verdict:
     """The one-step matrix changes area by the scheme's factor, to rounding."""
     why_not = _no_matrix(bench)
@@ -108,6 +111,7 @@ def determinant(bench: Bench) -> Verdict:
     )
 
 
+@check("sympl", family="map", needs="a symplectic scheme and no friction")
 def symplecticity(bench: Bench) -> Verdict:
     """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
     why_not = _no_matrix(bench)
@@ -163,6 +167,7 @@ def _shifted(
     return np.asarray(q, np.float64), np.asarray(p, np.float64)
 
 
+@check("reverse", family="map", needs="a scheme that undoes its steps, and no friction")
 def reversibility(bench: Bench) -> Verdict:
     """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
     scheme = bench.scheme
@@ -221,6 +226,7 @@ def _enlarged(case: Case, steps: int) -> float | None:
     return steps * (1 + steps * fastest(case) * abs(case.trajectory.step) / 2)
 
 
+@check("mirror", family="repeat", needs="a fixed step and no friction")
 def mirror(bench: Bench) -> Verdict:
     """A negative step does what flipped momenta do, bit for bit."""
     if not bench.scheme.one_step:
@@ -244,6 +250,7 @@ def mirror(bench: Bench) -> Verdict:
     )
 
 
+@check("repeat", family="repeat", needs="a run of one step at least")
 def repeatability(bench: Bench) -> Verdict:
     """A second run of the same scene gives the same numbers, bit for bit."""
     first = bench.forwards

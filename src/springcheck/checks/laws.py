@@ -17,6 +17,7 @@ from springcheck import schemes
 from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
+from springcheck.checks.check import check
 from springcheck.checks.experiments import symmetric
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
@@ -68,11 +69,13 @@ WELL = _scene((Quartic(i=np.array([0]), b=_one(2.3), at=_one(0.0)),), _one(0.9),
 DURATION = 2.5 / np.sqrt(2.9 / 3.7)
 
 
+@check("order", family="law", needs="a fixed step")
 def order(bench: Bench) -> Verdict:
     """On a spring the error falls with the scheme's power of the step."""
     return _order(bench, "order", SPRING, "spring")
 
 
+@check("order, well", family="law", needs="a fixed step and quartic wells")
 def order_anharmonic(bench: Bench) -> Verdict:
     """In a quartic well, where order cannot lie, the error falls with the scheme's power of the step."""
     return _order(bench, "order-anharmonic", WELL, "quartic well")
@@ -198,6 +201,7 @@ def _walk(bench: Bench, check: str) -> str | None:
     return None
 
 
+@check("bias", family="law", needs="a symplectic splitting in double precision")
 def rounding_bias(bench: Bench) -> Verdict:
     """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
     why_not = _walk(bench, "rounding-bias")
@@ -243,6 +247,7 @@ def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
     return float(np.mean(each)), se, predicted_drift(run)
 
 
+@check("growth", family="law", needs="a symplectic splitting in double precision")
 def rounding_growth(bench: Bench) -> Verdict:
     """The shadow energy's rounding grows no faster than a random walk, with the square root of the steps."""
     why_not = _walk(bench, "rounding-growth")
@@ -282,6 +287,7 @@ def rounding_growth(bench: Bench) -> Verdict:
     )
 
 
+@check("tolerance", family="law", needs="an adaptive method")
 def convergence(bench: Bench) -> Verdict:
     """The error of an adaptive solver falls with its tolerance, decade by decade."""
     if bench.scheme.one_step:

@@ -142,7 +142,10 @@ class Term:
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         """Add the force at positions q and velocities v, each (..., n), to out (..., n) [M L/T2]."""
-        pull = self.pull(q)
+        self.add_pull(self.pull(q), out)
+
+    def add_pull(self, pull: Reals, out: Reals) -> None:
+        """Add to out (..., n) what shortens the elongation of each row by a force (..., s) [M L/T2]."""
         if self.bodies == 2:
             _scatter(np.add, out, self._places[0], pull)
         _scatter(np.subtract, out, self._places[-1], pull)

@@ -223,6 +223,9 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     short = np.minimum(j, longest)
     with np.errstate(over="ignore", invalid="ignore"):
         ramp = short * (short - 1) / 2 + np.where(j > short, (j - short) * short, 0)
-        total = np.max(np.minimum(j + size * np.maximum(ramp, 0), j * condition(matrices, w)), axis=-1)
+        total = np.max(
+            np.minimum(j + size * np.maximum(ramp, 0), np.where(j > 0, j * condition(matrices, w), 0)),
+            axis=-1,
+        )
         grown = np.max(radius**j, axis=-1)
     return np.asarray(total, np.float64), np.asarray(grown, np.longdouble)

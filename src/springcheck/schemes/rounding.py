@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from springcheck.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.stepping import acting, weighted_sum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Met:
+    """One evaluation of the force within a step: what bounds its rounding there, and its slope.
+
+    `magnitude` is made by `System.magnitude`, near the position `q` (..., n) of the evaluation.
+    `stiffness` are the second derivatives of the potential there, (..., n) where no particle is joined to
+    another, else (..., n, n) or (n, n); only an implicit stage needs them.  Without `q` the scene is
+    linear, and what bounds the solution stands for it.
+    """
+
+    magnitude: Force
+    stiffness: Reals | None = None
+    joined: bool = False
+    q: Reals | None = None
 
 
 def magnitude_step(
@@ -22,20 +39,19 @@ def magnitude_step(
     stiffness: Reals | None = None,
     rate: Reals | None = None,
     parts: tuple[Force, Force] | None = None,
-    kicks: Sequence[Force] = (),
+    met: Sequence[Met] = (),
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `System.magnitude`; `kicks` are one for each kick of a splitting,
-    near where it takes place, and stand for `magnitude` where they are given.  An implicit scheme's is
-    carried through the solution of its equation.
+    `magnitude` and `parts` are made by `System.magnitude`; `met` has one entry for each evaluation of the
+    force, in their order, and stands for `magnitude`, `parts` and `stiffness` where it is given.
     """
     direction = np.sign(h)
     # in extended precision: the square of a step may leave the range of a double
     q, p, size = np.abs(q), np.abs(p), np.abs(np.longdouble(h))
+    each = iter(met)
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
-        each = iter(kicks)
         for kind, c in stages:
             if kind == "drift":
                 q = q + c * size * p / m
@@ -45,21 +61,23 @@ def magnitude_step(
                 x = np.zeros_like(m) if rate is None else -c * direction * size * rate
                 p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
             else:
-                p = p + c * size * next(each, acting(kind, magnitude, parts))(q, p)
+                here = next(each, None)
+                bound = acting(kind, magnitude, parts) if here is None else here.magnitude
+                p = p + c * size * bound(q, np.zeros_like(p) if kind == "pull" else p)
         return q, p
-    rows = [[abs(float(c)) * size for c in row] for row in scheme.a]
     forces: list[Reals] = []
     velocities: list[Reals] = []
-    for row in rows:
-        qs = weighted_sum(list(zip(row, velocities, strict=False)), q)
-        ps = weighted_sum(list(zip(row, forces, strict=False)), p)
-        own = row[len(forces)]
+    whole = Met(magnitude=magnitude, stiffness=stiffness, joined=stiffness is not None and stiffness.ndim > 1)
+    for row in scheme.a:
+        here = next(each, whole)
+        past = [abs(float(c)) * size for c in row[: len(forces)]]
+        qs = weighted_sum(list(zip(past, velocities, strict=True)), q)
+        ps = weighted_sum(list(zip(past, forces, strict=True)), p)
+        own = abs(float(row[len(forces)])) * size
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + direction * own * rate)
-            kicked = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
-            qs = _solved(qs + own * kicked / m, own**2 / (m * slowed), stiffness)
-            ps = (ps + own * magnitude(qs, np.zeros_like(ps))) / slowed
-        forces.append(magnitude(qs, ps))
+            qs, ps = _implicit_stage(here, qs, ps, own, m, slowed)
+        forces.append(here.magnitude(qs, ps))
         velocities.append(ps / m)
     weights = [abs(float(c)) * size for c in scheme.b]
     return (
@@ -68,21 +86,83 @@ def magnitude_step(
     )
 
 
-def _solved(given: Reals, factor: Reals, stiffness: Reals | None) -> Reals:
-    """What bounds the rounding of the solution of (1 + factor * stiffness) x = b, `given` bounding b.
+def _implicit_stage(here: Met, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals) -> tuple[Reals, Reals]:
+    """What bounds the rounding of the solution of Q = q + x P/m, slowed P = p + x F(Q).
 
-    Componentwise backward error: |A^-1| (|A| |x| + |b|) with |x| <= |A^-1| |b| (Higham, Accuracy and
-    Stability of Numerical Algorithms, 7.2).
+    Whatever solver finds Q leaves a residual of a few roundings of what the equation adds up, at Q; the
+    inverse of its Jacobian A = 1 + x**2 K/(m slowed) carries that into Q (Higham, Accuracy and Stability of
+    Numerical Algorithms, 7.2).  An engine may as well find P first, and drift.
     """
-    if stiffness is None:
-        return given
-    if stiffness.ndim == 1:
-        change = factor * stiffness
-        inverse = 1 / np.abs(1 + change)
-        return np.asarray(((1 + np.abs(change)) * (inverse * given) + given) * inverse)
-    matrix = np.asarray(factor, np.float64)[:, None] * np.asarray(stiffness, np.float64)
-    inverse = np.abs(np.linalg.inv(np.eye(len(matrix)) + matrix)).T
-    return np.asarray(((given @ inverse) @ (np.eye(len(matrix)) + np.abs(matrix)).T + given) @ inverse)
+    if here.stiffness is None:
+        raise ValueError("an implicit stage needs the stiffness of the scene")
+    none = np.zeros_like(p)
+    factor = x * x / (m * slowed)
+    solve = _Joined(here.stiffness, factor) if here.joined else _Separate(here.stiffness, factor)
+    right = q + x * p / (m * slowed)
+    if here.q is None:
+        right = right + factor * here.magnitude(np.zeros_like(q), none)
+        found = solve.inverse(right)
+    else:
+        found = np.abs(here.q)
+    residual = right + found + factor * here.magnitude(found, none)
+    of_q = np.maximum(solve.inverse(residual), found)
+    # the same equation for P, and what an error of Q does to the force
+    of_p = np.maximum(
+        solve.turned((p + x * here.magnitude(q, none)) / slowed, m),
+        (p + x * here.magnitude(found, none)) / slowed + solve.kicked(residual) * m / x,
+    )
+    return np.maximum(of_q, q + x * of_p / m), of_p
+
+
+class _Separate:
+    """|A^-1| and its relatives for A = 1 + factor K, all (..., n)."""
+
+    def __init__(self, stiffness: Reals, factor: Reals) -> None:
+        self._change = np.abs(factor * stiffness)
+        with np.errstate(divide="ignore"):
+            self._inverse = 1 / np.abs(1 + factor * stiffness)
+
+    def inverse(self, x: Reals) -> Reals:
+        return np.asarray(self._inverse * x)
+
+    def kicked(self, x: Reals) -> Reals:
+        """|factor K A^-1| x."""
+        return np.asarray(self._change * self._inverse * x)
+
+    def turned(self, x: Reals, m: Reals) -> Reals:
+        """|M A^-1 M^-1| x."""
+        return np.asarray(self._inverse * x)
+
+
+class _Joined:
+    """The same for matrices (..., n, n)."""
+
+    def __init__(self, stiffness: Reals, factor: Reals) -> None:
+        wide = np.asarray(factor, np.float64)[..., :, None] * np.asarray(stiffness, np.float64)
+        try:
+            found = np.linalg.inv(np.eye(wide.shape[-1]) + wide)
+        except np.linalg.LinAlgError:
+            found = np.full(wide.shape, np.inf)
+        self._inverse = np.abs(found)
+        self._change = np.abs(wide @ found)
+
+    def inverse(self, x: Reals) -> Reals:
+        return _product(self._inverse, x)
+
+    def kicked(self, x: Reals) -> Reals:
+        return _product(self._change, x)
+
+    def turned(self, x: Reals, m: Reals) -> Reals:
+        return np.asarray(m * _product(self._inverse, x / m))
+
+
+def _product(matrix: Reals, x: Reals) -> Reals:
+    """matrix (..., n, n) times x (..., n); an infinite entry times nothing is nothing."""
+    if np.all(np.isfinite(matrix)):
+        return np.asarray(x @ matrix.T if matrix.ndim == 2 else (matrix @ x[..., None])[..., 0])
+    with np.errstate(invalid="ignore"):
+        terms = matrix * x[..., None, :]
+    return np.asarray(np.sum(np.where(np.isnan(terms), 0, terms), axis=-1))
 
 
 def roundings(scheme: Scheme) -> int:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.arrays import Floats, Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
+
+Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]
+"""Positions (..., n) -> second derivatives there, and whether as matrices (..., n, n) instead of (..., n)."""
 
 
 def weighted_sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
@@ -27,16 +31,19 @@ def step(
     h: Any,
     m: Reals,
     force: Force,
-    stiffness: Reals | None = None,
+    stiffness: Reals | Slope | None = None,
     rate: Reals | None = None,
     parts: tuple[Force, Force] | None = None,
+    met: list[Reals] | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
     Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
-    particle is joined to another; double precision is enough, because it only steers an iteration whose
-    residual has the full width.  `rate` is `System.friction_rates`, left out where nothing is damped; `parts`
-    are the forces of the slow and the fast springs, for the schemes that part them.
+    particle is joined to another; or a function of the position, where that bends.  Double precision is
+    enough, because it only steers an iteration whose residual has the full width.  `rate` is
+    `System.friction_rates`, left out where nothing is damped; `parts` are the forces of the slow and the fast
+    springs, for the schemes that part them.  `met` takes the position (..., n) of each evaluation of the
+    force, in their order.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
@@ -48,6 +55,8 @@ def step(
             elif kind == "friction":
                 p = p if rate is None else p * np.exp(-ch * rate.astype(width))
             else:
+                if met is not None:
+                    met.append(q)
                 p = p + ch * acting(kind, force, parts)(q, p)
         return q, p
     if not scheme.b:
@@ -63,6 +72,8 @@ def step(
             if stiffness is None:
                 raise ValueError(f"{scheme.name} needs the stiffness of the scene")
             qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate)
+        if met is not None:
+            met.append(qs)
         forces.append(force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]
@@ -90,7 +101,7 @@ def _inverse(matrix: bytes, n: int) -> Floats:
 
 
 def _implicit_stage(
-    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals, rate: Reals | None
+    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals | Slope, rate: Reals | None
 ) -> tuple[Reals, Reals]:
     """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
 
@@ -99,24 +110,34 @@ def _implicit_stage(
     none = np.zeros_like(p)
     slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
     factor = x * x / (m * slowed)
-    diagonal = stiffness.ndim == 1
-    if diagonal:
-        matrix = 1 + np.asarray(stiffness, q.dtype) * factor
-    else:
-        matrix = np.eye(len(m)) + np.asarray(stiffness, np.float64) * factor.astype(np.float64)[:, None]
-        # it only steers: what counts is the residual
-        inverse = _inverse(np.ascontiguousarray(matrix).tobytes(), len(m)).T
-    guess, last = q, np.inf
+    eps, last = np.finfo(q.dtype).eps, np.inf
+    scale = np.abs(q) + np.abs(x * p / m)
+    guess = q
     for _ in range(50):
         residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
-        change = residual / matrix if diagonal else residual.astype(np.float64) @ inverse
+        k, joined = stiffness(guess) if callable(stiffness) else (stiffness, stiffness.ndim == 2)
+        change = _newton(residual, k, joined, factor)
         guess = guess - change
-        eps = np.finfo(q.dtype).eps
-        if not np.any(np.abs(change) > eps * np.abs(guess)):
-            break
-        # a component near 0 never gets there; where all are at their last digits nothing shrinks any more
-        size = np.max(np.abs(change))
-        if last / 2 <= size <= 1e3 * eps * np.max(np.abs(guess)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.where(change == 0, 0, np.abs(change) / (scale + np.abs(guess)))
+        size = np.max(off, initial=0)
+        # at the last digits nothing shrinks any more
+        if not size > 4 * eps or last / 2 <= size <= 1e3 * eps:
             break
         last = size
     return guess, np.asarray((p + x * force(guess, none)) / slowed)
+
+
+def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> Reals:
+    """The residual (..., n) over 1 + factor K, with K (..., n, n) if joined, else its diagonal (..., n)."""
+    if not joined:
+        return np.asarray(residual / (1 + np.asarray(stiffness, residual.dtype) * factor))
+    # it only steers: what counts is the residual
+    matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[:, None], np.float64)
+    right = residual.astype(np.float64)
+    if matrix.ndim == 2:
+        return np.asarray(right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T)
+    try:
+        return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.full_like(residual, np.nan)

@@ -263,7 +263,7 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
             end = start + len(piece.t) - 1
             # a piece ends where it ends; only the last one with what became of the run
             if end < frames - 1:
-                piece = replace(piece, outcome=replace(piece.outcome, step=end * piece.every))
+                piece = replace(piece, outcome=Outcome(status="continued", step=end * piece.every))
             yield piece
 
 

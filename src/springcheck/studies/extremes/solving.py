@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, engines, simulate
-from springcheck.checks import recorded
 from springcheck.checks.case import overflows
 from springcheck.engines.contract import Label, Stopped
 from springcheck.physics import exact
@@ -62,7 +61,7 @@ def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]
     ends = replace(scene, every=scene.steps)
     run = judging.as_trajectory(label, ends, q, p, engines.load(label.engine).arithmetic(label))
     run = replace(run, tolerance=scene.tolerance, force_calls=done.force_calls)
-    found = recorded.tolerance(checks.Case(trajectory=run, scene=ends))
+    found = checks.tolerance(checks.Case(trajectory=run, scene=ends))
     return found.value, found.bound, found.why if found.passed is None else ""
 
 
@@ -100,9 +99,9 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         with np.errstate(all="ignore"):
             run = simulate.run(scene, label)
             case, limit = _within_range(checks.Case(trajectory=run, scene=scene))
-            verdict = recorded.closed_form(case)
+            verdict = checks.closed_form(case)
             if verdict.passed is None and len(case.trajectory.t) > 1:
-                verdict = recorded.step_defect(case)
+                verdict = checks.step_defect(case)
             growth = judging.growth_of(case, scene)[0]
         unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
         outcome: Outcome = "unstable, as theory says" if unstable else "right"

@@ -53,7 +53,7 @@ def scene(where: Where) -> Scene:
     return replace(made, name=where)
 
 
-SLOW = frozenset({"order", "order-anharmonic", "rounding-bias", "rounding-growth", "convergence"})
+SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
 """Experiments that do not look at the scene, and take most of the time."""
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
@@ -118,8 +118,8 @@ class _Probe:
         return high
 
 
-_RECORDED = {checks.name(check): check for check in checks.CHECKS}
-_EXPERIMENTS: dict[str, Experiment] = {checks.name(check): check for check in checks.THOROUGH}
+_RECORDED = {check.name: check for check in checks.CHECKS}
+_EXPERIMENTS: dict[str, Experiment] = {check.name: check for check in checks.THOROUGH}
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:
@@ -155,7 +155,7 @@ def clean_scene(seed: int) -> Clean:
 
 def clean_laws(name: str) -> Clean:
     """The laws that hold over many runs, for the plain engine and one scheme."""
-    slow = tuple(check for check in checks.THOROUGH if checks.name(check) in SLOW)
+    slow = tuple(check for check in checks.THOROUGH if check.name in SLOW)
     return _judged(scene("spring"), f"plain:{name}", _plain(schemes.SCHEMES[name]), -1, slow)
 
 
@@ -170,7 +170,7 @@ _FIXED = tuple(
     for name, scheme in schemes.SCHEMES.items()
     if scheme.one_step and not scheme.flow and not scheme.mixes
 )
-_QUICK = tuple(check for check in checks.THOROUGH if checks.name(check) not in SLOW)
+_QUICK = tuple(check for check in checks.THOROUGH if check.name not in SLOW)
 
 
 def _plain(scheme: schemes.Scheme) -> Run:

@@ -11,9 +11,10 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Floats, Force
+from springcheck.arrays import Floats, Force, Reals
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics.scene import Scene
+from springcheck.schemes.stepping import Slope
 from springcheck.trajectory import Outcome, Timing, Trajectory
 
 State: TypeAlias = tuple[Floats, Floats]
@@ -37,7 +38,11 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
             return q, p
 
         return split
-    stiff = scene.system.hessian(scene.q).astype(np.float64) if scheme.implicit else None
+    stiff: Reals | Slope | None = None
+    if scheme.implicit:
+        constant = scene.system.hessian(scene.q).astype(np.float64)
+        linear = scene.system.is_linear
+        stiff = constant if linear else lambda q: (scene.system.hessian(q), True)
     parts = scene.system.parts
 
     def tableau(i: int, q: Floats, p: Floats) -> State:

@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.arrays import Extended, Floats, Integers, Reals
-from springcheck.checks.recorded import CONTRACTED
+from springcheck.checks.steps import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.norm import Norm

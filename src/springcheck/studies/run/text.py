@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from rich.text import Text
 
+from springcheck import checks
 from springcheck.schemes import SCHEMES
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
@@ -103,32 +104,6 @@ def _same_motions(report: Report) -> Lines:
     return out
 
 
-SHORT = {
-    "step-defect": "step",
-    "arithmetic": "arith",
-    "closed-form": "closed",
-    "shadow-energy": "shadow",
-    "frequency": "freq",
-    "momentum": "moment",
-    "tolerance": "toler",
-}
-
-
-MAP = {"propagator": "matrix", "determinant": "det", "symplecticity": "sympl", "reversibility": "reverse"}
-"""Experiments with the one-step map; those whose bound is 0 share the column `exact`."""
-
-LAWS = {
-    "order": "order",
-    "order-anharmonic": "order, well",
-    "rounding-bias": "bias",
-    "rounding-growth": "growth",
-    "convergence": "tolerance",
-}
-"""Experiments over many runs."""
-
-EXACT_EXPERIMENTS = frozenset({"mirror", "repeatability"})
-
-
 def ratio(verdict: Verdict) -> float:
     """Value as a fraction of the bound; infinite where an exact bound is missed."""
     if verdict.value == 0:
@@ -138,19 +113,24 @@ def ratio(verdict: Verdict) -> float:
 
 def matrices(verdicts: Sequence[Verdict]) -> Lines:
     """The checks of the recorded states, and below them the experiments where there are any."""
-    tried = MAP.keys() | LAWS.keys() | EXACT_EXPERIMENTS
-    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], SHORT)]
-    for title, short, exact in (("steps", MAP, EXACT_EXPERIMENTS), ("laws", LAWS, frozenset[str]())):
+    tried = {check.name for check in checks.THOROUGH}
+    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], _names("motion"))]
+    for title, short, exact in (("steps", _names("map"), _names("repeat")), ("laws", _names("law"), {})):
         mine = [v for v in verdicts if v.check in short or v.check in exact]
         if any(v.passed is not None for v in mine):
             out += [plain(), plain(f"Experiments with {title}, likewise:"), verdict_matrix(mine, short)]
     return out
 
 
+def _names(family: str) -> dict[str, str]:
+    """Names in narrow columns of the checks of a family, by their names."""
+    return {check.name: check.short for check in checks.ALL if check.family == family}
+
+
 def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> Table:
     """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
-    checks = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
-    shown = [c for c in checks if any(v.check == c and v.passed is not None for v in verdicts)]
+    named = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
+    shown = [c for c in named if any(v.check == c and v.passed is not None for v in verdicts)]
     exact = any(v.check not in short for v in verdicts)
     rows: list[Row] = []
     for method in dict.fromkeys(v.method for v in verdicts):

@@ -1,0 +1,212 @@
+"""The recorded motion as a whole: closed form, shadow energy, frequency, momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck import schemes
+from springcheck.arrays import Extended, Floats
+from springcheck.checks.case import Case
+from springcheck.checks.check import check
+from springcheck.checks.steps import STILL, closed_or_not
+from springcheck.trajectory import Verdict
+
+
+def growth_bound(case: Case) -> tuple[Floats, Floats]:
+    """Bound on the distance from the closed form at each frame, in units of one rounding, and that unit.
+
+    One rounding a step, enlarged by the map from the step where it arises, and all of one sign.
+    """
+    bound, unit = case.growth
+    with np.errstate(divide="ignore", over="ignore"):
+        return bound, np.asarray(unit / case.norm.unit, np.float64)
+
+
+@check("closed", family="motion", needs="normal modes that a step turns")
+def closed_form(case: Case) -> Verdict:
+    """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
+    why_not = closed_or_not(case)
+    if why_not:
+        return case.not_applicable("closed-form", why_not)
+    y, v = case.closed_states
+    q, p = case.modes.out_of(y + case.modes.centre(), v)
+    distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
+    moved = case.norm.size(q - case.scene.q, p - case.scene.p)
+    bound, unit = case.growth
+    late = case.steps > 0
+    allowed = np.where(late, bound * unit, 1)
+    ratio = np.where(late, distance / allowed, 0)
+    worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+    if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
+        return case.not_applicable("closed-form", f"{STILL} the motion")
+    return case.verdict(
+        "closed-form",
+        float(distance[worst] / unit[worst]),
+        float(bound[worst]),
+        "roundings",
+        f"one rounding of each of {case.steps[worst]} steps, carried on by the map, all of one sign"
+        + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
+    )
+
+
+def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
+    """From where on a check says nothing any more because its bound is as large as what it looks at."""
+    late = np.flatnonzero(~drowned)
+    if not len(late) or late[-1] == len(drowned) - 1:
+        return ""
+    return f"; says nothing from step {case.steps[late[-1] + 1]} on, where that may be all of the {what}"
+
+
+@check("shadow", family="motion", needs="normal modes that a step turns")
+def shadow_energy(case: Case) -> Verdict:
+    """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
+    why_not = closed_or_not(case)
+    if why_not:
+        return case.not_applicable("shadow-energy", why_not)
+    run = case.trajectory
+    form = schemes.invariant(case.matrices, h=run.step)
+    y, v = case.modes.into(run.q, run.p)
+    u = y - case.modes.centre()
+    stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
+    turn = schemes.rotation(case.matrices)
+    factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
+    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.modes.centre()
+    first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
+    expected = first * factor ** case.steps[:, None].astype(np.longdouble)
+    # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
+    shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
+    _, unit = case.growth
+    size = np.maximum.accumulate(case.norm.size(run.q - _rest(case), run.p))
+    if case.steps[0] != 0:
+        size = np.maximum(size, case.norm.size(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
+    scale = 2 * shape * size * unit
+    off = np.max(np.abs(stored - expected), axis=1)
+    late = case.steps > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = np.where(late & (off != 0), off / scale, 0)
+    limit = np.where(late, case.roundings * np.maximum(case.steps, 1), 1)
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
+    energy = np.max(np.abs(expected), axis=1)
+    if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & (energy > limit * scale)):
+        return case.not_applicable("shadow-energy", "rounding may be as large as the energy")
+    return case.verdict(
+        "shadow-energy",
+        float(seen[worst]),
+        float(limit[worst]),
+        "roundings",
+        f"{case.steps[worst]} steps, each rounded {case.roundings} times, all of one sign"
+        + _untold(case, energy <= limit * scale, "energy"),
+    )
+
+
+def _rest(case: Case) -> Floats:
+    q, _ = case.modes.out_of(case.modes.centre(), np.zeros_like(case.modes.w2))
+    return np.asarray(q, np.float64)
+
+
+@check("freq", family="motion", needs="a mode that oscillates without friction")
+def frequency(case: Case) -> Verdict:
+    """The phase turns by the scheme's own frequency, to rounding."""
+    why_not = closed_or_not(case)
+    if why_not:
+        return case.not_applicable("frequency", why_not)
+    if case.scene.system.is_damped:
+        return case.not_applicable("frequency", "a phase that decays is seen in the closed form")
+    turn = schemes.rotation(case.matrices)
+    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.modes.centre()
+    strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
+    j = int(np.argmax(strength))
+    if strength[j] <= 0:
+        return case.not_applicable("frequency", "no mode oscillates")
+    form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
+    y, v = case.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
+    steps = int(case.steps[-1])
+    if steps == 0:
+        return case.not_applicable("frequency", "nothing has moved yet")
+    # in the coordinates of the invariant form a step is a plain rotation by -angle
+    phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
+    # on an inverted spring a scheme that goes back on part of its way can turn the other way
+    backwards = np.sign(case.matrices[j, 0, 1])
+    expected = backwards * turn.angle[j] * np.longdouble(steps)
+    off = phase - expected
+    off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
+    off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
+    bound, unit = case.growth
+    # where the mode ought to be: one that has come to nothing would excuse any phase
+    own_y, own_v = case.closed_states
+    # extended: a motion that spirals out is squared here, up to the end of double's range
+    mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
+    wide = unit[-1] * np.sqrt(np.longdouble(2))
+    # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
+    shape = schemes.condition(case.matrices, case.w)[j]
+    angle = bound[-1] * (wide / mode) * shape
+    if angle >= 1:
+        return case.not_applicable(
+            "frequency", "rounding may be as large as the mode, which has no phase then"
+        )
+    if angle >= abs(expected):
+        return case.not_applicable("frequency", f"{STILL} the whole turn")
+    limit = float(angle / abs(expected))
+    true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
+    return case.verdict(
+        "frequency",
+        float(abs(off) / abs(expected)),
+        limit,
+        "relative",
+        f"the closed form's bound as an angle; the scheme itself is off the true frequency by {true:.2e}",
+    )
+
+
+_LOW_TWO_PI = 2 * (np.longdouble("3.14159265358979323846264338327950288") - np.longdouble(np.pi))
+"""What the double 2 pi lacks."""
+
+
+def _phase(form: Extended, u: np.longdouble, v: np.longdouble) -> np.longdouble:
+    if not (np.isfinite(u) and np.isfinite(v)):
+        return np.longdouble(np.nan)
+    x = np.sqrt(np.abs(form[0] - form[1] ** 2 / (4 * form[2]))) * u
+    y = np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
+    return np.longdouble(np.arctan2(-y, x))
+
+
+@check("moment", family="motion", needs="nothing that holds a particle")
+def momentum(case: Case) -> Verdict:
+    """Nothing outside pulls, so the total momentum stays."""
+    if any(term.bodies == 1 for term in case.scene.terms):
+        return case.not_applicable("momentum", "walls or wells take up momentum")
+    if not case.scheme.one_step:
+        return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
+    run = case.trajectory
+    if len(run.t) < 2:
+        return case.not_applicable("momentum", "there is no second frame")
+    total = np.sum(run.p.astype(np.longdouble), axis=1)
+    steps, first = case.steps, np.sum(case.scene.p.astype(np.longdouble))
+    # at both ends of each stretch between frames, for a motion that grows along it
+    with np.errstate(over="ignore", invalid="ignore"):
+        _, of_p = case.allowance_at(run.q, run.p)
+    unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
+    if steps[0] != 0 and case.linear:
+        unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
+    elif steps[0] != 0:
+        # nothing bounds the motion before this piece: it is judged from its own first frame on
+        steps, first = steps - steps[0], total[0]
+    off = np.abs(total - first)[1:]
+    limit = case.roundings * steps[1:].astype(np.float64)
+    # a step from a state near the end of all numbers may leave even the range of its own bound
+    finite = np.all(np.isfinite(run.q) & np.isfinite(run.p), axis=1)
+    beyond = np.asarray(finite)[1:] & ~np.isfinite(unit)
+    seen = np.asarray(off / np.where(beyond, np.inf, unit), np.float64)
+    worst = int(np.argmax(seen / limit))
+    size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
+    if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(~beyond & (size > limit * unit)):
+        return case.not_applicable("momentum", "rounding may be as large as all momenta together")
+    return case.verdict(
+        "momentum",
+        float(seen[worst]),
+        float(limit[worst]),
+        "roundings",
+        f"forces cancel in pairs; {steps[worst + 1]} steps, each rounded, all of one sign",
+    )

@@ -1,0 +1,116 @@
+"""What a trajectory says of itself: the start, the times, the grid and the energies, to the bit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.checks.case import REPEATED, Case
+from springcheck.checks.check import check
+from springcheck.physics import exact
+from springcheck.trajectory import Verdict
+
+
+@check("start", family="record", needs="the first frame")
+def start(case: Case) -> Verdict:
+    """Row 0 is the start, exactly."""
+    run, scene = case.trajectory, case.scene
+    if case.steps[0] != 0:
+        return case.not_applicable("start", "this piece does not hold the start")
+    value = float(np.max(np.abs([run.q[0] - scene.q, run.p[0] - scene.p])))
+    return case.verdict("start", value, 0.0, "", "the start is recorded, not computed")
+
+
+@check("times", family="record", needs="frames")
+def times(case: Case) -> Verdict:
+    """Times are the number of steps times the step, rounded once, up to where the run says it ended."""
+    run = case.trajectory
+    off = np.abs(run.t - case.steps * run.step)
+    missing = abs(float(case.steps[-1]) - run.outcome.step) * abs(run.step)
+    value = float(np.max([*off, missing]))
+    return case.verdict("times", value, 0.0, "T", "one product, no accumulation; the last frame is the end")
+
+
+@check("grid", family="record", needs="frames")
+def grid(case: Case) -> Verdict:
+    """The trajectory is the one that the scene asks for: its step, frames, quantities and tolerance, to its
+    end."""
+    run, scene = case.trajectory, case.scene
+    wrong = []
+    if run.step != scene.step:
+        wrong.append(f"the step is {run.step:g} instead of {scene.step:g}")
+    if run.every != scene.every:
+        wrong.append(f"every {run.every} steps are recorded instead of {scene.every}")
+    if not case.scheme.one_step and not case.scheme.flow and run.tolerance != scene.tolerance:
+        wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
+    if run.energy is None and "energy" in scene.quantities:
+        wrong.append("there are no energies")
+    last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
+    status = run.outcome.status
+    if last > asked or (status == "complete" and last != asked):
+        wrong.append(f"{last} of {asked} steps, and the run is called {status}")
+    elif status in ("stopped", "diverged") and not (_gives_up(case) or _explodes(case)):
+        wrong.append(f"{status} after {last} of {asked} steps for no reason that is known here")
+    why = "; ".join(wrong) or "every fact of the grid is the scene's own"
+    return case.verdict("grid", float(len(wrong)), 0.0, "facts", why)
+
+
+def _gives_up(case: Case) -> bool:
+    """Whether the engine may give up by itself, and says why: a solver that cannot hold its tolerance."""
+    outcome = case.trajectory.outcome
+    return not case.scheme.one_step and outcome.status == "stopped" and bool(outcome.message)
+
+
+HALF_RANGE = np.sqrt(np.finfo(np.float64).max)
+"""Sizes from which a product of two numbers of a step may leave the range of a double, as the squared
+length of a bond does."""
+
+
+def _explodes(case: Case) -> bool:
+    """Whether the motion itself, from the last frame to the next, comes so near the end of the engine's
+    numbers."""
+    run, scene = case.trajectory, case.judged
+    q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
+    limit = SINGLE_RANGE if run.arithmetic.force > np.finfo(np.float64).eps else HALF_RANGE
+    limit = min(limit, run.arithmetic.overflow)
+    with np.errstate(all="ignore"):
+        if not case.scheme.one_step:
+            if not exact.has_true_motion(case.scene):
+                return True
+            ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
+            return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
+        sizes = scene.system.magnitude(None if case.straight else q)
+        for _ in range(min(run.every, REPEATED) + 1):
+            largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
+            if not largest <= limit:
+                return True
+            q, p = case.step(q, p)
+            sizes = scene.system.magnitude(None if case.straight else q)
+    return False
+
+
+SINGLE_RANGE = float(np.sqrt(np.finfo(np.float32).max))
+"""The same for single precision."""
+
+
+@check("line", family="record", needs="an engine in three dimensions")
+def line(case: Case) -> Verdict:
+    """y and z stay exactly 0."""
+    off = case.trajectory.off_axis
+    if off is None:
+        return case.not_applicable("line", "the engine moves along a line only")
+    return case.verdict("line", off, 0.0, "L", "every force along y and z is a product with 0")
+
+
+@check("energy", family="record", needs="energies that are asked for")
+def energies(case: Case) -> Verdict:
+    """Stored energies are those of the stored states, bit for bit."""
+    run = case.trajectory
+    if run.energy is None:
+        return case.not_applicable("energies", "the scene keeps no energies")
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
+    same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
+    # the energy of finite states may overflow; states that are no numbers have none
+    same &= np.isfinite(run.q).all(axis=1) & np.isfinite(run.p).all(axis=1)
+    value = float(np.count_nonzero(~same))
+    return case.verdict("energies", value, 0.0, "frames", "one formula, one order of operations")

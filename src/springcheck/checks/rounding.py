@@ -1,0 +1,138 @@
+"""What rounding may do to one step from given states: a running error bound, each degree of freedom by
+itself."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.arrays import Extended, Force, Integers, Reals
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.schemes.rounding import Met
+
+if TYPE_CHECKING:
+    from springcheck.checks.case import Case
+
+SMALLEST = np.longdouble(5e-324)
+"""What an operation can lose to underflow: one unit of a subnormal double."""
+
+
+def of_step(
+    case: Case, q: Reals, p: Reals, places: list[Reals] | None, *, smallest: np.longdouble = SMALLEST
+) -> tuple[Extended, Extended]:
+    """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
+
+    `places` are the positions at which the scheme evaluates the force on its way: a law that bends is
+    weighed there, and so is the solution of an implicit stage.  `smallest` is what an operation may lose to
+    underflow.
+    """
+    run, scene = case.trajectory, case.judged
+    how = run.arithmetic
+    q, p = np.abs(q.astype(np.longdouble)), np.abs(p.astype(np.longdouble))
+    h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+    size_q, size_p = schemes.magnitude_step(
+        case.scheme,
+        q,
+        p,
+        h=run.step,
+        m=m,
+        magnitude=_none,
+        rate=scene.system.friction_rates if scene.system.is_damped else None,
+        met=_evaluations(case, places),
+    )
+    # an engine may count positions from where the springs rest, and so round those
+    of_q, of_p = how.state * (size_q + np.abs(case.rest_positions)), how.state * size_p
+    if run.rebuilds_velocity and not how.keeps_displacement:
+        of_p = of_p + how.state * m * (q + size_q) / h
+    # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
+    lost = smallest * (1 + m + h * pulls(scene, scene.terms))
+    if case.scheme.implicit:
+        lost = lost * scene.n
+    return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
+
+
+def _none(q: Reals, p: Reals) -> Reals:
+    raise ValueError("every evaluation of the force is given by itself")
+
+
+def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
+    """What bounds each evaluation of the force within a step."""
+    scene, scheme = case.judged, case.scheme
+    slow, fast = scene.system.slow, scene.system.fast
+    kicks = [stage for stage in scheme.stages if stage[0] not in ("drift", "friction")]
+    kicks = kicks or [("kick", Fraction(1)) for _ in scheme.b]
+    acting = {"slow": slow, "fast": fast}
+    joined = not scene.system.is_separate
+    made: dict[tuple[str, float], Met] = {}
+    found = []
+    for number, (kind, part) in enumerate(kicks):
+        # an engine may take a step's kick at once, and what its force lacks with it
+        whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
+        known = kind, whole
+        if places is None and known in made:
+            found.append(made[known])
+            continue
+        near = None if places is None else places[number]
+        stiffness = None
+        if scheme.implicit:
+            given = case.law["stiffness"]
+            stiffness = given if near is None or case.straight else stiffness_at(scene, near, joined=joined)
+        made[known] = Met(
+            magnitude=_force(case, acting.get(kind, scene.terms), None if case.straight else near, whole),
+            stiffness=stiffness,
+            joined=joined,
+            q=near,
+        )
+        found.append(made[known])
+    return found
+
+
+def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float) -> Force:
+    """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
+    quantum."""
+    how = case.trajectory.arithmetic
+    plain = case.judged.system.magnitude_of(terms, near)
+    count = pulls(case.scene, terms)
+    # each term on a particle after the first is added with a rounding of its own
+    more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)
+    if how.force > how.state:
+        more = more + whole * how.force / np.longdouble(how.state)
+
+    def force(q: Reals, p: Reals) -> Reals:
+        sizes = plain(q, p)
+        bound = sizes * more
+        if how.quantum:
+            # each term's force on a particle is cut off once in a kick, not once for every rounding, and a
+            # force below the quantum is lost, no more
+            lost = np.minimum(how.quantum * count, sizes)
+            bound = bound + whole * lost / (np.longdouble(how.state) * case.roundings)
+        return np.asarray(bound)
+
+    return force
+
+
+def pulls(scene: Scene, terms: tuple[Term, ...]) -> Integers:
+    """How many of these terms pull at each particle (n,)."""
+    count = np.zeros(scene.n)
+    for term in terms:
+        term.scatter(np.ones(len(term)), count)
+    return count.astype(np.int64)
+
+
+def stiffness_at(scene: Scene, q: Reals, *, joined: bool) -> Extended:
+    """Second derivatives of the potential at states q (..., n) -> (..., n), or (..., n, n) if joined."""
+    n = q.shape[-1]
+    out = np.zeros((*q.shape, n) if joined else q.shape, dtype=np.longdouble)
+    flat = out.reshape((*q.shape[:-1], n * n)) if joined else out
+    for term in scene.terms:
+        k = np.broadcast_to(term.curvature(q), (*q.shape[:-1], len(term)))
+        for i, one in enumerate(term.particles):
+            for j, other in enumerate(term.particles):
+                if joined or i == j:
+                    where: Any = (..., one * n + other if joined else one)
+                    np.add.at(flat, where, k if i == j else -k)
+    return out

@@ -1,0 +1,187 @@
+"""Adaptive solvers: what their tolerance allows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats
+from springcheck.checks.case import Case
+from springcheck.checks.check import check
+from springcheck.checks.steps import fastest
+from springcheck.physics import exact
+from springcheck.trajectory import Verdict
+
+
+@check("toler", family="motion", needs="an adaptive method and an exact solution")
+def tolerance(case: Case) -> Verdict:
+    """The error of an adaptive solver is what its tolerance allows."""
+    run = case.trajectory
+    if case.scheme.one_step or run.tolerance is None:
+        return case.not_applicable("tolerance", "a method of fixed step has no tolerance")
+    if not exact.has_true_motion(case.scene):
+        return case.not_applicable("tolerance", "the true motion of this scene has no closed form")
+    q, p = exact.true_motion(case.scene, case.steps, run.step)
+    value = float(np.max(case.norm(run.q - q, run.p - p)))
+    # sizes of the true motion: those of one that explodes would excuse it
+    true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
+    bound = tolerance_bound(Case(trajectory=true, scene=case.scene))
+    moved = np.max(case.norm(q - case.scene.q, p - case.scene.p))
+    if value <= bound and 0 < moved <= bound:
+        return case.not_applicable("tolerance", "standing still would pass: it allows all of the motion")
+    return case.verdict(
+        "tolerance",
+        value,
+        bound,
+        "of the start",
+        f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
+        f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times",
+    )
+
+
+def tolerance_bound(case: Case) -> float:
+    """What an adaptive solver's errors may add up to, in units of the start.
+
+    CVODE and IDA keep the weighted root mean square of the 2n local errors below 1, each weighed by the
+    tolerance times its size and its amplitude; all of it may lie in the component that counts most.  The
+    exact flow carries each of them on: near an instability it carries them apart.
+    """
+    states = case.trajectory.q, case.trajectory.p
+    if case.scene.system.is_linear and case.scene.system.is_separate and case.linear:
+        # what a state has grown to, an error made there no longer grows: from the start, both together
+        states = (case.scene.q[None], case.scene.p[None]) if np.any(case.modes.w2 < 0) else states
+    local = _worst_local_error(case, *states)
+    with np.errstate(over="ignore"):
+        return float((case.trajectory.tolerance or 0.0) * most_steps(case) * local * flow_growth(case))
+
+
+def most_steps(case: Case) -> float:
+    """Internal steps that a solver may have made: no more than force calls, and than order 1 asks for.
+
+    At order 1 a step of h leaves h**2 |z''|/2, which is the tolerance of |z| for h = sqrt(2
+    tolerance)/rate.  A method that says that it has made more of them is not believed.
+    """
+    duration = abs(float(case.trajectory.t[-1]))
+    slowest = duration * fastest(case) / np.sqrt(2 * (case.trajectory.tolerance or 1.0))
+    return float(min(case.trajectory.force_calls, max(slowest, STARTING)))
+
+
+STARTING = 100.0
+"""Steps that a solver may take before its step has grown to what the motion asks for."""
+
+TIMES = 128
+"""Times along the motion between which the exact flow's growth is looked at."""
+
+CHANGE = np.longdouble(2.0**-24)
+"""Of a start, of which the exact solution is taken again: its second order is 2**-24 of the first, and its
+rounding in extended precision 2**-40."""
+
+
+def flow_growth(case: Case) -> float:
+    """The largest |D phi| of the exact flow between any two times of the run, in the energy norm, at least 1.
+
+    For linear scenes it is known: a mode that nothing holds grows with the time, an unstable one with its
+    exponential.  Elsewhere it is taken from exact solutions with slightly different starts.
+    """
+    run, scene = case.trajectory, case.scene
+    duration = abs(float(run.t[-1]))
+    if scene.system.is_linear:
+        if not (case.linear and np.any(case.modes.w2 < 0)):
+            return 1.0
+        turn = float(np.sqrt(np.max(-case.modes.w2)) * duration)
+        with np.errstate(over="ignore"):
+            return float(np.exp(turn) * max(turn, 1.0))
+    if duration == 0:
+        return 1.0
+    maps = _flow_maps(case, duration)
+    if maps is None:
+        return 1.0 + fastest(case) * duration / 2
+    with np.errstate(all="ignore"):
+        back = np.linalg.inv(maps)
+        # from every time to every later one
+        growth = [
+            float(np.max(np.linalg.norm(maps[j:] @ back[j], 2, axis=(-2, -1)))) for j in range(len(maps))
+        ]
+    found = max(growth)
+    return max(1.0, found) if np.isfinite(found) else np.inf
+
+
+def _flow_maps(case: Case, duration: float) -> Floats | None:
+    """Derivatives of the exact flow from the start to `TIMES` times, in units of the energy norm: (f, [n,]
+    d, d).
+
+    None for more joined particles than are worth it.
+    """
+    scene, n = case.scene, case.scene.n
+    separate = scene.system.is_separate
+    if not separate and n > JOINED:
+        return None
+    unit = _units(case)
+    h = duration / TIMES
+    steps = np.arange(TIMES + 1)
+    columns: list[Extended] = []
+    size = 2 if separate else 2 * n
+    for j in range(size):
+        # separate particles are all moved at once
+        here = np.ones(n, dtype=bool) if separate else np.arange(n) == j % n
+        moves = (j == 0) if separate else j < n
+        amount = np.where(here, unit[0 if moves else 1], 0)
+        ends = []
+        changes = []
+        for sign in (1, -1):
+            q, p = scene.q + sign * amount * moves, scene.p + sign * amount * (not moves)
+            moved = replace(scene, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
+            changes.append((moved.q, moved.p))
+            ends.append(exact.true_motion(moved, steps, h))
+        # by what the doubles really differ
+        change = (changes[0][0] - changes[1][0]) if moves else (changes[0][1] - changes[1][1])
+        scale = np.where(change == 0, 1, change) / np.where(here, unit[0 if moves else 1], 1)
+        by = np.asarray(scale if separate else scale[j % n])
+        columns.append(
+            np.stack([(a - b) / (u * by) for a, b, u in zip(ends[0], ends[1], unit, strict=True)], axis=-1)
+        )
+    # (d, f, n, 2): which column, time, particle, q or p
+    table = np.stack(columns)
+    if separate:
+        return np.asarray(np.moveaxis(table, 0, -1), np.float64)
+    flat = np.concatenate([table[..., 0], table[..., 1]], axis=-1)
+    return np.asarray(np.moveaxis(flat, 0, -1), np.float64)
+
+
+JOINED = 4
+"""Joined particles of an anharmonic scene up to which the exact flow's growth is taken from its solution."""
+
+
+def _units(case: Case) -> tuple[Extended, Extended]:
+    """Changes of positions and momenta (n,) that are all as large in the energy norm, and small."""
+    scene = case.scene
+    stiff = _stiff(case)
+    fallback = scene.m * np.longdouble(fastest(case)) ** 2
+    stiff = np.where(stiff > 0, stiff, fallback)
+    unit = case.norm.unit * CHANGE
+    return np.asarray(unit * np.sqrt(2 / stiff)), np.asarray(
+        unit * np.sqrt(2 * scene.m.astype(np.longdouble))
+    )
+
+
+def _stiff(case: Case) -> Extended:
+    """What a difference of position counts in the norm of errors, at most (n,) [M/T2]."""
+    # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `Norm`
+    stiff = case.judged.system.rigidity.astype(np.longdouble)
+    for group in case.norm.groups:
+        stiff[group] += case.judged.m[group] / case.norm.duration**2
+    return stiff
+
+
+def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
+    """The largest local error at states (f, n) that passes, in tolerances and in units of the start."""
+    scene = case.judged
+    # extended: the squares of large states leave the range of a double
+    of_q, of_p = (x.astype(np.longdouble) for x in scene.system.amplitudes)
+    weight_q, weight_p = np.max(np.abs(q), axis=0) + of_q, np.max(np.abs(p), axis=0) + of_p
+    largest = np.max(np.maximum(_stiff(case) * weight_q**2, weight_p**2 / scene.m)) / 2
+    if largest == 0:
+        return np.longdouble(0)
+    with np.errstate(divide="ignore"):
+        return np.longdouble(np.sqrt(2 * scene.n * largest) / case.norm.unit)

@@ -1,0 +1,238 @@
+"""Each recorded frame against the scheme's own steps from the frame before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck import schemes
+from springcheck.arrays import Floats, Reals
+from springcheck.checks.case import REPEATED, Case, overflows
+from springcheck.checks.check import check
+from springcheck.checks.stretch import Stretch
+from springcheck.engines.contract import Arithmetic
+from springcheck.physics.system import MOST_JOINED
+from springcheck.trajectory import Verdict
+
+CONTRACTED = 1e-3
+"""Determinant of a step below which its powers are not formed: as the difference of two products it has
+lost 3 of the 19 digits of the reference there."""
+
+
+def no_map(case: Case) -> str | None:
+    """Why a check of the scheme's one-step map does not apply, or None."""
+    if not case.scheme.one_step:
+        return "an adaptive solver has no one-step map; it is judged by its tolerance"
+    if len(case.trajectory.t) < 2:
+        return "there is no second frame"
+    return None
+
+
+def closed_or_not(case: Case) -> str | None:
+    """Why the discrete motion has no closed form here, or None."""
+    reason = no_map(case)
+    if reason:
+        return reason
+    if case.mixed:
+        return "slow and fast springs act at different times: no normal mode stays by itself"
+    if not case.linear:
+        return (
+            "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
+            f"or more than {MOST_JOINED} particles are joined"
+        )
+    if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
+        return "a mode under a constant pull has no closed form here"
+    determinant = schemes.rotation(case.matrices).determinant
+    if np.any(determinant <= 0):
+        return "the step turns area over: it has no phase"
+    if np.any(determinant < CONTRACTED):
+        return "friction contracts area more in one step than the reference has digits for"
+    return None
+
+
+@check("step", family="motion", needs="a fixed step and two frames")
+def step_defect(case: Case) -> Verdict:
+    """Each step is the scheme's own step, to rounding."""
+    why_not = no_map(case)
+    if why_not:
+        return case.not_applicable("step-defect", why_not)
+    run = case.trajectory
+    if case.ahead is None:
+        return _by_norm(case)
+    bound = case.roundings
+    told = _told(case)
+    if not np.any(told):
+        return case.not_applicable(
+            "step-defect", "between two frames a rounding may grow to the whole motion"
+        )
+    seen = np.where(told, _defects(case), 0)
+    still = np.where(told, _in_roundings(case, run.q[:-1], run.p[:-1]), 0)
+    off = ~(seen <= bound)
+    if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
+        return case.not_applicable("step-defect", f"{STILL} any step")
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
+    why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
+    if run.every > 1:
+        why = f"roundings of each of {run.every} steps, each carried to the frame by the steps after it"
+    if not np.all(told):
+        first = case.steps[int(np.argmin(told)) + 1]
+        why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
+    why = _beyond_range(case, off) or why
+    return case.verdict("step-defect", float(seen[worst]), float(bound), "roundings", why)
+
+
+BENT = 0.125
+"""Part of a motion up to which what rounding does to it goes by the tangent: beyond, the next order
+counts."""
+
+
+def _told(case: Case) -> NDArray[np.bool_]:
+    """At which frames but the first the scheme's own state and what rounding does to it are known (f-1,)."""
+    ahead = case.ahead
+    assert ahead is not None
+    with np.errstate(all="ignore"):
+        parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
+        told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
+        if not case.straight:
+            span = case.trajectory.every * np.longdouble(abs(case.trajectory.step)) / case.judged.m
+            reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
+            near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
+                case.roundings * ahead.of_p <= BENT * reach_p
+            )
+            told &= np.all(near, axis=1)
+    return np.asarray(told)
+
+
+def _by_norm(case: Case) -> Verdict:
+    """The same in the energy norm over all particles: for very many steps, or very many joined particles."""
+    run = case.trajectory
+    if run.every > REPEATED and (no_leap := closed_or_not(case)):
+        return case.not_applicable("step-defect", f"{run.every} steps lie between frames, and {no_leap}")
+    bound = case.roundings * _amplified(case, run.every)
+    why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
+    seen, told = _defects(case), bound * run.arithmetic.state < 1
+    if not told[0]:
+        return case.not_applicable(
+            "step-defect", "between two frames a rounding may grow to the whole motion"
+        )
+    if not np.all(told):
+        # a motion that has grown steeper since: what rounding can do there is no smaller than the motion
+        seen, bound = seen[told], bound[told]
+        why += f"; judged up to step {case.steps[len(seen)]}, beyond which it may grow to the whole motion"
+    off = ~(seen <= bound)
+    still = _in_roundings(case, run.q[:-1], run.p[:-1])[: len(seen)]
+    if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
+        return case.not_applicable("step-defect", f"{STILL} any step")
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
+    why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why
+    return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why)
+
+
+STILL = "standing still would pass: rounding may be as large as"
+"""A check that an engine passes which does not move says nothing of one that does."""
+
+
+def _defects(case: Case) -> Reals:
+    """How far each frame is from the scheme's own steps after the frame before (f-1,), in roundings."""
+    return _in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:])
+
+
+def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
+    """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
+    if case.ahead is not None:
+        return _off(case.ahead, to_q, to_p)
+    q, p = case.next_states
+    with np.errstate(all="ignore"):
+        return np.asarray(case.norm.size(np.abs(q - to_q), np.abs(p - to_p)) / case.allowance_of_stretches)
+
+
+def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
+    """The same in allowances of each degree of freedom, the largest (f-1,)."""
+    with np.errstate(all="ignore"):
+        off = (np.abs(ahead.q - to_q), ahead.of_q), (np.abs(ahead.p - to_p), ahead.of_p)
+        # where nothing rounds nothing may be off: 0 of 0 is 0
+        return np.asarray(np.max(np.maximum(*(np.where(d == 0, 0, d / of) for d, of in off)), axis=1))
+
+
+def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
+    """The limit of the engine's arithmetic that explains every step that is off (f-1,), or nothing."""
+    how = case.trajectory.arithmetic
+    if not np.isfinite(how.overflow) or not np.any(off) or not np.all(case.strongest[off] >= how.overflow):
+        return ""
+    first = int(np.argmax(off))
+    return (
+        f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
+        f"has a force of {case.strongest[first]:.3g}"
+    )
+
+
+def _amplified(case: Case, steps: int) -> Floats:
+    """What the map can make of one rounding a step in so many steps, from each frame but the last (f-1,)."""
+    if case.linear:
+        total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
+        return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        growth = abs(case.trajectory.step) * rates_met(case, case.trajectory.q[:-1], case.next_states[0])
+        return np.where(growth > 0, ((1 + growth) ** steps - 1) / np.where(growth > 0, growth, 1), steps)
+
+
+def rates_met(case: Case, *states: Reals) -> Floats:
+    """Upper bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T].
+
+    By Gershgorin's circles.
+    """
+    rows = [case.judged.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
+    steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
+    return np.asarray(np.sqrt(steepest) + np.max(case.judged.system.friction_rates), np.float64)
+
+
+def fastest(case: Case) -> float:
+    """The same, of the whole trajectory."""
+    return float(rates_met(case, case.trajectory.q)[-1])
+
+
+@check("arith", family="motion", needs="an arithmetic coarser than double precision")
+def arithmetic(case: Case) -> Verdict:
+    """The size of the step defect is that of the arithmetic the method says it has."""
+    why_not = no_map(case)
+    if why_not:
+        return case.not_applicable("arithmetic", why_not)
+    named = case.trajectory.arithmetic
+    plain = Arithmetic()
+    if named.state <= plain.state and named.force <= plain.force and not named.quantum:
+        return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
+    seen = step_defect(case)
+    if seen.passed is None:
+        return case.not_applicable("arithmetic", seen.why)
+    # over many steps the bound is a sum of which roundings that are as good as random fill a part
+    alone = seen.value
+    if case.ahead is not None and case.trajectory.every > 1:
+        told = _told(case)
+        last = replace(case.ahead, of_q=case.ahead.last_q, of_p=case.ahead.last_p)
+        alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
+    finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
+    coarser, fine = (float(np.max(x.norm.size(*x.allowance))) for x in (case, finer))
+    # at rest the only rounding is underflow, which is the same in both
+    if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
+        return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
+    return Verdict(
+        method=seen.method,
+        check="arithmetic",
+        value=seen.value,
+        bound=seen.bound,
+        unit=seen.unit,
+        passed=bool(alone >= FLOOR and seen.value <= seen.bound),
+        why=seen.why
+        if seen.passed is False
+        else f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
+    )
+
+
+FLOOR = 2.0**-8
+"""A rounding that is as good as random stays below this fraction of its unit once in 2**8 times."""
+
+
+ENOUGH = 9
+"""Frames of which all stay below `FLOOR` by chance once in 2**64 times: 8 steps, or fewer particles."""

@@ -1,0 +1,171 @@
+"""Many steps between two frames: where the scheme comes to, and what the roundings on the way may have
+become.
+
+A rounding made in step i is carried to the frame by the tangent map of the steps after it.  With A the
+allowance of one step (see `rounding`), the bound of a frame s steps after the last one is the sum over i <
+s of |D Phi^(s-1-i)| A(z_i), each degree of freedom by itself: in a norm over all of them a heavy body would
+hide a light one, and a bound by norms of single steps grows exponentially on a motion that merely turns.
+
+The tangent map of a scheme is the scheme carried out on the equations of variation (Hairer, Lubich & Wanner,
+Geometric Numerical Integration, VI.4.1), so it needs no code of its own beyond the slope of the force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from springcheck.arrays import Extended, Force, Reals
+from springcheck.checks import rounding
+from springcheck.physics.system import System
+from springcheck.physics.term import Term
+
+if TYPE_CHECKING:
+    from springcheck.checks.case import Case
+
+JOINED = 32
+"""Joined particles up to which tangent maps are carried as matrices (2n, 2n)."""
+
+NUMBERS = 1 << 21
+"""Entries of tangent maps that are kept at a time: 32 MB."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stretch:
+    """Where s steps of the scheme lead from each state (f, n), and the allowance there, all extended."""
+
+    q: Extended
+    p: Extended
+    of_q: Extended
+    of_p: Extended
+    reach_q: Extended
+    reach_p: Extended
+    """The largest |q| and |p| on the way (f, n)."""
+    last_q: Extended
+    last_p: Extended
+    """The allowance of the last step alone (f, n)."""
+
+
+def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
+    """So many steps from states (f, n), with what their roundings may become."""
+    if steps == 1:
+        end, bound = _one(case, q, p)
+        reach = np.maximum(np.abs(q), np.abs(end[0])), np.maximum(np.abs(p), np.abs(end[1]))
+        q, p, of_q, of_p = *end, *bound
+        return Stretch(
+            q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach[0], reach_p=reach[1], last_q=of_q, last_p=of_p
+        )  # fmt: skip
+    size = 2 if case.judged.system.is_separate else 2 * q.shape[1]
+    each = steps * size * 2 * q.shape[1]
+    rows = len(q) if case.straight else max(1, NUMBERS // each)
+    parts = [_many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
+    return Stretch(**{name: np.concatenate([getattr(x, name) for x in parts]) for name in Stretch.__slots__})
+
+
+States = tuple[Extended, Extended]
+
+
+def _one(case: Case, q: Extended, p: Extended) -> tuple[States, States]:
+    """One step, and the allowance of that step."""
+    places: list[Reals] | None = [] if case.placed else None
+    end = case.step(q, p, met=places)
+    with np.errstate(all="ignore"):
+        return end, rounding.of_step(case, q, p, places)
+
+
+def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
+    separate = case.judged.system.is_separate
+    maps: list[Extended] = []
+    bounds: list[Extended] = []
+    reach_q, reach_p = np.abs(q), np.abs(p)
+    with np.errstate(all="ignore"):
+        one = tangent(case, q[:1], p[:1]) if case.straight else None
+        for _ in range(steps):
+            if one is None:
+                maps.append(tangent(case, q, p))
+            end, bound = _one(case, q, p)
+            bounds.append(_pack(*bound, separate))
+            q, p = end
+            reach_q, reach_p = np.maximum(reach_q, np.abs(q)), np.maximum(reach_p, np.abs(p))
+        carried = np.zeros_like(bounds[0])
+        power: Extended = np.broadcast_to(
+            np.eye(carried.shape[-1], dtype=np.longdouble), (*carried.shape[:-1], *2 * carried.shape[-1:])
+        )
+        if one is not None:
+            power = power[:1]
+        for i in reversed(range(steps)):
+            carried = carried + _apply(np.abs(power), bounds[i])
+            if i:
+                power = power @ (maps[i] if one is None else one)
+    of_q, of_p = _unpack(carried, separate)
+    last_q, last_p = _unpack(bounds[-1], separate)
+    return Stretch(
+        q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach_q, reach_p=reach_p, last_q=last_q, last_p=last_p
+    )  # fmt: skip
+
+
+def _apply(matrix: Extended, x: Extended) -> Extended:
+    """matrix (f, [n,] d, d) times x (f, [n,] d); what is not there is not enlarged, not even without
+    bound."""
+    if matrix.ndim == 3 and len(matrix) == 1:
+        return np.asarray(x @ matrix[0].T)
+    found = (matrix @ x[..., None])[..., 0]
+    return np.asarray(found)
+
+
+def _pack(q: Extended, p: Extended, separate: bool) -> Extended:
+    return np.stack([q, p], axis=-1) if separate else np.concatenate([q, p], axis=-1)
+
+
+def _unpack(z: Extended, separate: bool) -> States:
+    if separate:
+        return z[..., 0], z[..., 1]
+    n = z.shape[-1] // 2
+    return z[..., :n], z[..., n:]
+
+
+def tangent(case: Case, q: Extended, p: Extended) -> Extended:
+    """Derivative of one step at states (f, n): (f, n, 2, 2) where nothing is joined, else (f, 2n, 2n)."""
+    f, n = q.shape
+    separate = case.judged.system.is_separate
+    d = 2 if separate else 2 * n
+    dq, dp = np.zeros((2, 1 + d, f, n), dtype=np.longdouble)
+    dq[0], dp[0] = q, p
+    if separate:
+        dq[1], dp[2] = 1, 1
+    else:
+        each = np.arange(n)
+        dq[1 + each, :, each] = 1
+        dp[1 + n + each, :, each] = 1
+
+    def slope(q: Reals) -> tuple[Extended, bool]:
+        # the changes solve the linear equations that belong to the motion
+        return rounding.stiffness_at(case.judged, q[0], joined=not separate)[None], not separate
+
+    q, p = case.step(dq, dp, forces=variational(case.judged.system), slope=slope)
+    if separate:
+        return np.stack([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)
+    return np.concatenate([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)
+
+
+def variational(system: System) -> Callable[[Iterable[Term]], Force]:
+    """What makes forces on states (1 + d, ..., n): the first is a motion, the others are changes of it."""
+
+    def of(terms: Iterable[Term]) -> Force:
+        terms = tuple(terms)
+        whole = system.force_of(terms)
+        # friction is linear in p, and so its own change
+        brakes = system.force_of(term for term in terms if not term.is_potential)
+
+        def force(q: Reals, p: Reals) -> Reals:
+            change = brakes(q[1:], p[1:])
+            for term in terms:
+                term.add_pull(term.curvature(q[0]) * term.stretch(q[1:]), change)
+            return np.concatenate([whole(q[0], p[0])[None], change])
+
+        return force
+
+    return of

@@ -1,0 +1,128 @@
+"""Legal arithmetic raises no alarm: round binary numbers, many springs on one particle, forces between the
+recorded states, motion near an instability, and numbers at both ends of double's range."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, schemes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Morse, Quartic, Term, WallSpring
+from springcheck.studies.faults import clean, steppers
+from springcheck.trajectory import Trajectory, Verdict
+
+FIXED = [n for n, s in schemes.SCHEMES.items() if s.one_step and not s.flow and not s.mixes]
+
+
+def plain(scene: Scene, name: str) -> Trajectory:
+    scheme = schemes.SCHEMES[name]
+    return steppers.record(scene, scheme, steppers.textbook(scene, scheme))
+
+
+def alarms(verdicts: list[Verdict]) -> list[str]:
+    return [f"{v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}" for v in verdicts if v.passed is False]
+
+
+def one(*terms: Term, m: float = 1.3, q: float = 0.9, p: float = 0.4, **grid: float) -> Scene:
+    return clean.scene(np.array([m]), terms, np.array([q]), np.array([p]), **grid)  # type: ignore[arg-type]
+
+
+def wall(k: float, at: float = 0.0) -> WallSpring:
+    return WallSpring(i=np.array([0]), k=np.array([k]), at=np.array([at]))
+
+
+@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.parametrize(("k", "p"), [(0.0, 1.0), (0.0, 0.0), (-1.0, 0.0)])
+def test_binary_numbers_leave_no_rounding_and_no_alarm(name: str, k: float, p: float) -> None:
+    scene = one(wall(k), m=1.0, q=0.0, p=p, step=0.125, steps=40)
+    verdicts = checks.judge(scene, plain(scene, name))
+    assert alarms(verdicts) == []
+    assert not any(np.isnan(v.value) or np.isinf(v.value) for v in verdicts if v.passed is not None)
+
+
+@pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:euler", "ase:velocity-verlet"])
+@pytest.mark.parametrize("springs", [100, 1000])
+def test_many_springs_on_one_particle_round_once_more_each(label: str, springs: int) -> None:
+    pull = WallSpring(i=np.zeros(springs, int), k=np.full(springs, 2.9 / springs), at=np.full(springs, 0.1))
+    scene = one(pull, step=0.1, steps=60)
+    assert alarms(checks.judge(scene, springcheck.run(scene, label))) == []
+
+
+WELLS: dict[str, tuple[Term, ...]] = {
+    "quartic": (Quartic(i=np.array([0]), b=np.array([2.3]), at=np.zeros(1)),),
+    "off centre": (Quartic(i=np.array([0]), b=np.array([2.3]), at=np.array([0.7])), wall(1.1, 0.2)),
+    "pendulum": (Cosine(i=np.array([0]), depth=np.array([2.3]), wave=np.array([1.7]), at=np.array([0.3])),),
+}
+
+
+@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.parametrize("well", WELLS)
+def test_a_force_between_the_recorded_states_is_weighed_where_the_scheme_takes_it(
+    name: str, well: str
+) -> None:
+    for seed in range(6):
+        rng = np.random.default_rng([7, seed])
+        q, p = rng.normal(size=2)
+        scene = one(*WELLS[well], q=q, p=p, step=float(rng.uniform(0.02, 0.6)), steps=60)
+        assert alarms(checks.judge(scene, plain(scene, name))) == [], seed
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_a_bond_between_the_recorded_states_likewise(name: str) -> None:
+    bond = Morse(
+        a=np.array([0]),
+        b=np.array([1]),
+        depth=np.array([2.3]),
+        steepness=np.array([1.7]),
+        rest=np.array([0.9]),
+    )
+    for seed in range(6):
+        rng = np.random.default_rng([8, seed])
+        q = np.array([0.1, 1.0]) + 0.2 * rng.normal(size=2)
+        scene = clean.scene(
+            np.array([1.3, 2.1]), (bond,), q, rng.normal(size=2), step=float(rng.uniform(0.02, 0.3)), steps=60
+        )
+        assert alarms(checks.judge(scene, plain(scene, name))) == [], seed
+
+
+@pytest.mark.parametrize("label", ["sundials:adams", "sundials:bdf"])
+def test_an_adaptive_solver_may_lose_what_an_instability_takes(label: str) -> None:
+    top = Cosine(i=np.array([0]), depth=np.array([1.0]), wave=np.ones(1), at=np.zeros(1))
+    pendulum = one(top, m=1.0, q=np.pi - 0.01, p=0.0, step=0.1, steps=600)
+    well = one(
+        wall(-1.0),
+        Quartic(i=np.array([0]), b=np.ones(1), at=np.zeros(1)),
+        m=1.0,
+        q=0.01,
+        p=0.0,
+        step=0.1,
+        steps=600,
+    )
+    for scene in (pendulum, well):
+        asked = replace(scene, tolerance=1e-10)
+        verdicts = checks.judge(asked, springcheck.run(asked, label))
+        assert alarms(verdicts) == []
+        assert any(v.check == "tolerance" and v.passed for v in verdicts)
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "rk4"])
+def test_an_anharmonic_motion_that_explodes_between_frames_is_never_no_number(name: str) -> None:
+    well = Quartic(i=np.array([0]), b=np.array([2.3]), at=np.zeros(1))
+    scene = one(well, q=3.0, p=0.4, step=1.1, steps=60, every=3)
+    run = plain(scene, name)
+    verdicts = checks.judge(scene, run)
+    assert alarms(verdicts) == []
+
+
+def test_implicit_euler_loses_what_underflows_in_its_matrix() -> None:
+    chain = springcheck.load_scene("chain")
+    for size in (1e-312, 1e-316, 1e-320):
+        scene = replace(
+            chain, q=np.array([1.0, -2.0, 1.5]) * size, p=np.array([0.3, 0.2, 0.1]) * size, steps=40
+        )
+        verdicts = checks.judge(scene, springcheck.run(scene, "own:implicit-euler"))
+        assert alarms(verdicts) == []

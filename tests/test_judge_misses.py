@@ -1,0 +1,198 @@
+"""Faults that are large beside rounding and must be seen: stiff implicit steps, frames many steps apart,
+one light body among heavy ones, a trajectory that is not the one that the scene asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, schemes
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
+from springcheck.studies.faults import clean, steppers
+from springcheck.trajectory import Trajectory
+
+
+def plain(scene: Scene, name: str, moved: Scene | None = None) -> Trajectory:
+    """The textbook engine's run of a scene, or of another one under its name."""
+    scheme = schemes.SCHEMES[name]
+    other = moved or scene
+    return steppers.record(scene, scheme, steppers.textbook(other, scheme))
+
+
+def failed(scene: Scene, run: Trajectory) -> list[str]:
+    return [v.check for v in checks.judge(scene, run) if v.passed is False]
+
+
+def wall(k: float, i: int = 0) -> WallSpring:
+    return WallSpring(i=np.array([i]), k=np.array([k]), at=np.zeros(1))
+
+
+def two_masses(soft: float) -> Scene:
+    bond = Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.7e6]), rest=np.array([0.9]))
+    step = 500 / np.sqrt(2 * 1.7e6 / 1.3)
+    return clean.scene(
+        np.array([1.3, 1.3]),
+        (wall(soft), bond),
+        np.array([0.3, 1.1]),
+        np.array([0.2, 0.4]),
+        step=step,
+        steps=60,
+    )
+
+
+def test_a_soft_spring_beside_a_stiff_one_is_judged_by_implicit_euler() -> None:
+    scene = two_masses(1.7)
+    assert failed(scene, plain(scene, "implicit-euler")) == []
+    assert "step-defect" in failed(scene, plain(scene, "implicit-euler", two_masses(3.4)))
+    assert "step-defect" in failed(scene, plain(scene, "implicit-euler", two_masses(1.7 * (1 + 1e-5))))
+
+
+@pytest.mark.parametrize("name", ["implicit-euler", "implicit-midpoint", "trapezoidal"])
+def test_a_stiff_spring_is_judged_to_rounding_by_implicit_schemes(name: str) -> None:
+    def scene(k: float) -> Scene:
+        return clean.scene(np.array([3.7]), (wall(k),), np.array([0.3]), np.array([0.7]), step=1.0, steps=40)
+
+    # h w = 1e6 where a step forgets the phase, 500 where it keeps it
+    stiff = 3.7e12 if name == "implicit-euler" else 3.7 * 500**2
+    right = scene(stiff)
+    assert failed(right, plain(right, name)) == []
+    assert failed(right, plain(right, name, scene(11 * stiff)))
+    right = scene(3.7 * 500**2)
+    wrong = 1e-7 if name == "implicit-euler" else 1e-2
+    assert failed(right, plain(right, name, scene(3.7 * 500**2 * (1 + wrong))))
+
+
+def fast_and_slow(slow: float) -> Scene:
+    fast = WallSpring(i=np.array([0]), k=np.array([290.0]), at=np.zeros(1), fast=True)
+    return clean.scene(
+        np.array([3.7]), (wall(slow), fast), np.array([0.3]), np.array([0.7]), step=0.05, steps=2000
+    )
+
+
+@pytest.mark.parametrize("every", [20, 100, 500])
+def test_a_slow_stiffness_of_multiple_time_steps_is_judged_however_far_apart_frames_are(every: int) -> None:
+    scene = replace(fast_and_slow(2.9), every=every)
+    assert failed(scene, plain(scene, "respa8")) == []
+    assert "step-defect" in failed(scene, plain(scene, "respa8", fast_and_slow(2.9 * (1 + 1e-9))))
+
+
+@pytest.mark.parametrize("every", [10, 200])
+def test_an_anharmonic_coefficient_is_judged_however_far_apart_frames_are(every: int) -> None:
+    def scene(b: float) -> Scene:
+        well = Quartic(i=np.array([0]), b=np.array([b]), at=np.zeros(1))
+        return clean.scene(
+            np.array([1.3]), (wall(1.1), well), np.array([0.9]), np.array([0.4]), step=0.05, steps=1000
+        )
+
+    right = replace(scene(2.3), every=every)
+    assert failed(right, plain(right, "velocity-verlet")) == []
+    assert "step-defect" in failed(right, plain(right, "velocity-verlet", scene(2.3 * (1 + 1e-9))))
+
+
+def test_another_scheme_is_seen_at_every_400_steps_where_friction_couples_the_modes() -> None:
+    bond = Spring(a=np.array([0]), b=np.array([1]), k=np.array([2.9]), rest=np.array([0.9]))
+    m = np.array([1.3, 2.1])
+    brake = Damping(i=np.array([0, 1]), c=np.array([0.002, 0.0071]), m=m)
+    scene = clean.scene(
+        m,
+        (wall(1.7), bond, brake),
+        np.array([0.3, 1.1]),
+        np.array([0.2, 0.4]),
+        step=0.05,
+        steps=1200,
+        every=400,
+    )
+    assert failed(scene, plain(scene, "velocity-verlet")) == []
+    wrong = steppers.record(
+        scene,
+        schemes.SCHEMES["velocity-verlet"],
+        steppers.textbook(scene, schemes.SCHEMES["position-verlet"]),
+    )
+    assert "step-defect" in failed(scene, wrong)
+
+
+def test_a_light_body_is_not_hidden_by_a_heavy_one() -> None:
+    def scene(k: float) -> Scene:
+        walls = clean.walls(np.array([2.9e12, k]), np.zeros(2))
+        start = np.array([3e5, 3e-6]), np.array([2e11, 1e-7])
+        return clean.scene(np.array([3.7e12, 1.3]), (walls,), *start, step=0.1, steps=400, every=10)
+
+    right = scene(1.1)
+    assert failed(right, plain(right, "velocity-verlet")) == []
+    assert "step-defect" in failed(right, plain(right, "velocity-verlet", scene(1.1 * (1 + 1e-10))))
+
+
+def test_a_body_that_freezes_far_below_its_start_is_seen_at_every_10() -> None:
+    brake = Damping(i=np.array([0]), c=np.array([2.0]), m=np.array([3.7]))
+    scene = clean.scene(
+        np.array([3.7]), (wall(2.9), brake), np.array([0.3]), np.array([0.7]), step=0.1, steps=2000, every=10
+    )
+    run = plain(scene, "rk4")
+    assert failed(scene, run) == []
+    small = np.abs(run.q[:, 0]) + np.abs(run.p[:, 0]) < 1e-13
+    q, p = run.q.copy(), run.p.copy()
+    q[small], p[small] = q[np.argmax(small)], p[np.argmax(small)]
+    frozen = replace(run, q=q, p=p, energy=steppers.energies(scene, q, p))
+    assert "step-defect" in failed(scene, frozen)
+
+
+@pytest.mark.xfail(strict=True, reason="a recorded position counts as rounded once more")
+def test_a_pendulum_far_out_is_judged_by_the_positions_that_it_records() -> None:
+    def scene(depth: float) -> Scene:
+        swing = Cosine(i=np.array([0]), depth=np.array([depth]), wave=np.ones(1), at=np.zeros(1))
+        return clean.scene(np.array([1.3]), (swing,), np.array([1e9]), np.array([2.0]), step=0.05, steps=200)
+
+    right = scene(2.3)
+    assert failed(right, plain(right, "velocity-verlet")) == []
+    assert failed(right, plain(right, "velocity-verlet", scene(2.3 * (1 + 1e-7))))
+
+
+def uneven(**changes: Any) -> Scene:
+    return replace(scenefile.load_scene("spring-uneven"), steps=200, **changes)
+
+
+def test_the_trajectory_is_held_against_the_grid_of_the_scene() -> None:
+    scene = uneven()
+    assert failed(scene, springcheck.run(scene, "own:semi-implicit-euler")) == []
+    whole = springcheck.run(scene, "own:semi-implicit-euler")
+    assert whole.energy is not None
+    short = replace(
+        whole,
+        t=whole.t[:101],
+        q=whole.q[:101],
+        p=whole.p[:101],
+        energy=whole.energy[:101],
+        outcome=replace(whole.outcome, step=100),
+    )
+    wrong = {
+        "half the step": springcheck.run(replace(scene, step=scene.step / 2), "own:semi-implicit-euler"),
+        "every second step": springcheck.run(replace(scene, every=2), "own:semi-implicit-euler"),
+        "more steps": springcheck.run(replace(scene, steps=300), "own:semi-implicit-euler"),
+        "no energies": replace(whole, energy=None),
+        "half of the steps, called complete": short,
+        "half of the steps, stopped for no reason": replace(
+            short, outcome=replace(short.outcome, status="stopped")
+        ),
+        "only the start": replace(
+            whole, t=whole.t[:1], q=whole.q[:1], p=whole.p[:1], energy=whole.energy[:1],
+            outcome=replace(whole.outcome, step=0),
+        ),
+    }  # fmt: skip
+    for name, run in wrong.items():
+        assert "grid" in failed(scene, run), name
+
+
+def test_what_an_adaptive_method_says_of_itself_is_not_believed() -> None:
+    scene = uneven(tolerance=1e-10)
+    run = springcheck.run(scene, "sundials:bdf")
+    assert failed(scene, run) == []
+    assert "grid" in failed(scene, replace(run, tolerance=1e-4))
+    off = replace(run, q=run.q * (1 + 1e-2), force_calls=10**12)
+    off = replace(off, energy=scene.system.energy(off.q, off.p))
+    assert "tolerance" in failed(scene, off)
