@@ -120,7 +120,8 @@ def _implicit_stage(
         guess = guess - change
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.where(change == 0, 0, np.abs(change) / (scale + np.abs(guess)))
-        size = np.max(off, initial=0)
+        # what is no number stays so, and must not end the others' iteration
+        size = np.max(off, initial=0, where=np.isfinite(off))
         # at the last digits nothing shrinks any more
         if not size > 4 * eps or last / 2 <= size <= 1e3 * eps:
             break

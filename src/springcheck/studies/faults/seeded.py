@@ -17,7 +17,7 @@ from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
-from springcheck.trajectory import Trajectory
+from springcheck.trajectory import Outcome, Trajectory
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
 Where: TypeAlias = Literal["spring", "chain", "long spring"]
@@ -272,6 +272,14 @@ def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
     if middle + 1 < len(order):
         order[[middle, middle + 1]] = order[[middle + 1, middle]]
     return replace(run, q=run.q[order], p=run.p[order])
+
+
+def given_up(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """The run ends half-way."""
+    half = slice(len(run.t) // 2)
+    energy = None if run.energy is None else run.energy[half]
+    outcome = Outcome(status="stopped", step=(half.stop - 1) * run.every)
+    return replace(run, t=run.t[half], q=run.q[half], p=run.p[half], energy=energy, outcome=outcome)
 
 
 def accumulated(scene: Scene, size: float, run: Trajectory) -> Trajectory:

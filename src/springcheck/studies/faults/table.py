@@ -393,6 +393,12 @@ REPORTS = (
         caught_by=("line",),
         make=seeded.reporting(lambda s, x, r: replace(r, off_axis=x)),
     ),
+    Fault(
+        name="gives-up",
+        about="half of the frames, and no reason why the run has stopped there",
+        caught_by=("grid",),
+        make=seeded.reporting(seeded.given_up, again=False),
+    ),
 )
 
 ADAPTIVE = (
