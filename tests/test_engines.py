@@ -215,7 +215,7 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
         q=run.q[:step],
         p=run.p[:step],
         energy=run.energy[:step],
-        outcome=replace(run.outcome, step=step - 1),
+        outcome=replace(run.outcome, step=step - 1, status="continued"),
     )
     assert judged(scene, before) == []
 

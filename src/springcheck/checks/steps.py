@@ -95,7 +95,7 @@ def _told(case: Case) -> NDArray[np.bool_]:
     with np.errstate(all="ignore"):
         parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
         told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
-        if not case.straight:
+        if not case.straight and case.trajectory.every > 1:
             span = case.trajectory.every * np.longdouble(abs(case.trajectory.step)) / case.judged.m
             reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
             near = (case.roundings * ahead.of_q <= BENT * reach_q) & (

@@ -110,22 +110,23 @@ def _implicit_stage(
     none = np.zeros_like(p)
     slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
     factor = x * x / (m * slowed)
-    eps, last = np.finfo(q.dtype).eps, np.inf
+    eps = np.finfo(q.dtype).eps
     scale = np.abs(q) + np.abs(x * p / m)
-    guess = q
+    guess: Reals = q
+    last: Reals = np.full_like(q, np.inf)
     for _ in range(50):
         residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
         k, joined = stiffness(guess) if callable(stiffness) else (stiffness, stiffness.ndim == 2)
         change = _newton(residual, k, joined, factor)
         guess = guess - change
-        with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.where(change == 0, 0, np.abs(change) / (scale + np.abs(guess)))
-        # what is no number stays so, and must not end the others' iteration
-        size = np.max(off, initial=0, where=np.isfinite(off))
-        # at the last digits nothing shrinks any more
-        if not size > 4 * eps or last / 2 <= size <= 1e3 * eps:
+        off = np.abs(change)
+        # a component near 0 never has all its digits; at the last ones of what it is made of nothing shrinks
+        going = (off > 4 * eps * np.abs(guess)) & (
+            (off < last / 2) | (off > 1e3 * eps * (scale + np.abs(guess)))
+        )
+        if not np.any(going & np.isfinite(off)):
             break
-        last = size
+        last = off
     return guess, np.asarray((p + x * force(guess, none)) / slowed)
 
 
