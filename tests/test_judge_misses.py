@@ -98,7 +98,7 @@ def test_an_anharmonic_coefficient_is_judged_however_far_apart_frames_are(every:
 def test_another_scheme_is_seen_at_every_400_steps_where_friction_couples_the_modes() -> None:
     bond = Spring(a=np.array([0]), b=np.array([1]), k=np.array([2.9]), rest=np.array([0.9]))
     m = np.array([1.3, 2.1])
-    brake = Damping(i=np.array([0, 1]), c=np.array([0.002, 0.0071]), m=m)
+    brake = Damping(i=np.array([0, 1]), c=np.array([0.002, 0.0071]))
     scene = clean.scene(
         m,
         (wall(1.7), bond, brake),
@@ -129,7 +129,7 @@ def test_a_light_body_is_not_hidden_by_a_heavy_one() -> None:
 
 
 def test_a_body_that_freezes_far_below_its_start_is_seen_at_every_10() -> None:
-    brake = Damping(i=np.array([0]), c=np.array([2.0]), m=np.array([3.7]))
+    brake = Damping(i=np.array([0]), c=np.array([2.0]))
     scene = clean.scene(
         np.array([3.7]), (wall(2.9), brake), np.array([0.3]), np.array([0.7]), step=0.1, steps=2000, every=10
     )
