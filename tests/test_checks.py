@@ -50,7 +50,7 @@ def test_no_check_rejects_an_engine_on_random_scenes(label: str, need: Need) -> 
     need(label)
     for seed in range(12):
         scene = clean.random_scene(np.random.default_rng([2, seed]), steps=60)
-        assert alarms(checks.judge(scene, springcheck.run(scene, label))) == [], seed
+        assert alarms(checks.judge(scene, springcheck.simulate(scene, label))) == [], seed
 
 
 def part_of(run: Trajectory, rows: slice) -> Trajectory:
@@ -117,7 +117,7 @@ def test_the_arithmetic_of_opencl_is_the_one_it_is_said_to_have(
     seen = []
     for seed in range(6):
         scene = clean.random_scene(np.random.default_rng([6, seed]), decades=1.5, steps=steps)
-        run = springcheck.run(scene, label) if scene.step > 0 else None
+        run = springcheck.simulate(scene, label) if scene.step > 0 else None
         if run is None or np.max(scene.system.magnitude()(run.q, run.p)) > run.arithmetic.overflow:
             continue
         verdicts = checks.judge(scene, run)
@@ -130,7 +130,7 @@ def test_fixed_point_forces_lose_up_to_one_quantum_for_each_spring_and_no_more(n
     label = "openmm:verlet@OpenCL-double"
     need(label)
     scene = scenes.load_scene("chain")
-    case = checks.Case(trajectory=springcheck.run(scene, label), scene=scene)
+    case = checks.Case(trajectory=springcheck.simulate(scene, label), scene=scene)
     lost = np.max(np.abs(case.next_states[1] - case.trajectory.p[1:])) / scene.step / 2.0**-32
     # two springs pull at each particle, and what is cut off is spread evenly below one quantum
     assert 1 < lost < 2
@@ -185,7 +185,7 @@ def test_a_large_step_of_an_inverted_spring_can_turn_backwards() -> None:
 
 def test_frames_far_apart_are_judged_by_a_power_of_the_map() -> None:
     scene = replace(scenes.load_scene("chain"), steps=6000, every=3000)
-    run = springcheck.run(scene, "own:semi-implicit-euler")
+    run = springcheck.simulate(scene, "own:semi-implicit-euler")
     (defect,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
     assert defect.passed
     (wrong,) = (
@@ -200,7 +200,7 @@ def test_a_right_engine_passes_to_the_very_end_of_the_range_of_numbers(label: st
     scene = replace(scenes.load_scene("spring-uneven"), step=step, steps=60_000, every=10)
     # from a start this small the end, in units of the start, is beyond double's range
     scene = replace(scene, q=scene.q * 1e-9, p=scene.p * 1e-9)
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     if label == "own:euler":
         assert run.outcome.status == "diverged"
         assert np.max(np.abs(run.q)) > 1e300
@@ -212,7 +212,7 @@ def test_a_right_engine_passes_to_the_very_end_of_the_range_of_numbers(label: st
 def test_a_force_left_out_is_seen_in_any_arithmetic_far_beyond_stability() -> None:
     """Explicit Euler's next position does not feel the kick, so no rounding of the kick excuses the next."""
     scene = replace(scenes.load_scene("anharmonic"), q=np.array([-5.7e9]), p=np.array([-1.5e9]), steps=1)
-    run = springcheck.run(scene, "own:euler")
+    run = springcheck.simulate(scene, "own:euler")
     for how in (Arithmetic(), Arithmetic(state=2.0**-24, force=2.0**-24), Arithmetic(force=2.0**-24)):
         declared = replace(run, arithmetic=how)
         assert alarms(checks.judge(scene, declared, [checks.step_defect])) == []
@@ -224,7 +224,7 @@ def test_a_force_left_out_is_seen_in_any_arithmetic_far_beyond_stability() -> No
 @pytest.mark.parametrize(("frame", "check"), [(0, checks.start), (-1, checks.step_defect)])
 def test_a_state_that_is_no_number_is_never_passed(frame: int, check: checks.Check, quantity: str) -> None:
     scene = replace(scenes.load_scene("spring-uneven"), steps=5)
-    run = springcheck.run(scene, "own:euler")
+    run = springcheck.simulate(scene, "own:euler")
     states = getattr(run, quantity).copy()
     states[frame] = np.nan
     (verdict,) = checks.judge(scene, replace(run, **{quantity: states}), [check])
@@ -250,7 +250,7 @@ def overflowing(declared: float) -> tuple[Scene, Trajectory]:
         force = -spring.k * (q[-1] - spring.at)
         kick = h * force * (np.abs(force) < declared)
         q, p = [*q, q[-1] + h * (p[-1] / scene.m)], [*p, p[-1] + kick]
-    run = springcheck.run(scene, "own:euler")
+    run = springcheck.simulate(scene, "own:euler")
     how = Arithmetic(overflow=declared)
     return scene, replace(run, q=np.array(q), p=np.array(p), arithmetic=how)
 

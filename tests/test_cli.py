@@ -105,7 +105,7 @@ def test_what_is_stored_is_what_the_library_gives() -> None:
     scene = springcheck.load_scene("spring-uneven")
     stored = springcheck.read("spring-uneven.h5")
     for label, run in stored.items():
-        again = springcheck.run(scene, label)
+        again = springcheck.simulate(scene, label)
         assert np.array_equal(run.t, again.t)
         assert np.array_equal(run.q, again.q)
         assert np.array_equal(run.p, again.p)
@@ -253,7 +253,7 @@ def test_a_scene_file_may_begin_with_a_byte_order_mark_and_end_its_lines_as_on_w
 
 def test_an_unfinished_store_can_be_looked_at(capsys: pytest.CaptureFixture[str]) -> None:
     scene = springcheck.load_scene("spring-uneven")
-    run = springcheck.run(scene, "own:euler")
+    run = springcheck.simulate(scene, "own:euler")
     with store.open_new("some.h5", "some command") as journal, journal.draft("own:euler", scene) as draft:
         draft.append(run.t, run.q, run.p, run.energy)
         draft.finish(store.attributes(run))

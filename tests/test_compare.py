@@ -15,7 +15,7 @@ LABELS = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:
 
 
 def groups(scene: Scene) -> set[frozenset[str]]:
-    runs = {label: springcheck.run(scene, label) for label in LABELS}
+    runs = {label: springcheck.simulate(scene, label) for label in LABELS}
     found = compare.same_motions(scene, runs, compare.compare(scene, runs))
     return {frozenset(same.labels) for same in found}
 
@@ -44,7 +44,7 @@ def test_a_motion_of_which_rounding_leaves_nothing_is_not_taken_for_every_other(
 
 def test_pieces_of_trajectories_are_compared_as_wholes() -> None:
     scene = springcheck.load_scene("spring-uneven")
-    runs = {label: springcheck.run(scene, label) for label in ("own:euler", "own:implicit-euler")}
+    runs = {label: springcheck.simulate(scene, label) for label in ("own:euler", "own:implicit-euler")}
     whole = compare.compare(scene, runs)
     pieces = [
         {label: replace(run, t=run.t[a:b], q=run.q[a:b], p=run.p[a:b]) for label, run in runs.items()}

@@ -38,7 +38,7 @@ def states(scene: Scene, label: str) -> tuple[np.ndarray, np.ndarray]:
     if label == "exact":
         q, p = exact.true_motion(scene, np.arange(scene.frames) * scene.every, scene.step)
         return q, p
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     assert run.outcome.status == "complete"
     return run.q, run.p
 
@@ -77,14 +77,14 @@ def judged(scene: Scene, run: Trajectory) -> list[str]:
 def test_an_uneven_spring_passes_every_check(label: str, need: Need) -> None:
     need(label)
     scene = scenes.load_scene("spring-uneven")
-    assert judged(scene, springcheck.run(scene, label)) == []
+    assert judged(scene, springcheck.simulate(scene, label)) == []
 
 
 @pytest.mark.parametrize("label", [*FIXED, "sundials:adams", "sundials:bdf"])
 def test_backwards_in_time_is_a_motion_like_any_other(label: str, need: Need) -> None:
     need(label)
     scene = replace(scenes.load_scene("spring-uneven"), step=-0.07)
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     assert run.t[-1] == -0.07 * 200
     assert judged(scene, run) == []
 
@@ -93,7 +93,10 @@ def test_backwards_in_time_is_a_motion_like_any_other(label: str, need: Need) ->
 def test_recording_every_twentieth_step_gives_every_twentieth_state(label: str, need: Need) -> None:
     need(label)
     scene = scenes.load_scene("spring-uneven")
-    all_frames, some = springcheck.run(scene, label), springcheck.run(replace(scene, every=20), label)
+    all_frames, some = (
+        springcheck.simulate(scene, label),
+        springcheck.simulate(replace(scene, every=20), label),
+    )
     assert np.array_equal(all_frames.q[::20], some.q)
     assert np.array_equal(all_frames.p[::20], some.p)
     assert np.array_equal(all_frames.t[::20], some.t)
@@ -102,7 +105,7 @@ def test_recording_every_twentieth_step_gives_every_twentieth_state(label: str, 
 @pytest.mark.parametrize("label", [*FIXED, "sundials:adams", "sundials:bdf"])
 def test_forces_are_counted(label: str, need: Need) -> None:
     need(label)
-    run = springcheck.run(scenes.load_scene("spring"), label)
+    run = springcheck.simulate(scenes.load_scene("spring"), label)
     # ASE asks once more at the start; an adaptive solver needs at least one a step of its own
     assert run.force_calls in (200, 201) or (run.tolerance is not None and run.force_calls > 200)
 
@@ -112,7 +115,7 @@ def test_forces_are_counted(label: str, need: Need) -> None:
 def test_a_step_beyond_the_limit_ends_as_diverged_at_its_step(label: str, need: Need) -> None:
     need(label)
     scene = replace(scenes.load_scene("spring-uneven"), step=30.0, steps=2000)
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     assert run.outcome.status == "diverged"
     assert np.isfinite(run.q).all()
     assert np.isfinite(run.p).all()
@@ -128,7 +131,7 @@ def test_a_step_beyond_the_limit_ends_as_diverged_at_its_step(label: str, need: 
 def test_openmm_counts_from_rest_where_a_bond_could_turn_over(need: Need) -> None:
     need("openmm:euler")
     scene = scenes.load_scene("chain")
-    run = springcheck.run(scene, "openmm:euler")
+    run = springcheck.simulate(scene, "openmm:euler")
     crossed = np.any(np.diff(run.q, axis=1) < 0)
     assert crossed, "explicit Euler was to grow until particles pass one another"
     assert judged(scene, run) == []
@@ -148,14 +151,14 @@ def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
         ),
     )
     with pytest.raises(MethodError, match="no common rest"):
-        springcheck.run(scene, "openmm:verlet")
+        springcheck.simulate(scene, "openmm:verlet")
 
 
 def test_opencl_forces_are_kept_in_fixed_point(need: Need) -> None:
     label = "openmm:verlet@OpenCL-double"
     need(label)
     scene = scenes.load_scene("spring")
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     case = checks.Case(trajectory=run, scene=scene)
     defect = np.max(np.abs(case.next_states[1] - run.p[1:]))
     assert defect > 2.0**-34 * scene.step
@@ -166,7 +169,7 @@ def test_opencl_keeps_force_constants_in_single_precision(need: Need) -> None:
     label = "openmm:verlet@OpenCL-double"
     need(label)
     scene = scenes.load_scene("spring-uneven")
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     as_double = replace(run, arithmetic=replace(run.arithmetic, parameters="double"))
     assert "step-defect" in judged(scene, as_double)
     assert "step-defect" not in judged(scene, run)
@@ -185,7 +188,7 @@ def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Ne
     for method, factor in (("semi-implicit-euler", 1.0), ("leapfrog", 0.0)):
         label = f"openmm:{method}@OpenCL-double"
         need(label)
-        run = springcheck.run(scene, label)
+        run = springcheck.simulate(scene, label)
         kick = np.longdouble(scene.step) * np.longdouble(-2.875) * np.longdouble(1e6)
         too_large = float(run.p[1, 0] / kick - 1) * 2.0**32
         assert abs(too_large - factor) < 1e-5
@@ -205,7 +208,7 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
     need(label)
     plain = scenes.load_scene("anharmonic")
     scene = replace(plain, q=plain.q * size, p=plain.p * size, steps=step + 9)
-    run = springcheck.run(scene, label)
+    run = springcheck.simulate(scene, label)
     (verdict,) = (v for v in checks.judge(scene, run) if v.check == "step-defect")
     assert verdict.passed is False
     assert f"overflows beyond 2**31, and step {step}, the first that is off" in verdict.why
@@ -236,7 +239,7 @@ def test_pocl_turns_every_force_beyond_fixed_point_into_the_lowest_number_and_su
 
     for q in (-46279.44742758134, -1082.0, -1081.0, 1081.0, 1082.0, -8e8, 8e8):
         scene = replace(plain, q=np.array([q]), p=np.zeros(1), steps=1, every=1)
-        run = springcheck.run(scene, label)
+        run = springcheck.simulate(scene, label)
         total = (fixed(-k * q) + fixed(-b * q * q * q) + 2**63) % 2**64 - 2**63
         assert run.p[1, 0] == pytest.approx(scene.step * (total / unit), rel=2.0**-50, abs=0)
 
@@ -268,10 +271,10 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
 ) -> None:
     need(label)
     scene = replace(scenes.load_scene("spring-uneven"), steps=300, every=100)
-    whole = springcheck.run(scene, label)
+    whole = springcheck.simulate(scene, label)
     monkeypatch.setattr(simulate, "PIECE", 7)
     told: list[int] = []
-    pieces = springcheck.run(scene, label, progress=told.append)
+    pieces = springcheck.simulate(scene, label, progress=told.append)
     assert np.array_equal(whole.q, pieces.q)
     assert np.array_equal(whole.p, pieces.p)
     assert sum(told) == 300
@@ -280,9 +283,9 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
 
 def test_chunks_of_any_length_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(scenes.load_scene("chain"), steps=1000)
-    whole = springcheck.run(scene, "own:euler")
+    whole = springcheck.simulate(scene, "own:euler")
     monkeypatch.setattr(simulate, "FIRST", 3)
     monkeypatch.setattr(simulate, "CHUNK", 40)
-    pieces = springcheck.run(scene, "own:euler")
+    pieces = springcheck.simulate(scene, "own:euler")
     assert np.array_equal(whole.q, pieces.q)
     assert np.array_equal(whole.energy, pieces.energy)

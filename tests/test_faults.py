@@ -112,7 +112,9 @@ def test_a_fault_that_only_the_rounding_law_sees_passes_everything_else() -> Non
 
 def test_the_package_exposes_its_scenes_to_a_plain_run() -> None:
     scene = trial.scene("spring")
-    assert [v for v in checks.judge(scene, springcheck.run(scene, "own:euler")) if v.passed is False] == []
+    assert [
+        v for v in checks.judge(scene, springcheck.simulate(scene, "own:euler")) if v.passed is False
+    ] == []
 
 
 def test_faults_of_the_command_line_print_one_document(

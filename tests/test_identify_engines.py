@@ -31,7 +31,7 @@ SCHEMES_OF = {
 
 def run(scene: str, label: str, every: int, tolerance: float = 1e-12) -> tuple[Trajectory, Identification]:
     chosen = replace(springcheck.load_scene(scene), every=every, tolerance=tolerance)
-    made = springcheck.run(chosen, label)
+    made = springcheck.simulate(chosen, label)
     return made, identify(made.t, made.q, made.p, mass=chosen.m)
 
 

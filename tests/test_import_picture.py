@@ -17,14 +17,14 @@ HOME = Path(springcheck.__file__).parent
 ROWS = [
     "interrupts", "errors", "workers", "arrays", "physics", "schemes", "engines", "trajectory", "store",
     "text", "simulate", "checks", "compare", "identify", "figures", "studies", "inspect", "plot", "listing",
-    "cli", "__main__",
+    "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
 
 HOMES = {
     "h5py": ("store",),
-    "matplotlib": ("figures", *(f"studies/{name}/figure.py" for name in STUDIES)),
+    "matplotlib": ("plot.py", "figures", *(f"studies/{name}/figure.py" for name in STUDIES)),
     "openmm": ("engines/openmm/simulation.py",),
     "ase": ("engines/ase/simulation.py",),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
@@ -91,7 +91,7 @@ FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
         ("import springcheck", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
         ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
         ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich"}),
-        ("import springcheck; springcheck.run(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
+        ("import springcheck; springcheck.simulate(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
     ],
 )
 def test_what_is_not_needed_is_not_imported(code: str, absent: set[str]) -> None:

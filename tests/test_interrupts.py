@@ -73,7 +73,7 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_ctrl_c_in_an_engine_is_no_outcome() -> None:
     scene = scenefile.load_scene("spring-uneven")
     with pytest.raises(KeyboardInterrupt):
-        springcheck.run(scene, "own:semi-implicit-euler")
+        springcheck.simulate(scene, "own:semi-implicit-euler")
 
 
 @pytest.mark.usefixtures("interrupted")
@@ -105,7 +105,7 @@ def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(simulation, "start", lambda *_: Counting())
     scene = replace(scenefile.load_scene("spring-uneven"), steps=10**9, every=10**8)
-    assert springcheck.run(scene, "own:euler").outcome.step == sum(calls) == 10**9
+    assert springcheck.simulate(scene, "own:euler").outcome.step == sum(calls) == 10**9
     assert max(calls) <= simulate.PIECE
     calls.clear()
     label = engines.parse("own:euler")
@@ -124,10 +124,10 @@ def test_openmm_moves_in_pieces_as_it_does_in_one_call(monkeypatch: pytest.Monke
 
     scene = replace(scenefile.load_scene("spring-uneven"), steps=2100, every=1050)
     for method in ("verlet", "leapfrog", "euler", "semi-implicit-euler"):
-        pieces = springcheck.run(scene, f"openmm:{method}")
+        pieces = springcheck.simulate(scene, f"openmm:{method}")
         with monkeypatch.context() as patch:
             patch.setattr(openmm, "ATTENTIVE", 10**6)
-            whole = springcheck.run(scene, f"openmm:{method}")
+            whole = springcheck.simulate(scene, f"openmm:{method}")
         assert np.array_equal(pieces.q, whole.q)
         assert np.array_equal(pieces.p, whole.p)
 

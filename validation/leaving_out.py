@@ -111,7 +111,7 @@ def main() -> int:
     codes = {
         "import numpy, h5py": "import numpy, h5py",
         "load a scene": "from springcheck import scenes; scenes.load_scene('spring')",
-        "one run in memory": "from springcheck import *; run(load_scene('spring'), 'own:euler')",
+        "one run in memory": "from springcheck import *; simulate(load_scene('spring'), 'own:euler')",
         "run spring --method 'own:*' --quiet": RUN.format(arguments=small),
         "run spring --method 'own:*'": RUN.format(arguments=small[:-1]),
         "run lc-circuit": RUN.format(arguments=["run", "lc-circuit"]),

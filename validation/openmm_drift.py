@@ -21,12 +21,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from arguments import arguments
-from springcheck import run
 from springcheck.arrays import Floats
 from springcheck.checks import laws
 from springcheck.figures import style
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
+from springcheck.simulate import run
 
 STEPS = 300_000
 FRAMES = 300

@@ -24,8 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from arguments import arguments
-from springcheck import compare, load_scene, run
+from springcheck import compare, load_scene
 from springcheck.checks import judge
+from springcheck.simulate import run
 from springcheck.studies.run import figure as trajectories
 
 METHODS = [

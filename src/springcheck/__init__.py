@@ -2,38 +2,85 @@
 
 >>> import springcheck
 >>> scene = springcheck.load_scene("spring")
->>> run = springcheck.run(scene, "own:semi-implicit-euler")
->>> run.t.shape, run.q.shape, run.p.shape
-((201,), (201, 1), (201, 1))
+>>> run = springcheck.simulate(scene, "own:semi-implicit-euler")
+>>> run
+Trajectory('own:semi-implicit-euler', 201 frames, 1 particle, t = 0 to 20, complete)
+>>> all(verdict.passed for verdict in springcheck.judge(scene, run) if verdict.passed is not None)
+True
 
-`load_scene` reads a scene, `run` moves it by one method, `read` opens a store, `judge` gives verdicts.
-What they return is described in `springcheck.trajectory`.  Each is imported when it is first used.
+`run` does the whole job, as the command does; `simulate` runs one method.  Each name is imported when it is
+first used.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # typing takes longer to import than all else here
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
 if TYPE_CHECKING:
-    from typing import Any
-
-    from springcheck.checks import judge
+    from springcheck import plot
+    from springcheck.api import exact, judge, read, run
+    from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
-    from springcheck.simulate import run
-    from springcheck.studies.keeper import read
+    from springcheck.trajectory import Trajectory, Verdict
 
-__all__ = ["judge", "load_scene", "read", "run"]
+    __version__: str
+
+__all__ = [
+    "Scene", "Trajectory", "Verdict", "__version__", "compare", "exact", "identify", "judge", "load_scene",
+    "plot", "read", "run", "simulate",
+]  # fmt: skip
 
 _HOMES = {
-    "judge": "checks",
+    "Scene": "physics.scene",
+    "Trajectory": "trajectory",
+    "Verdict": "trajectory",
+    "exact": "api",
+    "judge": "api",
     "load_scene": "physics.scenefile",
-    "read": "studies.keeper",
-    "run": "simulate",
+    "read": "api",
+    "run": "api",
 }
+_MODULES = {"compare", "identify", "simulate"}
+"""Modules that are called as the public function of their name, which stands in `api`."""
+
+
+class _Function(ModuleType):
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.__wrapped__(*arguments, **named)
+
+    @property
+    def __wrapped__(self) -> Any:
+        """The function, for `help` and signatures."""
+        from springcheck import api
+
+        return getattr(api, self.__name__.rpartition(".")[2])
+
+
+class _Package(ModuleType):
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _MODULES and isinstance(value, ModuleType):
+            value.__class__ = _Function
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("springcheck")
+    if name in _MODULES or name == "plot":
+        return import_module(f"{__name__}.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

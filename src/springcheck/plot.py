@@ -1,11 +1,16 @@
-"""`springcheck plot`: everything in a store that can be drawn."""
+"""`springcheck plot`: everything in a store that can be drawn; and trajectories on axes of one's own."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from springcheck import inspect, store
 from springcheck.errors import SpringcheckError
+from springcheck.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def draw(path: Path, folder: Path) -> tuple[list[Path], list[str]]:
@@ -26,3 +31,47 @@ def draw(path: Path, folder: Path) -> tuple[list[Path], list[str]]:
     if not written:
         raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
     return written, notes
+
+
+def phase(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
+    """Phase portraits, p over q, of one particle of each trajectory; returns the axes."""
+    axes = _axes(ax)
+    for run in runs:
+        axes.plot(run.q[:, particle], run.p[:, particle], label=run.label)
+    return _finished(axes, "q", "p")
+
+
+def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
+    """Positions over time of one particle of each trajectory; returns the axes."""
+    axes = _axes(ax)
+    for run in runs:
+        axes.plot(run.t, run.q[:, particle], label=run.label)
+    return _finished(axes, "t", "q")
+
+
+def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
+    """Relative change of the total energy over time, absolute where it starts at 0; returns the axes.
+
+    SpringcheckError where a trajectory was recorded without energies.
+    """
+    axes = _axes(ax)
+    for run in runs:
+        if run.energy is None:
+            raise SpringcheckError(f"{run.label}: its scene keeps no energies (record.quantities)")
+        axes.plot(run.t, (run.energy - run.energy[0]) / (abs(run.energy[0]) or 1.0), label=run.label)
+    return _finished(axes, "t", "(H - H0) / |H0|")
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.figure(layout="constrained").add_subplot()
+
+
+def _finished(axes: Axes, x: str, y: str) -> Axes:
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.legend()
+    return axes

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from html import escape
+from importlib import import_module
+from typing import Any, Literal
 
 from springcheck.arrays import Floats
 from springcheck.engines.contract import Arithmetic
+from springcheck.errors import SpringcheckError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +57,54 @@ class Trajectory:
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
 
+    def __repr__(self) -> str:
+        n = self.q.shape[1] if self.q.ndim == 2 else 1
+        size = f"{len(self.t)} frames, {n} particle{'s' if n != 1 else ''}"
+        span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self.t) else ""
+        return f"Trajectory({self.label!r}, {size}{span}, {self.outcome.status})"
+
+    def _repr_html_(self) -> str:
+        """A small table for notebooks: what it is, its first and its last frame."""
+        rows = [("frame", "t", "q", "p")]
+        shown = sorted({0, len(self.t) - 1}) if len(self.t) else []
+        rows += [(str(i), f"{self.t[i]:g}", _few(self.q[i]), _few(self.p[i])) for i in shown]
+        body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+        return f"<p>{escape(repr(self))}</p><table>{body}</table>"
+
+    def to_dataframe(self) -> Any:
+        """A pandas DataFrame: a row a frame, columns q0, p0, q1 ... and energy where it was kept; index t."""
+        pandas = _library("pandas")
+        columns: dict[str, Floats] = {}
+        for i in range(self.q.shape[1]):
+            columns |= {f"q{i}": self.q[:, i], f"p{i}": self.p[:, i]}
+        if self.energy is not None:
+            columns["energy"] = self.energy
+        return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: q and p over t and particle, energy over t where it was kept."""
+        xarray = _library("xarray")
+        kept = {name: (("t", "particle"), getattr(self, name)) for name in ("q", "p")}
+        if self.energy is not None:
+            kept["energy"] = (("t",), self.energy)  # type: ignore[assignment]
+        about = {"method": self.label, "scheme": self.scheme, "step": self.step}
+        coordinates = {"t": self.t, "particle": range(self.q.shape[1])}
+        return xarray.Dataset(kept, coords=coordinates, attrs=about)
+
+
+def _few(values: Floats) -> str:
+    text = ", ".join(f"{x:.6g}" for x in values[:3])
+    return text + (" ..." if len(values) > 3 else "")
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise SpringcheckError(
+            f"{name} is not installed; install it with: python -m pip install {name}"
+        ) from None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Comparison:
@@ -64,6 +115,18 @@ class Comparison:
 
     labels: tuple[str, ...]
     max_difference: Floats
+
+    def __repr__(self) -> str:
+        return f"Comparison of {', '.join(self.labels)}: differences up to {self.max_difference.max():.3g}"
+
+    def _repr_html_(self) -> str:
+        """The differences as a table for notebooks."""
+        head = "".join(f"<th>{escape(label)}</th>" for label in ("", *self.labels))
+        rows = [
+            f"<tr><th>{escape(label)}</th>" + "".join(f"<td>{x:.1e}</td>" for x in row) + "</tr>"
+            for label, row in zip(self.labels, self.max_difference, strict=True)
+        ]
+        return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,154 @@
+"""What `import springcheck` offers: functions that take a scene or its name, and say what they need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from springcheck import checks
+from springcheck import compare as comparing
+from springcheck import simulate as driver
+from springcheck.errors import SpringcheckError
+from springcheck.physics import exact as solutions
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
+
+if TYPE_CHECKING:
+    from springcheck.identify.result import Identification
+    from springcheck.studies.run.result import Report
+
+
+def run(
+    scene: Scene | str | Path,
+    methods: str | Sequence[str] = (),
+    *,
+    path: str | Path | None = None,
+    force: bool = False,
+    thorough: bool = False,
+) -> Report:
+    """The whole job, as `springcheck run` does it: run, store, compare, judge.
+
+    `methods` are labels or globs such as ``"own:*"``; left out: those of the scene.  The store is `path`, by
+    default SCENE.h5 in the current folder; what an interrupted call has finished is taken up.
+
+    Raises SpringcheckError for everything that a user can mend.
+    """
+    from springcheck.studies.run import measure
+
+    found = _scene(scene)
+    named = (methods,) if isinstance(methods, str) else tuple(methods)
+    place = Path(path or f"{found.name}.h5")
+    return measure.run(found, place, methods=named, force=force, thorough=thorough)
+
+
+def simulate(
+    scene: Scene | str | Path, method: str, *, progress: driver.Progress | None = None
+) -> Trajectory:
+    """A scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
+
+    `progress` is called with the number of steps done since its last call.
+
+    Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
+    """
+    return driver.run(_scene(scene), method, progress=progress)
+
+
+def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
+    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None."""
+    return checks.judge(_scene(scene), _trajectory(trajectory))
+
+
+def compare(
+    scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
+) -> Comparison:
+    """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
+    if isinstance(trajectories, Mapping):
+        named = {label: _trajectory(one) for label, one in trajectories.items()}
+    else:
+        named = {_trajectory(one).label: one for one in trajectories}
+    return comparing.compare(_scene(scene), named)
+
+
+def identify(
+    found: Trajectory | str | Path | Any,
+    q: Any = None,
+    p: Any = None,
+    *,
+    v: Any = None,
+    mass: Any = None,
+    stiffness: float | None = None,
+    step: float | None = None,
+) -> Identification | dict[str, Identification]:
+    """Which scheme made a trajectory: of arrays t, q and p (or v), of a `Trajectory`, or of a file.
+
+    t (f,), q, p and v (f, n) or (f,); a file gives one identification for each of its trajectories, by label.
+    Raises IdentificationError where the states say nothing.
+    """
+    from springcheck.identify import files
+    from springcheck.identify.report import identify as of_states
+
+    if isinstance(found, str | Path):
+        stated = {"mass": mass, "stiffness": stiffness, "step": step}
+        return {one.label: files.identify_states(one, **stated) for one in files.read(Path(found))}
+    t = found
+    if isinstance(found, Trajectory):
+        t, q, p = found.t, found.q, found.p
+    if q is None or (p is None and v is None):
+        raise SpringcheckError("identify needs t, q and p (or v=), a Trajectory, or the path of a file")
+    arrays = [None if x is None else np.asarray(x, np.float64) for x in (q, p, v)]
+    of_q, of_p, of_v = (x[:, None] if x is not None and x.ndim == 1 else x for x in arrays)
+    assert of_q is not None
+    m = None if mass is None else np.broadcast_to(np.asarray(mass, np.float64), of_q.shape[1:])
+    times = np.asarray(t, np.float64)
+    return of_states(times, of_q, of_p, v=of_v, mass=m, stiffness=stiffness, step=step)
+
+
+def exact(scene: Scene | str | Path) -> Trajectory:
+    """The exact solution at the frames of a scene, rounded to double precision.
+
+    Raises SpringcheckError where no closed form is known.
+    """
+    found = _scene(scene)
+    if not solutions.has_true_motion(found):
+        raise SpringcheckError(f"scene {found.name}: no closed form of its exact solution is known")
+    steps = np.arange(found.frames, dtype=np.int64) * found.every
+    q, p = (np.asarray(x, np.float64) for x in solutions.true_motion(found, steps, found.step))
+    return Trajectory(
+        label="exact",
+        scheme="exact",
+        t=np.asarray(steps * found.step, np.float64),
+        q=q,
+        p=p,
+        step=found.step,
+        every=found.every,
+        outcome=Outcome(status="complete", step=found.steps),
+        timing=Timing(start=0.0, run=0.0),
+        force_calls=0,
+    )
+
+
+def read(path: str | Path) -> dict[str, Trajectory]:
+    """The trajectories of a store by label.  StoreError where it cannot be read."""
+    from springcheck.studies import keeper
+
+    return keeper.read(path)
+
+
+def _scene(scene: Scene | str | Path) -> Scene:
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return scenefile.load_scene(scene)
+    raise SpringcheckError(f"a Scene, or the name or path of one, is needed, not {type(scene).__name__}")
+
+
+def _trajectory(found: Any) -> Trajectory:
+    if isinstance(found, Trajectory):
+        return found
+    raise SpringcheckError(
+        f"a Trajectory is needed, not {type(found).__name__}: simulate gives one, read many"
+    )

@@ -1,0 +1,132 @@
+"""What `import springcheck` offers: its names are pinned, short to look at, and take a name for an object."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck.errors import SpringcheckError
+from springcheck.physics.terms import Quartic
+from springcheck.trajectory import Comparison
+
+NAMES = [
+    "Scene", "Trajectory", "Verdict", "__version__", "compare", "exact", "identify", "judge", "load_scene",
+    "plot", "read", "run", "simulate",
+]  # fmt: skip
+
+
+def test_the_names_are_these_and_each_is_there() -> None:
+    assert dir(springcheck) == sorted(springcheck.__all__) == NAMES
+    for name in NAMES:
+        assert getattr(springcheck, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'integrate'"):
+        springcheck.integrate  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["simulate", "compare", "identify"])
+def test_a_module_named_as_a_function_is_called_as_it_and_shows_its_signature(name: str) -> None:
+    from springcheck import api
+
+    assert inspect.signature(getattr(springcheck, name)) == inspect.signature(getattr(api, name))
+
+
+def test_run_is_the_whole_job_and_simulate_one_method(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    report = springcheck.run("spring", "own:*")
+    assert report.status == 0
+    assert Path("spring.h5").is_file()
+    alone = springcheck.simulate("spring", "own:euler")
+    assert np.array_equal(springcheck.read("spring.h5")["own:euler"].q, alone.q)
+    verdicts = springcheck.judge("spring", alone)
+    assert [v.passed for v in verdicts if v.passed is not None] == [True] * sum(
+        v.passed is not None for v in verdicts
+    )
+    by_file = springcheck.identify("spring.h5")
+    (by_arrays, by_object) = (
+        springcheck.identify(alone.t, alone.q[:, 0], alone.p[:, 0]),
+        springcheck.identify(alone),
+    )
+    assert {by_file["own:euler"].scheme, by_arrays.scheme, by_object.scheme} == {by_object.scheme}
+    assert by_object.scheme == "explicit-euler"
+
+
+def test_the_exact_solution_of_the_unit_spring_is_the_sine() -> None:
+    found = springcheck.exact("spring")
+    np.testing.assert_allclose(found.q[:, 0], np.sin(found.t), rtol=0, atol=4e-15)
+    same = springcheck.compare("spring", [found, springcheck.simulate("spring", "own:implicit-euler")])
+    assert same.labels == ("exact", "own:implicit-euler")
+    assert same.max_difference[0, 1] > 0.1
+
+
+def test_what_is_shown_is_short() -> None:
+    run = springcheck.simulate("spring", "own:euler")
+    assert repr(run) == "Trajectory('own:euler', 201 frames, 1 particle, t = 0 to 20, complete)"
+    shown = Comparison(labels=("a", "<b>"), max_difference=np.array([[0, 0.5], [0.5, 0]]))
+    assert repr(shown) == "Comparison of a, <b>: differences up to 0.5"
+    for one in (run, shown):
+        html = one._repr_html_()
+        assert html.count("<tr>") == html.count("</tr>") == 3
+        assert len(html) < 1000
+    assert "<b>" not in shown._repr_html_()
+
+
+def test_what_is_no_scene_and_no_trajectory_is_refused_in_one_line() -> None:
+    chain = springcheck.load_scene("chain")
+    coupled = replace(
+        chain, terms=(*chain.terms, Quartic(i=np.array([0]), b=np.array([1.0]), at=np.zeros(1)))
+    )
+    run = springcheck.simulate("spring", "own:euler")
+    for call, words in (
+        (lambda: springcheck.simulate(3, "own:euler"), "a Scene, or the name or path of one"),
+        (lambda: springcheck.judge("spring", "spring.h5"), "a Trajectory is needed, not str"),
+        (lambda: springcheck.judge("sprung", run), "spring"),
+        (lambda: springcheck.identify(run.t), "needs t, q and p"),
+        (lambda: springcheck.exact(coupled), "no closed form"),
+    ):
+        with pytest.raises(SpringcheckError, match=words) as refused:
+            call()
+        assert "\n" not in str(refused.value)
+
+
+def test_plots_go_onto_axes_of_ones_own() -> None:
+    mpl.use("agg")
+    from matplotlib.figure import Figure
+
+    one, other = (springcheck.simulate("spring", f"own:{name}") for name in ("euler", "implicit-euler"))
+    for draw, x, y in (
+        (springcheck.plot.phase, one.q[:, 0], one.p[:, 0]),
+        (springcheck.plot.position, one.t, one.q[:, 0]),
+        (springcheck.plot.energy, one.t, (one.energy - one.energy[0]) / one.energy[0]),
+    ):
+        axes = Figure().add_subplot()
+        assert draw(one, other, ax=axes) is axes
+        np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack([x, y]))
+        assert [line.get_label() for line in axes.lines] == [one.label, other.label]
+    assert springcheck.plot.phase(one).lines
+
+
+def test_a_trajectory_is_a_table_where_the_libraries_are_there() -> None:
+    run = springcheck.simulate("chain", "own:euler")
+    pytest.importorskip("pandas")
+    table = run.to_dataframe()
+    assert np.array_equal(table["q1"].to_numpy(), run.q[:, 1])
+    assert np.array_equal(table["energy"].to_numpy(), run.energy)
+    assert np.array_equal(table.index.to_numpy(), run.t)
+    pytest.importorskip("xarray")
+    assert np.array_equal(run.to_xarray()["p"].to_numpy(), run.p)
+
+
+def test_a_library_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(SpringcheckError, match="python -m pip install pandas"):
+        springcheck.simulate("spring", "own:euler").to_dataframe()
