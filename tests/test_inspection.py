@@ -297,7 +297,7 @@ def test_without_friction_energies_are_drawn_beside_the_start_s(tmp_path: Path) 
 def test_drawing_says_nothing_beside_the_names_of_its_files(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
-    text = scenes.load_scene("spring").text.replace("Mass on a spring", "\\u8cea\\u91cf")
+    text = scenes.load_scene("spring").to_toml().replace("Mass on a spring", "\\u8cea\\u91cf")
     (tmp_path / "mass.toml").write_text(text)
     path = str(tmp_path / "mass.h5")
     assert main(["run", str(tmp_path / "mass.toml"), "--method", "own:*", "--quiet", "-o", path]) == 0

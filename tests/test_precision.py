@@ -262,7 +262,7 @@ def test_what_fails_stays_in_with_its_reason(need: Callable[[str], None]) -> Non
 
 
 def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
-    scene = replace(scenes.load_scene("spring"), kind="circuit")
+    scene = replace(scenes.load_scene("spring"), kind="circuit", units="si")
     found = precision.study(scene, [engines.parse("ase:velocity-verlet")], budget=1.0)
     (point,) = found.points
     assert point.outcome == "cannot run"

@@ -191,6 +191,6 @@ def test_methods_for_friction_or_fast_springs_say_what_a_scene_lacks() -> None:
 
 
 def test_a_friction_below_zero_is_refused() -> None:
-    text = scenes.load_scene("overdamped").text.replace("coefficient = 388.3", "coefficient = -1.0")
+    text = scenes.load_scene("overdamped").to_toml().replace("coefficient = 388.3", "coefficient = -1.0")
     with pytest.raises(SceneError, match=r"damping\[0\].coefficient"):
         scenes.parse(text, name="x")

@@ -71,7 +71,6 @@ def scene(frames: int) -> Scene:
         terms=(),
         step=0.1,
         steps=frames - 1,
-        text="killed",
     )
 
 

@@ -42,9 +42,7 @@ trust.LIMIT = 5.0
 def originals(folder: Path) -> dict[str, bytes]:
     """Files to damage, by kind."""
     m = np.array([3.7, 0.4])
-    scene = Scene(
-        name="fuzz", title="", source="", m=m, q=m, p=m, terms=(), step=0.1, steps=60, text="fuzz", units="md"
-    )
+    scene = Scene(name="fuzz", title="", source="", m=m, q=m, p=m, terms=(), step=0.1, steps=60, units="md")
     rng = np.random.default_rng(3)
     with store.open_new(folder / "s.h5", "fuzz") as journal:
         for label in (LABEL, "openmm:verlet"):

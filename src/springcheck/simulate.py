@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Literal, Protocol
 
@@ -81,7 +81,7 @@ def play(
         raise MethodError(f"{label}: {reason}")
     method = engines.method(label)
     driver = engines.load(label.engine)
-    ahead = scene if method.adaptive else replace(scene, steps=max(scene.steps, planned))
+    ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
     simulation = driver.start(ahead, method, label, scene.step)
     start_seconds = perf_counter() - began
@@ -281,7 +281,7 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
         Stopped: the engine gave up.
     """
     driver, method = engines.load(label.engine), engines.method(label)
-    ahead = scene if method.adaptive else replace(scene, steps=max(scene.steps, planned))
+    ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
     simulations = [driver.start(ahead, method, label, scene.step) for _ in range(copies)]
     start_seconds = perf_counter() - began

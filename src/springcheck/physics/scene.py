@@ -2,38 +2,66 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
+import operator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
 
 from springcheck.arrays import Floats
+from springcheck.errors import SceneError
 from springcheck.physics.system import System
-from springcheck.physics.term import Term
+from springcheck.physics.term import Term, check_sign, frozen, refrozen
+from springcheck.physics.terms import in_order
 
 Kind: TypeAlias = Literal["particles", "circuit", "rotor"]
 Units: TypeAlias = Literal["reduced", "md", "si"]
+Quantity: TypeAlias = Literal["q", "p", "energy"]
+
+MOST_STEPS = 2**53
+"""Numbers of steps up to which each is a double of its own, so that t = i h tells them apart."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """What is to be simulated: a system, its start, its time grid, and what is asked of it."""
+    """What is to be simulated: a system, its start, its time grid, and what is asked of it.
 
-    name: str
-    title: str
-    source: str
+    Making one, or changing one by `dataclasses.replace`, raises SceneError where it makes no sense.  Arrays
+    are kept as read-only copies.  Its identity is `digest`, and `to_toml` writes it as a scene file.
+    """
+
     m: Floats
+    """Masses, > 0 (n,) [M]."""
     q: Floats
+    """Positions at the start (n,) [L]."""
     p: Floats
-    terms: tuple[Term, ...]
+    """Momenta at the start (n,) [M L/T]."""
+    terms: tuple[Term, ...] = ()
+    """One of each kind, in the order of `terms.known`; terms of one kind are joined."""
     step: float
+    """Step [T], < 0 for a run backwards in time."""
     steps: int
     every: int = 1
+    """Every how many steps a frame is recorded; it divides `steps`."""
     tolerance: float = 1e-12
+    """Relative tolerance per step of adaptive solvers."""
     units: Units = "reduced"
     kind: Kind = "particles"
     include: tuple[str, ...] = ("*",)
+    """Labels or globs of the methods to run."""
     quantities: tuple[str, ...] = ("q", "p", "energy")
-    text: str = ""
+    """What is recorded: q and p, and the energy unless it is left out."""
+    name: str = "scene"
+    title: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for field, value in _checked(self):
+            object.__setattr__(self, field, value)
 
     @property
     def n(self) -> int:
@@ -50,14 +78,145 @@ class Scene:
         """What follows from the scene: forces, energies, modes and the like, each worked out once."""
         return System(self)
 
+    @cached_property
+    def digest(self) -> str:
+        """The scene's identity: sha256 of all its numbers, and of no word about them.
+
+        Equal for scenes that no method can tell apart: name, title, source and the list of methods do not
+        count, nor does the sign of a zero.
+        """
+        total = hashlib.sha256()
+        known = (self.kind, self.units, self.step, self.steps, self.every, self.tolerance, *self.quantities)
+        total.update(repr(known).encode())
+        for values in (self.m, self.q, self.p):
+            total.update((values + 0.0).astype("<f8").tobytes())
+        for term in self.terms:
+            total.update(repr((term.key, term.fast, len(term))).encode())
+            for index in term.particles:
+                total.update(index.astype("<i8").tobytes())
+            for column in term.columns:
+                total.update((getattr(term, column.field) + 0.0).astype("<f8").tobytes())
+        return total.hexdigest()
+
+    @cached_property
+    def _toml(self) -> str:
+        from springcheck.physics.scenefile.writing import text
+
+        return text(self)
+
+    def to_toml(self) -> str:
+        """The scene as a scene file, written from its numbers: read back it has exactly the same ones."""
+        return self._toml
+
     def derived(self, **changes: Any) -> Scene:
         """Like `replace`, for numbers that follow from a scene's own and are not checked again.
 
         They may be inf, where an engine of single precision would keep them so.
         """
         twin = object.__new__(type(self))
-        twin.__dict__.update({field.name: getattr(self, field.name) for field in fields(self)}, **changes)
+        twin.__dict__.update(self.__getstate__(), **changes)
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        refrozen(self, state)
+
+
+def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
+    """The fields of a scene in the types in which it keeps them.  Raises SceneError, the field first."""
+    n: int | None = None
+    for field, sign in (("m", "positive"), ("q", "any"), ("p", "any")):
+        values = frozen(getattr(scene, field), np.float64, n, field)
+        n = len(values)
+        if n == 0:
+            raise SceneError("m: at least one particle is needed")
+        check_sign(values, sign, field)
+        yield field, values
+    assert n is not None
+    yield "terms", _terms(scene.terms, n)
+    steps, every = _whole(scene.steps, "steps"), _whole(scene.every, "every")
+    if steps > MOST_STEPS:
+        raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h")
+    if steps % every:
+        raise SceneError(
+            f"every = {every}: steps = {steps} is no multiple of it, so the end would not be recorded"
+        )
+    yield from (("steps", steps), ("every", every))
+    yield "step", _step(scene.step, steps)
+    tolerance = _real(scene.tolerance, "tolerance")
+    if not 0 < tolerance < 1:
+        raise SceneError(f"tolerance = {tolerance}: a number between 0 and 1 is needed")
+    yield "tolerance", tolerance
+    for field, known in (("units", get_args(Units)), ("kind", get_args(Kind))):
+        if getattr(scene, field) not in known:
+            raise SceneError(f"{field} = {getattr(scene, field)!r}: one of {', '.join(known)} is needed")
+    if scene.kind == "circuit" and scene.units != "si":
+        raise SceneError(
+            f"units = {scene.units!r}: a circuit is given in H, F, Ohm, C and Wb; leave units out"
+        )
+    yield "quantities", _quantities(scene.quantities)
+    include = scene.include if isinstance(scene.include, tuple | list) else ()
+    if not include or not all(isinstance(one, str) and one for one in include):
+        raise SceneError(f"include = {scene.include!r}: labels or globs of methods are needed")
+    yield "include", tuple(include)
+    for field in ("name", "title", "source", "include"):
+        _check_text(getattr(scene, field), field)
+
+
+def _terms(given: Any, n: int) -> tuple[Term, ...]:
+    if not isinstance(given, tuple | list) or not all(isinstance(term, Term) for term in given):
+        raise SceneError("terms: objects of springcheck.physics.terms are needed, such as WallSpring(...)")
+    for term in given:
+        term.check(n)
+    return in_order(given)
+
+
+def _whole(value: Any, field: str) -> int:
+    try:
+        found = operator.index(value)
+    except TypeError:
+        found = 0
+    if found < 1 or isinstance(value, bool):
+        raise SceneError(f"{field} = {value}: a whole number >= 1 is needed")
+    return found
+
+
+def _real(value: Any, field: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(f"{field} = {value!r}: a number is needed") from None
+
+
+def _step(given: Any, steps: int) -> float:
+    step = _real(given, "step")
+    if step == 0 or not math.isfinite(step):
+        raise SceneError(f"step = {step}: a step forwards (> 0) or backwards (< 0) is needed")
+    if not math.isfinite(step * steps):
+        raise SceneError(f"step = {step}: {steps} of them go beyond the largest number")
+    return step
+
+
+def _quantities(given: Any) -> tuple[str, ...]:
+    known = get_args(Quantity)
+    found = tuple(given) if isinstance(given, tuple | list) else (given,)
+    unknown = [one for one in found if one not in known]
+    if unknown:
+        raise SceneError(f"quantities: {unknown[0]!r} is none of {', '.join(known)}")
+    if not {"q", "p"} <= set(found):
+        raise SceneError('quantities needs "q" and "p"; "energy" may be left out')
+    # each once, and in one order
+    return tuple(one for one in known if one in found)
+
+
+def _check_text(given: Any, field: str) -> None:
+    for text in (given,) if isinstance(given, str) else given if isinstance(given, tuple) else (None,):
+        try:
+            right = text.isprintable() or field != "name"
+            text.encode()
+        except (AttributeError, UnicodeEncodeError):
+            right = False
+        if not right or (field == "name" and not text):
+            raise SceneError(f"{field} = {text!r}: a text is needed, without halves of characters")

@@ -217,6 +217,13 @@ class Term:
         where = np.concatenate([np.take(q, index, axis=-1) for index in self.particles], axis=-1)
         return self._changed(**dict(zip(self.ends, own, strict=True))), where
 
+    def __getstate__(self) -> dict[str, Any]:
+        names = (*self.ends, *(column.field for column in self.columns))
+        return {name: getattr(self, name) for name in names} | ({"fast": True} if self.fast else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        refrozen(self, state)
+
     def _changed(self, **values: Any) -> Self:
         record: Any = self
         return replace(record, **values)  # type: ignore[no-any-return]
@@ -263,6 +270,14 @@ def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]
         raise SceneError(f"{what} has the shape {out.shape}: {wanted} is needed")
     out.setflags(write=False)
     return out
+
+
+def refrozen(self: object, state: dict[str, Any]) -> None:
+    """Put what another process has sent into a frozen object; its arrays come back writeable."""
+    self.__dict__.update(state)
+    for value in state.values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
 
 
 def check_sign(values: Floats, sign: str, what: str) -> None:

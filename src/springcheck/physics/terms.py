@@ -6,6 +6,7 @@ ten lines are shown in data/README.md.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -240,3 +241,23 @@ def register(term: T) -> T:
 def known() -> dict[str, type[Term]]:
     """The classes of terms by key, in the order in which a scene holds them."""
     return dict(_KNOWN)
+
+
+def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
+    """Terms as a scene holds them: one of each kind, in one order, none without rows.
+
+    First springs, fast ones last among them, then the other potentials, then friction: forces are added up
+    in this order, so that scenes of the same rows move alike to the last bit.
+    """
+    known = list(_KNOWN)
+    found: dict[tuple[type[Term], bool], Term] = {}
+    for term in terms:
+        if len(term):
+            kind = (type(term), term.fast)
+            found[kind] = found[kind].joined(term) if kind in found else term
+
+    def place(term: Term) -> tuple[bool, bool, bool, int, str]:
+        number = known.index(term.key) if term.key in known else len(known)
+        return (not term.is_potential, not isinstance(term, Hooke), term.fast, number, term.key)
+
+    return tuple(sorted(found.values(), key=place))

@@ -163,13 +163,13 @@ class Draft:
         digest = combined(digests, self._columns)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         given = {name: value for name, value in attributes.items() if value is not None}
-        text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.text])
+        text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.to_toml()])
         with layout.reopened(self._temporary, text) as file:
             layout.begin(file)
             layout.write_attributes(file, {"part": self.label})
             parameters = file.create_group(f"parameters/{self.label}")
             known: dict[str, Scalar] = {
-                "scene": self.scene.text,
+                "scene": self.scene.to_toml(),
                 "scene_name": self.scene.name,
                 "units": self.scene.units,
                 "kind": self.scene.kind,

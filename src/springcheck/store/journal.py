@@ -178,7 +178,7 @@ class Journal:
             extra.append(tables.of_verdicts(verdicts))
         root: dict[str, Scalar] = {"run": self.run, "complete": final, **(attributes or {})}
         if scene is not None:
-            root |= {"scene": scene.text, "scene_name": scene.name, "units": scene.units}
+            root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)
         temporary = self.folder / COLLECTION
         with files.told(self.path, "write"):

@@ -10,7 +10,7 @@ import importlib.metadata
 import platform
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
 from typing import Any, cast
@@ -23,7 +23,7 @@ from springcheck.engines.own import kernels
 from springcheck.errors import MethodError
 from springcheck.physics import terms
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Term, WallSpring
+from springcheck.physics.terms import Term, WallSpring
 
 WORTH = 1_000_000
 """Spring-steps from which compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
@@ -123,7 +123,7 @@ def _layout(scene: Scene, method: str, h: float) -> Layout:
     # friction is part of what implicit Euler solves for: 1 + h c/m stands where 1 does without it
     slowed = 1 + h * scene.system.friction_rates.astype(np.float64)
     if implicit:
-        scene = replace(scene, terms=tuple(t for t in scene.terms if not isinstance(t, Damping)))
+        scene = scene.derived(terms=tuple(t for t in scene.terms if t.is_potential))
     walls = _single_walls(scene)
     if walls is not None:
         k, at = walls

@@ -65,7 +65,7 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
     except msgspec.ValidationError as error:
         raise SceneError(f"{where}: {_explain(str(error), data)}") from error
     try:
-        return building.scene(table, name=name, text=text)
+        return building.scene(table, name=name)
     except building.MistakeError as error:
         raise SceneError(f"{where}: {error}") from error
 

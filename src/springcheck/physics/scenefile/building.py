@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from springcheck.arrays import Floats
+from springcheck.errors import SceneError
+from springcheck.physics import builders
 from springcheck.physics.scene import Kind, Scene, Units
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import Damping, Spring, Term, WallSpring
+from springcheck.physics.terms import Column, Damping, Spring, Term, WallSpring
 
 
 class MistakeError(ValueError):
@@ -27,31 +29,25 @@ class _Bodies:
     p: Floats
     kind: Kind
     name: str
+    terms: tuple[Term, ...] = ()
 
 
-MOST_STEPS = 2**53
-"""Numbers of steps up to which each is a double of its own."""
+PLACES = {
+    "step": "time.step",
+    "steps": "time.steps",
+    "every": "record.every",
+    "tolerance": "time.tolerance",
+    "quantities": "record.quantities",
+    "include": "methods.include",
+}
+"""Where a field of a scene stands in its file, for messages."""
 
 
-def scene(table: Any, *, name: str, text: str) -> Scene:
-    """The scene of a `tables.SceneTable`.  Raises MistakeError."""
+def scene(table: Any, *, name: str) -> Scene:
+    """The scene of a `tables.scene_table`.  Raises MistakeError."""
     time = table.time
-    if time.step == 0:
-        raise MistakeError("time.step = 0: a step forwards (> 0) or backwards (< 0) is needed")
-    if time.steps > MOST_STEPS:
-        raise MistakeError(
-            f"time.steps = {time.steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h"
-        )
     if time.every is not None and table.record.every is not None:
         raise MistakeError("record.every and time.every are both given; keep record.every")
-    every = table.record.every or time.every or 1
-    if time.steps % every:
-        raise MistakeError(
-            f"record.every = {every}: time.steps = {time.steps} is no multiple of it, so the end "
-            "would not be recorded"
-        )
-    if not {"q", "p"} <= set(table.record.quantities):
-        raise MistakeError('record.quantities needs "q" and "p"; "energy" may be left out')
     bodies = _bodies(table)
     if table.kind not in (None, bodies.kind):
         raise MistakeError(
@@ -59,26 +55,29 @@ def scene(table: Any, *, name: str, text: str) -> Scene:
             "particles come as [[particle]] or [chain], rotors as [[rotor]], circuits as [[inductor]]"
         )
     units: Units = table.units or ("si" if bodies.kind == "circuit" else "reduced")
-    if bodies.kind == "circuit" and units != "si":
-        raise MistakeError(f"units = {units!r}: a circuit is given in H, F, Ohm, C and Wb; leave units out")
-    return Scene(
-        name=name,
-        title=table.title,
-        source=table.source,
-        units=units,
-        kind=bodies.kind,
-        m=bodies.m,
-        q=bodies.q,
-        p=bodies.p,
-        terms=tuple(_terms(table, bodies)),
-        step=time.step,
-        steps=time.steps,
-        every=every,
-        tolerance=time.tolerance,
-        include=table.methods.include,
-        quantities=table.record.quantities,
-        text=text,
-    )
+    terms = tuple(_terms(table, bodies))
+    try:
+        return Scene(
+            name=name,
+            title=table.title,
+            source=table.source,
+            units=units,
+            kind=bodies.kind,
+            m=bodies.m,
+            q=bodies.q,
+            p=bodies.p,
+            terms=terms,
+            step=time.step,
+            steps=time.steps,
+            every=table.record.every or time.every or 1,
+            tolerance=time.tolerance,
+            include=table.methods.include,
+            quantities=table.record.quantities,
+        )
+    except SceneError as error:
+        field, separator, rest = str(error).partition(" ")
+        head, colon = field.removesuffix(":"), ":" if field.endswith(":") else ""
+        raise MistakeError(f"{PLACES.get(head, head)}{colon}{separator}{rest}") from error
 
 
 def _bodies(table: Any) -> _Bodies:
@@ -91,7 +90,8 @@ def _bodies(table: Any) -> _Bodies:
         raise MistakeError(f"[[{given[0]}]] and [[{given[1]}]] are both given; a scene has one kind of them")
     name = given[0]
     if name == "chain":
-        return _standing(table.chain)
+        made = _chain(table.chain)
+        return _Bodies(m=made.m, q=made.q, p=made.p, kind="particles", name=name, terms=made.terms)
     columns = {
         "particle": ("mass", "position", "momentum"),
         "rotor": ("inertia", "angle", "momentum"),
@@ -102,16 +102,26 @@ def _bodies(table: Any) -> _Bodies:
     return _Bodies(m=m, q=q, p=p, kind=kinds[name], name=name)
 
 
-def _standing(chain: tables.ChainTable) -> _Bodies:
-    n = chain.masses
-    q = np.zeros(n)
-    for j, wave in enumerate(chain.wave):
+def _chain(table: tables.ChainTable) -> Scene:
+    """The chain of a [chain]; its time grid is of no account."""
+    n = table.masses
+    if table.wave and (table.position or table.momentum):
+        raise MistakeError("chain.wave is given beside the position or momentum of each mass; keep one")
+    if not (table.wave or table.position or table.momentum):
+        raise MistakeError("chain: its start is needed: [[chain.wave]], or position and momentum")
+    for name in ("position", "momentum"):
+        if len(getattr(table, name)) not in (0, n):
+            raise MistakeError(f"chain.{name}: {len(getattr(table, name))} numbers for {n} masses")
+    for j, wave in enumerate(table.wave):
         if wave.mode > n:
             raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: a chain of {n} masses has {n} modes")
-        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
-        phase = wave.mode * np.arange(1, n + 1) % (2 * (n + 1))
-        q += wave.amplitude * np.sin(np.pi * phase / (n + 1))
-    return _Bodies(m=np.full(n, chain.mass), q=q, p=np.zeros(n), kind="particles", name="chain")
+    waves = [(wave.mode, wave.amplitude) for wave in table.wave] or [(1, 0.0)]
+    try:
+        return builders.chain(
+            n, table.mass, table.stiffness, waves=waves, q=table.position or 0.0, p=table.momentum or 0.0
+        )
+    except SceneError as error:
+        raise MistakeError(f"chain: {error}") from error
 
 
 def _number(value: int, bodies: _Bodies, field: str) -> int:
@@ -123,8 +133,7 @@ def _number(value: int, bodies: _Bodies, field: str) -> int:
 
 
 def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
-    if table.chain is not None:
-        yield from _links(table.chain)
+    yield from bodies.terms
     yield from _springs(table.spring, bodies)
     yield from _capacitors(table, bodies)
     for key, (term, _) in tables.of_terms().items():
@@ -132,16 +141,6 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
         if rows:
             yield _by_columns(term, rows, bodies)
     yield from _friction(table, bodies)
-
-
-def _links(chain: tables.ChainTable) -> Iterator[Term]:
-    ends = np.unique([0, chain.masses - 1])
-    # a chain of one mass hangs on both walls
-    k = np.full(len(ends), chain.stiffness * (2 if chain.masses == 1 else 1))
-    yield WallSpring(i=ends, k=k, at=np.zeros(len(ends)))
-    if chain.masses > 1:
-        a = np.arange(chain.masses - 1)
-        yield Spring(a=a, b=a + 1, k=np.full(len(a), chain.stiffness), rest=np.zeros(len(a)))
 
 
 def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator[Term]:
@@ -203,8 +202,10 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
     """A term from rows of its table: what it acts on, and an array for each column."""
     values = {}
     for column in term.columns:
-        given = np.array([getattr(row, column.name) for row in rows])
-        values[column.field] = 1 / given if column.inverse else given
+        if column.inverse:
+            values[column.field] = np.array([_inverse(term, column, j, row) for j, row in enumerate(rows)])
+        else:
+            values[column.field] = np.array([getattr(row, column.name) for row in rows])
     if len(term.ends) == 1:
         field = f"{term.key}[{{}}].particle"
         chosen = [_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]
@@ -216,6 +217,19 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
     a, b = zip(*(row.ends for row in rows), strict=True)
     joined: Term = term(a=np.array(a), b=np.array(b), **values)
     return joined
+
+
+def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
+    """What the field of an inverse column holds: given as such, or as the inverse of what is given."""
+    given, inverse = getattr(row, column.name), getattr(row, column.field)
+    if given is not None and inverse is not None:
+        raise MistakeError(f"{term.key}[{j}]: {column.name} and its inverse {column.field} are both given")
+    if inverse is not None:
+        return float(inverse)
+    value = column.default if given is None else given
+    if value is None:
+        raise MistakeError(f"{term.key}[{j}] lacks the field {column.name!r}")
+    return float(1 / value)
 
 
 def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Any, Literal, TypeAlias, cast, get_args
+from typing import Annotated, Any, Literal, cast, get_args
 
 import msgspec
 
 from springcheck.physics import terms
-from springcheck.physics.scene import Kind, Units
+from springcheck.physics.scene import Kind, Quantity, Units
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 Count = Annotated[int, msgspec.Meta(ge=1)]
 End = int | Literal["wall"]
-Quantity: TypeAlias = Literal["q", "p", "energy"]
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -55,7 +55,7 @@ class ResistorTable(Table, frozen=True):
     """A resistor of one loop [Ohm]."""
 
     loop: int
-    resistance: Annotated[float, msgspec.Meta(ge=0)]
+    resistance: NonNegative
 
 
 class SpringTable(Table, frozen=True):
@@ -75,7 +75,7 @@ class DampingTable(Table, frozen=True):
     """Friction of one particle: force -coefficient p/mass, coefficient [M/T]."""
 
     particle: int
-    coefficient: Annotated[float, msgspec.Meta(ge=0)]
+    coefficient: NonNegative
 
 
 class WaveTable(Table, frozen=True):
@@ -88,13 +88,16 @@ class WaveTable(Table, frozen=True):
 class ChainTable(Table, frozen=True):
     """Equal masses [M] between two walls, neighbours joined by equal springs [M/T2].
 
-    Positions count from the rest of each mass; at the start the chain stands still in these waves.
+    Positions count from the rest of each mass; the start is a sum of standing waves, or the position and
+    the momentum of each mass.
     """
 
     masses: Count
     mass: Positive
     stiffness: Positive
-    wave: Annotated[tuple[WaveTable, ...], msgspec.Meta(min_length=1)]
+    wave: tuple[WaveTable, ...] = ()
+    position: tuple[float, ...] = ()
+    momentum: tuple[float, ...] = ()
 
 
 class TimeTable(Table, frozen=True):
@@ -139,11 +142,18 @@ class SceneBase(Table, frozen=True):
     record: RecordTable = RecordTable()
 
 
+_SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": NonNegative}
+
+
 def _of_term(term: Any) -> type[Table]:
     """The table of a term: the particle or the two ends on which it acts, and its columns."""
     fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     for column in term.columns:
-        kind = Positive if column.sign == "positive" else float
+        kind: Any = _SIGNS[column.sign]
+        if column.inverse:
+            # given itself, or its inverse under the name of the field
+            fields += [(column.name, kind | None, None), (column.field, kind | None, None)]
+            continue
         fields.append((column.name, kind) if column.default is None else (column.name, kind, column.default))
     table = msgspec.defstruct(f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True)
     return cast(type[Table], table)

@@ -48,7 +48,7 @@ def cells() -> list[Cell]:
         for what, scene in (("a spring", spring), ("friction", braked)):
             if engines.refusal(scene, label) and not engines.absence(label.engine):
                 try:
-                    simulate.run(replace(scene, steps=1), label)
+                    simulate.run(replace(scene, steps=1, every=1), label)
                     answer = None
                 except SpringcheckError as error:
                     answer = str(error)

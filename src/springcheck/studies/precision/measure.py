@@ -145,7 +145,7 @@ def record(
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
-    command = keeper.command("precision", labels, scene.text)
+    command = keeper.command("precision", labels, scene.digest)
     with keeper.kept(path, command, force=force, progress=progress) as kept:
         found = study(scene, labels, budget=budget, kept=kept)
         for summary in found.methods:

@@ -82,7 +82,7 @@ def run(
     path = Path(path)
     labels, left = choose(scene, methods)
     bar = _Bar(progress, len(labels) * (1 + thorough))
-    with keeper.kept(path, keeper.command("run", labels, scene.text), force=force) as kept:
+    with keeper.kept(path, keeper.command("run", labels, scene.digest), force=force) as kept:
         resumed = kept.runs()
         kept.room(scene, len(labels) - len(resumed))
         for label in tuple(labels):

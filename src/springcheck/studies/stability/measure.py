@@ -99,7 +99,7 @@ def record(
     when the file exists or cannot be written.
     """
     labels = engines.match(tuple(methods) or ("*",))
-    command = keeper.command("stability", labels, scene.text)
+    command = keeper.command("stability", labels, scene.digest)
     with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
         study = measure(scene, methods, kept=kept)
         kept.commit("stability", study.document(), scene)

@@ -1,0 +1,113 @@
+"""Scenes from numbers in Python: springs side by side, and chains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springcheck.arrays import Floats
+from springcheck.errors import SceneError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Spring, Term, WallSpring
+
+
+def spring(
+    m: ArrayLike = 1.0,
+    k: ArrayLike = 1.0,
+    q: ArrayLike = 0.0,
+    p: ArrayLike = 1.0,
+    step: float = 0.1,
+    steps: int = 200,
+    *,
+    at: ArrayLike = 0.0,
+    c: ArrayLike = 0.0,
+    fast: bool = False,
+    **rest: Any,
+) -> Scene:
+    """A mass on a spring, or many side by side: numbers, or arrays (n,) of them.
+
+    Masses m [M] at q [L] with momenta p [M L/T], on springs of stiffness k [M/T2] that rest at `at` [L], with
+    friction -c p/m, c [M/T]; `fast` as in `WallSpring`.  The rest are fields of `Scene`.  Raises SceneError.
+
+    >>> spring(m=2.0, k=[1.0, 4.0], p=[1.0, 0.5]).n
+    2
+    """
+    m, k, q, p, at, c = _together(m=m, k=k, q=q, p=p, at=at, c=c)
+    index = np.arange(len(m))
+    terms: list[Term] = [WallSpring(i=index, k=k, at=at, fast=fast)]
+    if np.any(c):
+        terms.append(Damping(i=index, c=c))
+    words = {"name": "spring", "title": "Mass on a spring", **rest}
+    return Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, **words)
+
+
+def chain(
+    masses: int = 10,
+    m: ArrayLike = 1.0,
+    k: ArrayLike = 1.0,
+    *,
+    waves: Sequence[tuple[int, float]] = (),
+    q: ArrayLike = 0.0,
+    p: ArrayLike = 0.0,
+    step: float = 0.1,
+    steps: int = 200,
+    **rest: Any,
+) -> Scene:
+    """Masses in a row between two walls, neighbours joined by springs; positions count from the rest of each.
+
+    m [M] is one number or (masses,), k [M/T2] one number or (masses + 1,), from wall to wall.  The start is
+    q [L] and p [M L/T], plus standing waves given as (mode, amplitude), mode 1 the slowest; a chain with
+    neither swings in mode 1 with amplitude 1.  The rest are fields of `Scene`.  Raises SceneError.
+    """
+    if not isinstance(masses, int) or masses < 1:
+        raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")
+    _, m, q, p = _together(masses=np.zeros(masses), m=m, q=q, p=p)
+    links, walls = _between(masses, np.asarray(k, np.float64))
+    if not (len(waves) or np.any(q) or np.any(p)):
+        waves = [(1, 1.0)]
+    words = {"name": "chain", "title": f"Chain of {masses:,} masses between two walls", **rest}
+    return Scene(
+        m=m,
+        q=q + standing(masses, waves),
+        p=p,
+        terms=(walls, links),
+        step=step,
+        steps=steps,
+        **words,
+    )
+
+
+def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
+    """The springs of a chain: those between neighbours, and those to the two walls."""
+    row = np.arange(masses - 1)
+    ends, none = np.unique([0, masses - 1]), np.zeros(masses - 1)
+    if k.ndim == 0:
+        # a chain of one mass hangs on both walls
+        walls = WallSpring(i=ends, k=np.full(len(ends), k * (2 if masses == 1 else 1)), at=0.0 * ends)
+        return Spring(a=row, b=row + 1, k=none + k, rest=none), walls
+    if k.shape != (masses + 1,):
+        raise SceneError(f"k has the shape {k.shape}: a chain of {masses} masses has {masses + 1} springs")
+    walls = WallSpring(i=np.array([0, masses - 1]), k=k[[0, -1]], at=np.zeros(2))
+    return Spring(a=row, b=row + 1, k=k[1:-1], rest=none), walls
+
+
+def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
+    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses."""
+    q = np.zeros(masses)
+    for mode, amplitude in waves:
+        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
+        phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
+        q += amplitude * np.sin(np.pi * phase / (masses + 1))
+    return q
+
+
+def _together(**given: ArrayLike) -> list[Floats]:
+    try:
+        rows = [np.atleast_1d(np.asarray(values, np.float64)) for values in given.values()]
+        return [np.array(row) for row in np.broadcast_arrays(*rows)]
+    except (TypeError, ValueError):
+        shapes = ", ".join(f"{name} {np.shape(values)}" for name, values in given.items())
+        raise SceneError(f"numbers that do not broadcast together: {shapes}") from None

@@ -1,0 +1,161 @@
+"""From a `Scene` to the text of a scene file, so that reading it back gives exactly the same numbers."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.physics.builders import standing
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.physics.terms import Damping, Spring, WallSpring
+
+BODIES = {
+    "particles": ("particle", "mass", "position", "momentum"),
+    "rotor": ("rotor", "inertia", "angle", "momentum"),
+    "circuit": ("inductor", "inductance", "charge", "flux"),
+}
+"""For each kind of scene the table of what moves, and its names of m, q and p."""
+MOST_WAVES = 64
+"""Standing waves up to which the start of a chain is written as such."""
+
+
+def text(scene: Scene) -> str:
+    """The scene file of a scene."""
+    head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
+    lines = [_assigned(head)]
+    is_chain = (
+        scene.kind == "particles" and scene.n > 1 and scene.system.is_uniform_chain and _rests_at_0(scene)
+    )
+    if is_chain:
+        lines += _chain(scene)
+    else:
+        table, *names = BODIES[scene.kind]
+        for row in zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True):
+            lines.append(_table(f"[[{table}]]", zip(names, row, strict=True)))
+    for term in scene.terms:
+        if not (is_chain and isinstance(term, WallSpring | Spring)):
+            lines += _rows(scene, term)
+    time = {"step": scene.step, "steps": scene.steps, "tolerance": scene.tolerance}
+    lines.append(_table("[time]", time.items()))
+    lines.append(_table("[methods]", [("include", list(scene.include))]))
+    record = {"every": scene.every, "quantities": list(scene.quantities)}
+    lines.append(_table("[record]", record.items()))
+    return "\n".join(lines) + "\n"
+
+
+def _rests_at_0(scene: Scene) -> bool:
+    """Whether the springs of a chain have the rests that [chain] stands for."""
+    springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
+    return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
+
+
+def _chain(scene: Scene) -> Iterator[str]:
+    k = next(term.k for term in scene.terms if isinstance(term, Spring))
+    known: dict[str, Any] = {"masses": scene.n, "mass": scene.m[0], "stiffness": k[0]}
+    waves = None if np.any(scene.p) else _waves(scene.q)
+    if waves is None:
+        known |= {"position": scene.q.tolist(), "momentum": scene.p.tolist()}
+    yield _table("[chain]", known.items())
+    for mode, amplitude in waves or ():
+        yield _table("[[chain.wave]]", [("mode", mode), ("amplitude", amplitude)])
+
+
+def _waves(q: Floats) -> list[tuple[int, float]] | None:
+    """The few standing waves (mode, amplitude) whose sum is q to the last bit; None where there are none."""
+    n = len(q)
+    odd = np.concatenate([[0.0], q, [0.0], -q[::-1]])
+    amplitudes = -np.fft.rfft(odd).imag[1 : n + 1] / (n + 1)
+    size = np.max(np.abs(amplitudes))
+    if not np.isfinite(size) or size == 0:
+        return None
+    large = np.flatnonzero(np.abs(amplitudes) > 1e-12 * size)
+    if len(large) > min(MOST_WAVES, n // 2 + 1):
+        return None
+    # an amplitude that was written down has few digits
+    for digits in (3, 6, 9, 12, 15, 17):
+        found = [(int(j) + 1, float(f"{amplitudes[j]:.{digits}g}")) for j in large]
+        orders: Any = itertools.permutations(found) if len(found) <= 4 else (found, found[::-1])
+        for waves in orders:
+            if np.array_equal(standing(n, waves), q):
+                return list(waves)
+    return None
+
+
+def _rows(scene: Scene, term: Term) -> Iterator[str]:
+    if isinstance(term, Damping):
+        name = (
+            ("[[resistor]]", "loop", "resistance")
+            if scene.kind == "circuit"
+            else ("[[damping]]", "particle", "coefficient")
+        )
+        for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+            yield _table(name[0], [(name[1], i), (name[2], c)])
+    elif isinstance(term, WallSpring | Spring) and scene.kind == "circuit" and _are_capacitors(term):
+        for loops, k in zip(
+            zip(*(x.tolist() for x in term.particles), strict=True), term.k.tolist(), strict=True
+        ):
+            yield _table("[[capacitor]]", [("loops", list(loops)), ("capacitance", 1 / k)])
+    elif isinstance(term, WallSpring):
+        for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+            yield _spring(["wall", i], k, 0.0, at, fast=term.fast)
+    elif isinstance(term, Spring):
+        for a, b, k, rest in zip(
+            term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True
+        ):
+            yield _spring([a, b], k, rest, 0.0, fast=term.fast)
+    else:
+        yield from _by_columns(term)
+
+
+def _are_capacitors(term: WallSpring | Spring) -> bool:
+    """Whether every row is V = q**2 / 2C with a C whose inverse is the stiffness to the last bit."""
+    with np.errstate(divide="ignore", over="ignore"):
+        capacitance = 1 / term.k
+        exact = (term.k > 0) & (capacitance > 0) & np.isfinite(capacitance) & (1 / capacitance == term.k)
+    return bool(np.all(exact)) and not (term.fast or np.any(getattr(term, term.origin)))
+
+
+def _spring(ends: Sequence[Any], k: float, rest: float, wall: float, *, fast: bool) -> str:
+    row: dict[str, Any] = {"ends": ends, "stiffness": k}
+    row |= {"rest": rest} if rest else {}
+    row |= {"wall": wall} if wall else {}
+    return _table("[[spring]]", (row | ({"fast": True} if fast else {})).items())
+
+
+def _by_columns(term: Term) -> Iterator[str]:
+    for j, ends in enumerate(zip(*(index.tolist() for index in term.particles), strict=True)):
+        row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": list(ends)}
+        for column in term.columns:
+            value = float(getattr(term, column.field)[j])
+            inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0
+            # the inverse of the inverse is often, not always, the number again
+            if inverse and 1 / inverse == value:
+                row[column.name] = inverse
+            else:
+                row[column.field if column.inverse else column.name] = value
+        yield _table(f"[[{term.key}]]", row.items())
+
+
+def _table(head: str, items: Any) -> str:
+    return f"\n{head}\n{_assigned(dict(items))}"
+
+
+def _assigned(values: dict[str, Any]) -> str:
+    return "".join(f"{name} = {_value(value)}\n" for name, value in values.items()).rstrip("\n")
+
+
+def _value(value: Any) -> str:
+    """A value in TOML: numbers by repr, which reads back to the last bit."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return f"[{', '.join(_value(one) for one in value)}]"
+    return repr(value) if isinstance(value, int) else repr(float(value))
