@@ -111,11 +111,11 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
     """Derivatives of the exact flow from the start to `TIMES` times, in units of the energy norm: (f, [n,]
     d, d).
 
-    None for more joined particles than are worth it.
+    None where no exact solution is known, and for more joined particles than are worth it.
     """
     scene, n = case.scene, case.scene.n
     separate = scene.system.is_separate
-    if not separate and n > JOINED:
+    if scene.system.solution is None or (not separate and n > JOINED):
         return None
     unit = _units(case)
     h = duration / TIMES
@@ -133,6 +133,8 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
             q, p = scene.q + sign * amount * moves, scene.p + sign * amount * (not moves)
             moved = replace(scene, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
             changes.append((moved.q, moved.p))
+            if not exact.has_true_motion(moved):
+                return None
             ends.append(exact.true_motion(moved, steps, h))
         # by what the doubles really differ
         change = (changes[0][0] - changes[1][0]) if moves else (changes[0][1] - changes[1][1])
