@@ -18,8 +18,8 @@ Expected (smallest relative size that any check sees on one spring, h w = 0.09, 
 import sys
 
 from arguments import arguments
-from springcheck import engines, simulate
-from springcheck.studies.faults.measure import ENGINES, study
+from springcheck import simulate
+from springcheck.studies.faults.measure import judged_labels, study
 from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.team import Processes
 
@@ -38,8 +38,7 @@ def table(found: FaultReport) -> list[str]:
 def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
     arguments(__doc__)
-    labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
-    found = study(simulate.run, labels, team=Processes(2))
+    found = study(simulate.run, judged_labels(), team=Processes(2))
     for line in table(found):
         print(line)
     clean = found.clean

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError
 from springcheck.studies import STUDIES
-from springcheck.studies.study import Study
+from springcheck.studies.study import Study, engine_option
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -38,6 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
     interrupts.announce(f"interrupted; {what}")
     try:
+        if getattr(options, "engine", None):
+            from springcheck import doors
+
+            doors.bring(options)
         return command(options)
     except KeyboardInterrupt:
         return _interrupted(what)
@@ -129,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     export.set_defaults(command=_export)
 
     listing = commands.add_parser("list", help="scenes, engines with their versions, checks")
+    engine_option(listing)
     listing.add_argument("--json", action="store_true", help="one JSON document on standard output")
     listing.set_defaults(command=_list)
     return parser

@@ -14,6 +14,7 @@ def listing() -> dict[str, Any]:
     return {
         "scenes": [{"name": name, "title": scenes.load_scene(name).title} for name in scenes.names()],
         "engines": [_engine(name) for name in engines.names()],
+        "unusable_engines": engines.unusable(),
         "checks": [{"name": check.name, "sentence": check.sentence} for check in checks.ALL],
     }
 
@@ -26,12 +27,14 @@ def _engine(name: str) -> dict[str, Any]:
         "title": found.title,
         "version": None if absence else engines.installed_version(name),
         "absence": absence,
+        "origin": str(engines.origin(name)),
         "platforms": list(found.platforms),
         "methods": [
             {
                 "method": f"{name}:{method.name}",
-                "scheme": schemes.SCHEMES[method.scheme].title,
+                "scheme": schemes.title(method.scheme),
                 "about": method.about,
+                "default": method.default,
             }
             for method in found.methods.values()
         ],
@@ -46,12 +49,14 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
         yield f"  {scene['name']:{width}}  {scene['title']}"
     yield "Engines and methods"
     for engine in found["engines"]:
-        yield f"  {engine['title']} {engine['version']}" if engine["version"] else f"  {engine['absence']}"
+        here = f"{engine['title']} {engine['version']}".strip()
+        yield f"  {engine['absence'] or here}, from {engine['origin']}"
         for method in engine["methods"]:
             yield f"    {method['method']:26}  {method['about']}"
         if engine["platforms"]:
             yield f"    platforms, as METHOD@PLATFORM: {', '.join(engine['platforms'][:4])}"
             yield f"      {', '.join(engine['platforms'][4:])}"
+    yield from (f"  {reason}" for reason in found["unusable_engines"].values())
     yield "Checks"
     for check in found["checks"]:
         yield f"  {check['name']:14}  {check['sentence']}"

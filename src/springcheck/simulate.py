@@ -83,14 +83,15 @@ def play(
     driver = engines.load(label.engine)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
-    simulation = driver.start(ahead, method, label, scene.step)
+    simulation = engines.start(ahead, label)
     start_seconds = perf_counter() - began
 
     with_energy = "energy" in scene.quantities
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
-    q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
+    # an engine that fills nothing must not pass for one that has
+    q, p = np.full((rows, scene.n), np.nan), np.full((rows, scene.n), np.nan)
     q[0], p[0] = scene.q, scene.p
     _hand_over(scene, sink, 0, q[:1], p[:1], with_energy)
     run_seconds = 0.0
@@ -98,7 +99,7 @@ def play(
     frame = 1
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
-        part = _Part(simulation, scene.every, piece, progress)
+        part = _Part(label, simulation, scene.every, piece, progress)
         status, good, message, seconds = part.advance(q[:f], p[:f])
         run_seconds += seconds
         ready = min(rows, 4 * ready) if seconds < QUICK else ready
@@ -138,6 +139,7 @@ Ending = Literal["complete", "diverged", "stopped"]
 class _Part:
     """One chunk of a run on its way."""
 
+    label: Label
     simulation: Simulation
     every: int
     piece: int
@@ -152,7 +154,7 @@ class _Part:
         began = perf_counter()
         try:
             if self.piece == self.every:
-                self.simulation.advance(self.every, q, p)
+                engines.guarded(self.label, self.simulation.advance, self.every, q, p)
             else:
                 self._in_pieces(q, p)
         except Stopped as stop:
@@ -172,7 +174,9 @@ class _Part:
             while left:
                 steps = min(left, self.piece)
                 try:
-                    self.simulation.advance(steps, q[row : row + 1], p[row : row + 1])
+                    engines.guarded(
+                        self.label, self.simulation.advance, steps, q[row : row + 1], p[row : row + 1]
+                    )
                 except Stopped as stop:
                     raise Stopped(row, str(stop)) from stop
                 left -= steps
@@ -280,10 +284,11 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     Raises:
         Stopped: the engine gave up.
     """
-    driver, method = engines.load(label.engine), engines.method(label)
+    method = engines.method(label)
+    engines.load(label.engine)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
-    simulations = [driver.start(ahead, method, label, scene.step) for _ in range(copies)]
+    simulations = [engines.start(ahead, label) for _ in range(copies)]
     start_seconds = perf_counter() - began
     every = 1 if read else scene.steps
     rows = min(CHUNK // scene.n or 1, scene.steps // every)

@@ -48,7 +48,7 @@ class Bench:
     @property
     def scheme(self) -> schemes.Scheme:
         """The scheme that the method claims to run."""
-        return schemes.SCHEMES[self.forwards.scheme]
+        return schemes.scheme(self.forwards.scheme)
 
     @cached_property
     def copies(self) -> tuple[Case, Floats]:

@@ -32,7 +32,7 @@ class Case:
     @property
     def scheme(self) -> schemes.Scheme:
         """The scheme that the method claims to run."""
-        return schemes.SCHEMES[self.trajectory.scheme]
+        return schemes.scheme(self.trajectory.scheme)
 
     @cached_property
     def judged(self) -> Scene:

@@ -63,7 +63,7 @@ def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     slow, fast = scene.system.slow, scene.system.fast
-    kicks = [stage for stage in scheme.stages if stage[0] not in ("drift", "friction")]
+    kicks = [stage for stage in scheme.stages if stage[0] not in ("drift", "held", *schemes.FRICTION)]
     kicks = kicks or [("kick", Fraction(1)) for _ in scheme.b]
     acting = {"slow": slow, "fast": fast}
     joined = not scene.system.is_separate

@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from enum import Enum
+from importlib import import_module
+from typing import Any, Literal, Protocol
 
 from springcheck.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.schemes import Scheme
+
+
+class Need(Enum):
+    """What a scene must have for a method to be worth running; the value is the phrase for a report."""
+
+    DAMPING = "damping"
+    FAST_SPRINGS = "springs marked fast"
+
+    def met_by(self, scene: Scene) -> bool:
+        """Whether the scene has it."""
+        if self is Need.DAMPING:
+            return any(term.key == "damping" for term in scene.terms)
+        return any(term.fast for term in scene.terms)
+
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function, whatever its law."""
@@ -15,17 +34,25 @@ ANY_POTENTIAL = "any potential"
 class Method:
     """A method that an engine can run, as the engine declares it without its library being imported."""
 
-    engine: str
     name: str
     scheme: str
+    """A scheme of the catalogue, or one that the engine brings."""
     about: str
+    """One line for `springcheck list`: what of the library is called."""
     adaptive: bool = False
-    terms: frozenset[str] = frozenset({"spring"})
+    """Whether it chooses its steps by the scene's tolerance; `scheme` then has no one-step map."""
+    default: bool = True
+    """Whether `*` names it, which is what a scene runs by unless it says otherwise.  Methods that are not
+    default are run by name, or by a glob that names their engine."""
+    terms: frozenset[str] = frozenset({"wall-spring", "spring"})
+    """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})
-    requires: frozenset[str] = frozenset()
-    """What a scene must have for the method to be worth running: term keys, or "springs marked fast"."""
+    """Kinds of scenes that it moves: particles, circuit, rotor."""
+    requires: frozenset[Need] = frozenset()
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
+    one_friction: bool = False
+    """One friction rate serves all particles of a run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +91,10 @@ class Label:
 
 
 class Simulation(Protocol):
-    """A started engine.  It moves and does nothing else: the driver records, times and judges."""
+    """A started engine.  It moves and does nothing else: the driver records, times and judges.
+
+    An engine in three dimensions may have an attribute `off_axis`, the largest |y| or |z| that it has seen.
+    """
 
     @property
     def force_calls(self) -> int:
@@ -85,3 +115,81 @@ class Stopped(Exception):  # noqa: N818 - an outcome, not an error
     def __init__(self, rows: int, message: str) -> None:
         super().__init__(message)
         self.rows = rows
+
+
+def _double(label: Label) -> Arithmetic:
+    """IEEE double precision throughout."""
+    return Arithmetic()
+
+
+def _synchronised(method: Method) -> str:
+    """Velocities of the same times as the positions."""
+    return "synchronised"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Engine:
+    """An engine, declared without its library being imported: only `start` and `version` may do that."""
+
+    name: str
+    """Also the name of its entry point."""
+    title: str
+    methods: Mapping[str, Method]
+    """By name; see `named`."""
+    start: Callable[[Scene, Method, Label, float], Simulation]
+    """start(scene, method, label, step): the engine at the scene's start.  The step may be negative."""
+    version: Callable[[], Mapping[str, str]]
+    """Versions of the library and of what it stands on, by name."""
+    arithmetic: Callable[[Label], Arithmetic] = _double
+    convention: Callable[[Method], str] = _synchronised
+    """How the library stores velocities, as a phrase for the report."""
+    distribution: str = ""
+    """Its library's name on the package index, or "" where it needs none."""
+    module: str = ""
+    """The module whose absence means that the library is missing; the name of the distribution by default."""
+    extra: str = ""
+    """The extra of springcheck that installs the library, where there is one."""
+    platforms: tuple[str, ...] = ()
+    """Platforms and precisions that a label may name, as `platform` or `platform-precision`."""
+    schemes: tuple[Scheme, ...] = ()
+    """Schemes that are not in the catalogue."""
+    atlas: tuple[str, ...] = ()
+    """Methods on platforms, as `method@platform`, that the atlas of extremes measures beside the methods."""
+    step_seconds: float = 1e-6
+    """What a step of one particle takes, about: studies plan their longest runs by it."""
+    squares_lengths: bool = False
+    """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half the range of
+    exponents is left."""
+    internal_steps: Callable[..., Any] | None = None
+    """internal_steps(scene, method, most=): what an adaptive solver does on its way, counted."""
+
+    @property
+    def install(self) -> str:
+        """The command that installs the library."""
+        what = f"'springcheck[{self.extra}]'" if self.extra else self.distribution
+        return f"python -m pip install {what}"
+
+    @property
+    def imports(self) -> str:
+        """The module that must be there, or ""."""
+        return self.module or self.distribution.replace("-", "_")
+
+
+def named(*methods: Method) -> dict[str, Method]:
+    """Methods by name, as `Engine` takes them."""
+    return {method.name: method for method in methods}
+
+
+def deferred(module: str) -> dict[str, Any]:
+    """`start`, `version`, `arithmetic` and `convention` of a module that imports a library.
+
+    The module is imported as the first of them is called.
+    """
+
+    def of(name: str) -> Callable[..., Any]:
+        def call(*arguments: object) -> Any:
+            return getattr(import_module(module), name)(*arguments)
+
+        return call
+
+    return {name: of(name) for name in ("start", "version", "arithmetic", "convention")}

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from springcheck import store
+from springcheck import schemes, store
 from springcheck.arrays import Floats, Integers
-from springcheck.errors import StoreError
+from springcheck.errors import MethodError, StoreError
 from springcheck.identify.report import identify
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
-from springcheck.schemes import SCHEMES
 
 MOST_FRAMES = 20_000
 """Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""
@@ -73,8 +72,12 @@ def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator
 
 
 def _adaptive(run: store.Run) -> str:
-    scheme = SCHEMES.get(str(run.parameters.get("scheme", "")))
-    return scheme.title if scheme is not None and not (scheme.one_step or scheme.flow) else ""
+    try:
+        scheme = schemes.scheme(str(run.parameters.get("scheme", "")))
+    except MethodError:
+        # of an engine that is not here
+        return ""
+    return "" if scheme.one_step or scheme.flow else scheme.title
 
 
 def _foreign(path: Path, wanted: str | None) -> Iterator[States]:

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from springcheck.schemes.catalogue import SCHEMES, Coefficient, Scheme, Stage, number
+from springcheck.schemes.catalogue import (
+    FRICTION,
+    SCHEMES,
+    Coefficient,
+    Scheme,
+    Stage,
+    number,
+)
 from springcheck.schemes.linear import (
     Rotation,
     amplification,
@@ -13,14 +20,19 @@ from springcheck.schemes.linear import (
     propagator,
     rotation,
 )
+from springcheck.schemes.lookup import bring, scheme, title
 from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
     "Coefficient",
+    "FRICTION",
     "Scheme",
     "SCHEMES",
     "Stage",
+    "bring",
+    "scheme",
+    "title",
     "number",
     "step",
     "magnitude_step",

@@ -21,12 +21,18 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 Coefficient: TypeAlias = Fraction | str
-Stage: TypeAlias = tuple[Literal["kick", "drift", "pull", "friction", "slow", "fast"], Coefficient]
-"""What is done for a fraction of the step: a kick by all forces at the present q and p, a drift, a pull
-by the forces of the potential alone, the exact decay of p by friction alone, or a kick by the slow or
-by the fast springs alone."""
+Kind: TypeAlias = Literal["kick", "held", "drift", "pull", "friction", "implicit-friction", "slow", "fast"]
+Stage: TypeAlias = tuple[Kind, Coefficient]
+"""What is done for a fraction of the step: a kick by all forces at the present q and p, a kick by the force
+of the kick before, which is not evaluated anew, a drift, a pull by the forces of the potential alone, the
+exact decay of p by friction alone, its decay by implicit Euler, or a kick by the slow or by the fast springs
+alone."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
+
+
+FRICTION = frozenset({"friction", "implicit-friction"})
+"""Stages that act by friction alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +53,8 @@ class Scheme:
     a: tuple[tuple[Fraction, ...], ...] = ()
     b: tuple[Fraction, ...] = ()
     flow: bool = False
+    convergence: Fraction | None = None
+    """Of an adaptive solver: the power of its tolerance with which its error falls, on a smooth motion."""
     source: str = ""
 
     @property
@@ -66,7 +74,9 @@ class Scheme:
         for kind, _ in self.stages:
             if kind == "drift":
                 reach = max(reach, int(kicked))
-            elif kind != "friction":
+            elif kind == "held":
+                kicked = True
+            elif kind not in FRICTION:
                 reach, kicked = 2 if reach else 0, True
         uses = np.array(self.a, dtype=np.float64)
         # a stage takes its position from velocities, and these from the forces of stages before
@@ -282,6 +292,7 @@ _ALL = (
         order=0,
         limit=np.inf,
         symplectic=False,
+        convergence=Fraction(12, 13),
         source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
     ),
     Scheme(
@@ -290,6 +301,7 @@ _ALL = (
         order=0,
         limit=np.inf,
         symplectic=False,
+        convergence=Fraction(5, 6),
         source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
     ),
     Scheme(

@@ -52,6 +52,7 @@ def magnitude_step(
     each = iter(met)
     if scheme.stages:
         stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
+        last = np.zeros_like(p)
         for kind, c in stages:
             if kind == "drift":
                 q = q + c * size * p / m
@@ -60,10 +61,16 @@ def magnitude_step(
                 # below p forwards in time; backwards p grows first
                 x = np.zeros_like(m) if rate is None else -c * direction * size * rate
                 p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
+            elif kind == "implicit-friction":
+                # backwards in time 1 - h c/m cancels
+                x = np.zeros_like(m) if rate is None else c * direction * size * rate
+                p = p * (1 + np.abs(x)) / np.abs(1 + x)
             else:
-                here = next(each, None)
-                bound = acting(kind, magnitude, parts) if here is None else here.magnitude
-                p = p + c * size * bound(q, np.zeros_like(p) if kind == "pull" else p)
+                if kind != "held":
+                    here = next(each, None)
+                    bound = acting(kind, magnitude, parts) if here is None else here.magnitude
+                    last = bound(q, np.zeros_like(p) if kind == "pull" else p)
+                p = p + c * size * last
         return q, p
     forces: list[Reals] = []
     velocities: list[Reals] = []
@@ -165,11 +172,14 @@ def _product(matrix: Reals, x: Reals) -> Reals:
     return np.asarray(np.sum(np.where(np.isnan(terms), 0, terms), axis=-1))
 
 
+ROUNDINGS = {"drift": 3, "friction": 3, "implicit-friction": 3, "held": 2}
+
+
 def roundings(scheme: Scheme) -> int:
     """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4.
 
-    Friction takes 3: its exponent, the exponential and the product.
+    Friction takes 3: its exponent, the exponential and the product, or the sum and the quotient.
     """
     if scheme.stages:
-        return 4 + sum(3 if kind in ("drift", "friction") else 6 for kind, _ in scheme.stages)
+        return 4 + sum(ROUNDINGS.get(kind, 6) for kind, _ in scheme.stages)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

@@ -48,16 +48,21 @@ def step(
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
+        last = np.zeros_like(p)
         for kind, c in scheme.stages:
             ch = number(c, width) * h
             if kind == "drift":
                 q = q + ch * (p / m)
             elif kind == "friction":
                 p = p if rate is None else p * np.exp(-ch * rate.astype(width))
+            elif kind == "implicit-friction":
+                p = p if rate is None else p / (1 + ch * rate.astype(width))
             else:
-                if met is not None:
-                    met.append(q)
-                p = p + ch * acting(kind, force, parts)(q, p)
+                if kind != "held":
+                    if met is not None:
+                        met.append(q)
+                    last = acting(kind, force, parts)(q, p)
+                p = p + ch * last
         return q, p
     if not scheme.b:
         raise ValueError(f"{scheme.name} has no step that a force alone defines")

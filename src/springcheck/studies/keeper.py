@@ -237,6 +237,9 @@ def origin(labels: Iterable[Label]) -> dict[str, str]:
         distribution = engines.engine(name).distribution
         if distribution and engines.absence(name) is None:
             found[distribution] = engines.installed_version(name)
+        where = engines.origin(name)
+        if where.package != engines.OURS:
+            found[where.package] = where.version
     return found
 
 

@@ -91,8 +91,20 @@ def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:
         metavar="LABEL",
         help="engine:method[@platform[-precision]] or a glob such as 'own:*'; repeatable",
     )
+    engine_option(parser)
     parser.add_argument("--force", action="store_true", help="write an existing store anew")
     report_options(parser)
+
+
+def engine_option(parser: ArgumentParser) -> None:
+    """Engines that a call brings."""
+    parser.add_argument(
+        "--engine",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="an engine of your own, for this call; repeatable",
+    )
 
 
 def report_options(parser: ArgumentParser) -> None:

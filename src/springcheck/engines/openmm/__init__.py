@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from springcheck.engines import Engine
-from springcheck.engines.contract import Method
+from springcheck.engines.contract import Engine, Method, Need, deferred, named
 
 _TERMS = frozenset({"wall-spring", "spring", "quartic", "cosine", "morse"})
 
@@ -20,16 +19,17 @@ def _method(
     rebuilds: bool = False,
     lacks: str = "",
     terms: str = "",
-    requires: str = "",
+    requires: Need | None = None,
+    one_friction: bool = False,
 ) -> Method:
     return Method(
-        engine="openmm",
         name=name,
         scheme=scheme,
         about=about,
         terms=_TERMS - {lacks} | ({terms} if terms else set()),
         requires=frozenset({requires} if requires else ()),
         rebuilds_velocity=rebuilds,
+        one_friction=one_friction,
     )
 
 
@@ -37,28 +37,27 @@ ENGINE = Engine(
     name="openmm",
     title="OpenMM",
     distribution="openmm",
-    module="openmm",
     platforms=_PLATFORMS,
-    methods={
-        method.name: method
-        for method in (
-            _method(
-                "verlet", "velocity-verlet", "VerletIntegrator, started and read synchronised", rebuilds=True
-            ),
-            _method("leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", rebuilds=True),
-            # its growing motion would turn a Morse bond over, of which OpenMM knows only the length
-            _method("euler", "explicit-euler", "explicit Euler by CustomIntegrator", lacks="morse"),
-            _method("semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator"),
-            _method(
-                "langevin-middle",
-                "langevin-middle",
-                "LangevinMiddleIntegrator at T = 0, started and read synchronised",
-                terms="damping",
-                requires="damping",
-            ),
-            _method(
-                "mts", "respa8", "MTSIntegrator, fast springs 8 times a step", requires="springs marked fast"
-            ),
-        )
-    },
+    methods=named(
+        _method(
+            "verlet", "velocity-verlet", "VerletIntegrator, started and read synchronised", rebuilds=True
+        ),
+        _method("leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", rebuilds=True),
+        # its growing motion would turn a Morse bond over, of which OpenMM knows only the length
+        _method("euler", "explicit-euler", "explicit Euler by CustomIntegrator", lacks="morse"),
+        _method("semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator"),
+        _method(
+            "langevin-middle",
+            "langevin-middle",
+            "LangevinMiddleIntegrator at T = 0, started and read synchronised",
+            terms="damping",
+            requires=Need.DAMPING,
+            one_friction=True,
+        ),
+        _method("mts", "respa8", "MTSIntegrator, fast springs 8 times a step", requires=Need.FAST_SPRINGS),
+    ),
+    atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
+    step_seconds=8e-7,
+    squares_lengths=True,
+    **deferred(f"{__name__}.simulation"),
 )

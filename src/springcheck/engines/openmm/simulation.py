@@ -32,7 +32,7 @@ from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, 
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import scheme
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
@@ -156,7 +156,7 @@ def _origins(scene: Scene, method: Method) -> Floats:
         # Gershgorin's bound of the squared frequencies
         w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
-    bounded = SCHEMES[method.scheme].symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
+    bounded = scheme(method.scheme).symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from springcheck.engines import Engine
-from springcheck.engines.contract import ANY_POTENTIAL, Method
+from typing import Any
+
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, deferred, named
 
 
 def _method(name: str, about: str) -> Method:
     return Method(
-        engine="sundials",
         name=name,
         scheme=name,
         about=about,
@@ -18,25 +18,30 @@ def _method(name: str, about: str) -> Method:
     )
 
 
+def _internal_steps(*arguments: Any, **options: Any) -> Any:
+    from springcheck.engines.sundials import simulation
+
+    return simulation.internal_steps(*arguments, **options)
+
+
 ENGINE = Engine(
     name="sundials",
     title="SUNDIALS (scikit-sundae)",
     distribution="scikit-sundae",
     module="sksundae",
-    methods={
-        method.name: method
-        for method in (
-            _method("adams", "CVODE, Adams-Moulton of orders 1 to 12"),
-            _method("bdf", "CVODE, backward differentiation of orders 1 to 5"),
-            Method(
-                engine="sundials",
-                name="ida",
-                scheme="ida",
-                about="IDA: Kirchhoff's laws as they stand, unsolved for the currents",
-                adaptive=True,
-                terms=frozenset({"wall-spring", "spring", "damping"}),
-                kinds=frozenset({"circuit"}),
-            ),
-        )
-    },
+    methods=named(
+        _method("adams", "CVODE, Adams-Moulton of orders 1 to 12"),
+        _method("bdf", "CVODE, backward differentiation of orders 1 to 5"),
+        Method(
+            name="ida",
+            scheme="ida",
+            about="IDA: Kirchhoff's laws as they stand, unsolved for the currents",
+            adaptive=True,
+            terms=frozenset({"wall-spring", "spring", "damping"}),
+            kinds=frozenset({"circuit"}),
+        ),
+    ),
+    step_seconds=6e-5,
+    internal_steps=_internal_steps,
+    **deferred(f"{__name__}.simulation"),
 )

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.engines.contract import Label
+from springcheck import engines
+from springcheck.engines.contract import Label, Need
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Term, WallSpring
 from springcheck.studies.stability.propagators import MASS, STEP
@@ -33,9 +34,9 @@ STRETCH = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
 
 LENGTHS = (1, 10, 1000, 100_000, 1_000_000)
 LONGEST = 100_000_000
-"""Steps of the runs that are judged by their end; LONGEST for the methods in `FAST` alone."""
+"""Steps of the runs that are judged by their end; LONGEST for engines of `FAST_SECONDS` a step alone."""
 
-FAST = frozenset({"own:euler", "own:semi-implicit-euler", "own:implicit-euler"})
+FAST_SECONDS, SLOW_SECONDS = 1e-8, 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,13 +122,13 @@ def _special() -> Iterator[Spec]:
 
 def lengths(label: Label, *, quick: bool = False) -> list[Spec]:
     """Cells that are judged by the end of a long run."""
-    plain = str(label)
+    seconds = engines.engine(label.engine).step_seconds
     steps = list(LENGTHS)
-    if label.engine == "ase":
+    if seconds > SLOW_SECONDS:
         steps = [1, 10, 1000] if quick else [1, 10, 1000, 4000]
     elif label.platform or quick:
         steps = [1, 10, 1000, 10_000]
-    if plain in FAST:
+    if seconds <= FAST_SECONDS and not label.platform:
         steps.append(LONGEST // 100 if quick else LONGEST)
     turns: tuple[float, ...] = (1e-4, 0.01, 0.1, 1.0, 1.9)
     if label.platform and quick:
@@ -164,15 +165,15 @@ def solver_specs(*, quick: bool = False) -> list[Spec]:
     return [x for x in found if x.finite]
 
 
-def scene(cells: list[Spec], label: Label, requires: frozenset[str]) -> Scene:
+def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
     """Cells of one step and one length as a scene of particles side by side."""
     first = cells[0]
     n = len(cells)
     index = np.arange(n)
     m = np.array([x.m for x in cells])
-    fast = "springs marked fast" in requires
+    fast = Need.FAST_SPRINGS in requires
     terms: list[Term] = [WallSpring(i=index, k=np.array([x.k for x in cells]), at=np.zeros(n), fast=fast)]
-    if "damping" in requires:
+    if Need.DAMPING in requires:
         # the method is there for friction: h c/m = 1/80
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):

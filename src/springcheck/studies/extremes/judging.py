@@ -83,7 +83,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     """Intermediates of a step from (q, p) to its exact successor (q2, p2).
 
     Whatever order an engine works in, it forms positions, momenta, velocities, forces, accelerations and
-    the changes that they make.  OpenMM also forms 1/m, 1/h, and the square of a bond's length.
+    the changes that they make.  An engine that squares lengths of bonds also forms 1/m and 1/h.
     """
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
@@ -92,7 +92,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
     parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]
-    if label.engine == "openmm":
+    if engines.engine(label.engine).squares_lengths:
         parts += [np.broadcast_to(part, x.shape) for part in (1 / m, m, h, 1 / h)]
         # the length of a bond is the root of a square, and the force is divided by it
         parts += [x * x, y / m * (y / m) * h * h]

@@ -29,9 +29,12 @@ from springcheck.studies.stability import propagators
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
 
-ALL = ("*", "openmm:verlet@CPU", "openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed",
-       "openmm:verlet@OpenCL-double")  # fmt: skip
-"""Every method on its first platform, and the platforms."""
+
+def everything() -> tuple[str, ...]:
+    """Every method on its first platform, and the platforms that engines declare for the atlas."""
+    places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
+    return ("*", *places)
+
 
 CALM = (0.01, 1.9)
 """h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
@@ -52,7 +55,7 @@ def measure(
     """
     usable = []
     left_out = []
-    for label in engines.match(tuple(methods) or ALL):
+    for label in engines.match(tuple(methods) or everything()):
         reason = _absence(label)
         if reason is None:
             usable.append(label)
@@ -96,7 +99,7 @@ def record(
     An unfinished atlas of the same command is taken up.  Raises StoreError, before anything is measured,
     when the file exists or cannot be written.
     """
-    labels = engines.match(tuple(methods) or ALL)
+    labels = engines.match(tuple(methods) or everything())
     size = "quick" if quick else "whole"
     command = keeper.command("extremes", labels, size)
     with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:

@@ -28,11 +28,11 @@ MOST = 20_000
 def solve(label: Label, spec: Spec) -> Cell:
     """One cell by an adaptive solver, judged at its end."""
     scene = grid.scene([spec], label, frozenset())
-    driver: Any = engines.load(label.engine)
+    solver = engines.internal_steps(label)
     said, value, bound, whole, untold = "", np.nan, np.nan, False, ""
     with np.errstate(all="ignore"):
         try:
-            done = driver.internal_steps(scene, engines.method(label), most=MOST)
+            done = solver(scene, engines.method(label), most=MOST)
         except Stopped as stop:
             said = f"; it says: {stop}"
         else:
@@ -112,8 +112,7 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         if run.outcome.status != "complete":
             # the driver ends a run at the last finite frame; the next one is out of range by theory
             high = judging.RANGES["double"][1]
-            # OpenMM squares the length of a bond
-            room = (0.5 if label.engine == "openmm" else 1) * np.log(high) - np.log(
+            room = (0.5 if engines.engine(label.engine).squares_lengths else 1) * np.log(high) - np.log(
                 max(abs(spec.q), abs(spec.p))
             )
             left = growth * (run.outcome.step + scene.every) > room

@@ -57,8 +57,6 @@ SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law
 """Experiments that do not look at the scene, and take most of the time."""
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
-ENGINES = ("own:*", "openmm:*", "ase:*")
-"""Methods of fixed step whose right runs are judged too."""
 BY_ENGINES = 40
 """Random scenes for each method of the engines."""
 SMALLEST, LARGEST = 1e-20, 0.3
@@ -197,10 +195,18 @@ def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Ex
     )
 
 
+def judged_labels() -> list[str]:
+    """Default methods of fixed step that are here: their right runs are judged too."""
+    return [
+        str(label)
+        for label in engines.match(("*",))
+        if engines.absence(label.engine) is None and not engines.method(label).adaptive
+    ]
+
+
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
-    labels = [str(label) for label in engines.match(ENGINES) if engines.absence(label.engine) is None]
-    return study(simulate.run, labels, team=teams.of(options), progress=progress)
+    return study(simulate.run, judged_labels(), team=teams.of(options), progress=progress)
 
 
 def study(

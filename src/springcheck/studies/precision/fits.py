@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from springcheck import schemes
 from springcheck.engines.contract import Arithmetic, Method
-from springcheck.schemes import SCHEMES
 from springcheck.studies.precision.points import Point
 
 ASYMPTOTIC = 2e-2
@@ -106,7 +106,7 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     step turns the same way every time, eps N.  Parameters kept in single precision detune the motion by
     their own eps, whatever the step.
     """
-    scheme = SCHEMES[method.scheme]
+    scheme = schemes.scheme(method.scheme)
     if not scheme.one_step or angle <= 0:
         return None
     eps = 2 * max(arithmetic.state, 2.0**-53)

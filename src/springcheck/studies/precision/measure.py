@@ -26,7 +26,7 @@ from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import Keeper
@@ -203,7 +203,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         known,
         scene.step,
         scene.every,
-        scheme=SCHEMES[sweep.method.scheme],
+        scheme=scheme(sweep.method.scheme),
         judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
     )
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)

@@ -9,11 +9,10 @@ from time import perf_counter
 
 import numpy as np
 
-from springcheck import engines, simulate
+from springcheck import engines, schemes, simulate
 from springcheck.engines.contract import Arithmetic, Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.schemes import SCHEMES
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import FRAMES, Truth
 from springcheck.studies.precision.points import Point
@@ -73,7 +72,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     """A sweep at its coarsest point, or at its end where the method cannot run."""
     method = engines.method(label)
     plain = replace(scene, quantities=("q", "p"))
-    limit = SCHEMES[method.scheme].limit
+    limit = schemes.scheme(method.scheme).limit
     sweep = Sweep(
         label=label,
         scenes=by_tolerance(plain) if method.adaptive else by_step(plain, limit, known),

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from springcheck import schemes
 from springcheck.arrays import Floats, Reals
 from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
-from springcheck.schemes import SCHEMES
 from springcheck.studies.run.result import Stored
 from springcheck.trajectory import Trajectory
 
@@ -90,7 +90,7 @@ def _groups(runs: Mapping[str, Trajectory]) -> list[Group]:
     for run in runs.values():
         found.setdefault(run.scheme, []).append(run)
     # what follows a colon tells how the scheme goes, too long for a legend
-    return [(SCHEMES[name].title.partition(":")[0], members) for name, members in found.items()]
+    return [(schemes.title(name).partition(":")[0], members) for name, members in found.items()]
 
 
 def _all(groups: Sequence[Group]) -> list[Trajectory]:

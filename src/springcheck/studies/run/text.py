@@ -8,8 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from rich.text import Text
 
-from springcheck import checks
-from springcheck.schemes import SCHEMES
+from springcheck import checks, schemes
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text import Lines, Row, Table, plain, seconds, table
@@ -67,7 +66,7 @@ def _runs(runs: Sequence[MethodRun]) -> Table:
     """One line a method, under the scheme that it runs."""
     rows: list[Row] = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
-        rows.append(plain(SCHEMES[scheme].title, "italic"))
+        rows.append(plain(schemes.title(scheme), "italic"))
         rows += [
             (
                 f"  {run.method}",

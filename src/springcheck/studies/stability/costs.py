@@ -34,9 +34,16 @@ OUTPUTS = 2000
 TOLERANCE = 1e-6
 """Of adaptive solvers: relative, per step."""
 
-MOST = {"ase": 4_000, "sundials": 20_000}
-MOST_ELSEWHERE = 1_500_000
-"""Steps that a run may take before it is not worth its time: half a second to two."""
+WORTH_SECONDS = 1.2
+"""What a run may take before it is not worth its time."""
+
+MOST_STEPS = 1_500_000
+"""Steps that a run may take however fast they are."""
+
+
+def most_steps(label: Label) -> int:
+    """Steps of this method that are worth their time."""
+    return min(MOST_STEPS, round(WORTH_SECONDS / engines.engine(label.engine).step_seconds))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,12 +83,12 @@ def scene(family: Family, ratio: float) -> Scene:
 
 def step_for(found: Scene, label: Label) -> float:
     """The step of a method: half its limit on the fastest mode, an OUTPUTS-th of the end at most."""
-    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    scheme = schemes.scheme(engines.method(label).scheme)
     held = found.step
     if np.isfinite(scheme.limit):
         fastest = float(np.sqrt(np.max(exact.modes(found).w2)))
         held = min(held, (scheme.limit / 2 or 0.1) / fastest)
-        if scheme.name != "langevin-middle" and found.system.is_damped:
+        if not schemes.FRICTION & {kind for kind, _ in scheme.stages} and found.system.is_damped:
             # friction in the force of an explicit method: h c/m < 2
             held = min(held, 0.5 / float(np.max(found.system.friction_rates)))
     return held
@@ -103,7 +110,7 @@ def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
     end = found.step * found.steps
     steps = int(np.ceil(end / step_for(found, label)))
     run = replace(found, step=end / steps, steps=steps, every=steps, quantities=("q", "p"))
-    most = MOST.get(label.engine, MOST_ELSEWHERE)
+    most = most_steps(label)
     common = {"family": family, "method": str(label), "ratio": ratio, "step": run.step, "steps": steps}
     if steps > most:
         return Cost(
@@ -124,11 +131,11 @@ def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
 
 
 def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
-    driver: Any = engines.load(label.engine)
+    solver = engines.internal_steps(label)
     end = found.step * found.steps
     common: dict[str, Any] = {"family": family, "method": str(label), "ratio": ratio}
     try:
-        done = driver.internal_steps(found, engines.method(label), most=MOST[label.engine])
+        done = solver(found, engines.method(label), most=most_steps(label))
     except Stopped as stop:
         return Cost(
             **common, step=float("nan"), steps=stop.rows, rejected=0, force_calls=0, error=float("nan"),

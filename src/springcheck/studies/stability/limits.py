@@ -68,7 +68,7 @@ class Limit:
 
 def measure(label: Label) -> Limit:
     """Find a method's limit, step to both sides of it and at it, and compare with its scheme."""
-    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    scheme = schemes.scheme(engines.method(label).scheme)
     limit = first_exit(label, propagators.measured)
     hidden = first_exit(label, propagators.theory)
     theory = scheme.limit

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats
-from springcheck.engines.contract import Arithmetic, Label
+from springcheck.engines.contract import Arithmetic, Label, Need
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Term, WallSpring
@@ -62,7 +62,7 @@ def arithmetic(label: Label) -> Arithmetic:
 def noise(label: Label) -> float:
     """Relative rounding of an entry of a propagator: all roundings of one step, of one sign."""
     how = arithmetic(label)
-    scheme = schemes.SCHEMES[engines.method(label).scheme]
+    scheme = schemes.scheme(engines.method(label).scheme)
     return schemes.roundings(scheme) * (max(how.state, how.force) + how.quantum / FORCE)
 
 
@@ -73,9 +73,9 @@ def scene(
     n = copies * len(springs.turn)
     k = np.tile(springs.k, copies)
     requires = engines.method(springs.label).requires
-    fast = "springs marked fast" in requires
+    fast = Need.FAST_SPRINGS in requires
     terms: list[Term] = [WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
-    if np.any(springs.brake) or "damping" in requires:
+    if np.any(springs.brake) or Need.DAMPING in requires:
         c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
         terms.append(Damping(i=np.arange(n), c=c))
     return Scene(
@@ -120,7 +120,7 @@ def measured(springs: Springs) -> Floats:
 
 def theory(springs: Springs) -> Extended:
     """The scheme's one-step matrices (n, 2, 2), extended precision."""
-    scheme = schemes.SCHEMES[engines.method(springs.label).scheme]
+    scheme = schemes.scheme(engines.method(springs.label).scheme)
     k = springs.k.astype(np.longdouble)
     friction = np.broadcast_to(springs.brake, springs.turn.shape) * np.longdouble(MASS / STEP)
     out = schemes.matrix(scheme, h=STEP, m=np.full(len(k), MASS), k=k, c=friction)
@@ -167,7 +167,7 @@ def one_step_labels(labels: tuple[Label, ...]) -> tuple[Label, ...]:
     return tuple(
         label
         for label in labels
-        if schemes.SCHEMES[engines.method(label).scheme].one_step
+        if schemes.scheme(engines.method(label).scheme).one_step
         and "wall-spring" in engines.method(label).terms
     )
 

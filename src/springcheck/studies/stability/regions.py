@@ -19,9 +19,6 @@ TURN = (0.05, 20.0)
 RATIO_FROM = 0.025
 """The smallest damping ratio; the largest follows, because both axes have the same ratio of neighbours."""
 
-UNIFORM = frozenset({"openmm:langevin-middle"})
-"""Methods with one friction rate for all particles of a run."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Region:
@@ -58,7 +55,7 @@ def measure(label: Label, points: int = 200) -> Region:
     row, column = (x.ravel() for x in np.indices((points, points)))
     brake = 2 * ratio[row] * turn[column]
     measured = np.empty((points * points, 2, 2))
-    if str(label).partition("@")[0] in UNIFORM:
+    if engines.method(label).one_friction:
         # on axes of the same ratio the rate 2 ratio h w is constant where row + column is
         for total in range(2 * points - 1):
             these = np.flatnonzero(row + column == total)

@@ -15,7 +15,7 @@ import numpy as np
 
 from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats, Reals
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
@@ -53,7 +53,7 @@ def fast_frequency(scene: Scene) -> float:
 def serves(scene: Scene, label: Label) -> bool:
     """Whether a method takes the scene's fast springs in steps of their own."""
     fast = scene.system.fast
-    marked = engines.method(label).requires == {"springs marked fast"}
+    marked = engines.method(label).requires == {Need.FAST_SPRINGS}
     return bool(fast) and marked and not engines.refusal(scene, label)
 
 
@@ -118,7 +118,7 @@ def _by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
 def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
     law: dict[str, Any] = {"parts": scene.system.parts}
     q, p = schemes.step(
-        schemes.SCHEMES[engines.method(label).scheme],
+        schemes.scheme(engines.method(label).scheme),
         scene.q.astype(np.longdouble),
         scene.p.astype(np.longdouble),
         h=scene.step,

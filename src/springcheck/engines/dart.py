@@ -1,0 +1,109 @@
+"""DART through dartpy: bodies on prismatic joints along x, pulled by our force or by the spring of the joint.
+
+DART takes joint springs and joint damping implicitly, whatever is asked of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, WallSpring
+
+
+def version() -> dict[str, str]:
+    """Version of DART."""
+    import dartpy
+
+    return {"dart": dartpy.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A world with the scene's bodies at its start."""
+    return _World(scene, step, springs=method.name == "joint-spring")
+
+
+class _World:
+    """DART's world in motion."""
+
+    def __init__(self, scene: Scene, step: float, *, springs: bool) -> None:
+        import dartpy
+
+        self.force_calls = 0
+        self._m = scene.m
+        self._world = dartpy.simulation.World()
+        self._world.setGravity([0.0, 0.0, 0.0])
+        self._world.setTimeStep(step)
+        self._skeleton = skeleton = dartpy.dynamics.Skeleton("springs")
+        joints = []
+        for m in scene.m.tolist():
+            joint, body = skeleton.createPrismaticJointAndBodyNodePair(None)
+            joint.setAxis([1.0, 0.0, 0.0])
+            body.setInertia(dartpy.dynamics.Inertia(m, [0.0, 0.0, 0.0], np.eye(3)))
+            joints.append(joint)
+        self._world.addSkeleton(skeleton)
+        skeleton.setPositions(scene.q)
+        skeleton.setVelocities(scene.p / scene.m)
+        self._force = None if springs else scene.system.force
+        if springs:
+            self._add_springs(joints, scene)
+
+    @staticmethod
+    def _add_springs(joints: list, scene: Scene) -> None:  # type: ignore[type-arg]
+        taken: set[int] = set()
+        for term in scene.terms:
+            if isinstance(term, WallSpring):
+                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                    if i in taken or k < 0:
+                        raise MethodError(
+                            f"dart:joint-spring: a joint has one spring, of stiffness 0 or more; particle {i}"
+                        )
+                    taken.add(i)
+                    joints[i].setSpringStiffness(0, k)
+                    joints[i].setRestPosition(0, at)
+            elif isinstance(term, Damping):
+                for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+                    joints[i].setDampingCoefficient(0, joints[i].getDampingCoefficient(0) + c)
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        world, skeleton, force = self._world, self._skeleton, self._force
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row in range(len(q)):
+                for _ in range(every):
+                    if force is not None:
+                        skeleton.setForces(force(skeleton.getPositions(), skeleton.getVelocities() * self._m))
+                    world.step()
+                q[row] = skeleton.getPositions()
+                p[row] = skeleton.getVelocities()
+            p *= self._m
+        self.force_calls += every * len(q)
+
+
+ENGINE = Engine(
+    name="dart",
+    title="DART (dartpy)",
+    distribution="dartpy",
+    extra="dart",
+    methods=named(
+        Method(
+            name="force",
+            scheme="semi-implicit-euler",
+            about="Skeleton.setForces before each step",
+            terms=frozenset({ANY_POTENTIAL, "damping"}),
+            default=False,
+        ),
+        Method(
+            name="joint-spring",
+            scheme="implicit-euler",
+            about="spring and damping of the joint",
+            terms=frozenset({"wall-spring", "damping"}),
+            default=False,
+        ),
+    ),
+    start=start,
+    version=version,
+    step_seconds=3e-6,
+)

@@ -1,0 +1,225 @@
+"""MuJoCo: bodies on slide joints along x, their springs given to joints, to tendons or to a motor.
+
+How a spring is attached decides the scheme.  Joint and tendon springs are evaluated by MuJoCo at the
+positions of each step; a motor's force is ours, and it stays what it is until it is set again: over the
+stages of RK4, and over the substeps of a frame (`frame_skip`).  Joint damping is implicit in the velocity
+unless that is switched off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import (
+    ANY_POTENTIAL,
+    Arithmetic,
+    Engine,
+    Label,
+    Method,
+    Need,
+    Simulation,
+    Stopped,
+    named,
+)
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Spring, WallSpring
+
+SPRINGS = frozenset({"wall-spring", "spring"})
+DAMPED = SPRINGS | {"damping"}
+FORCES = frozenset({ANY_POTENTIAL, "damping"})
+
+IMPLICIT_FRICTION = "semi-implicit-euler-implicit-friction"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _How:
+    """The options of MuJoCo behind a method."""
+
+    integrator: str = "EULER"
+    substeps: int = 1
+    motor: bool = False
+    explicit_damping: bool = False
+
+
+HOW = {
+    "joint-spring": _How(),
+    "joint-spring-implicit": _How(integrator="IMPLICIT"),
+    "joint-spring-implicitfast": _How(integrator="IMPLICITFAST"),
+    "joint-spring-rk4": _How(integrator="RK4"),
+    "joint-damping": _How(),
+    "joint-damping-implicitfast": _How(integrator="IMPLICITFAST"),
+    "joint-damping-explicit": _How(explicit_damping=True),
+    "motor": _How(motor=True),
+    "motor-rk4": _How(integrator="RK4", motor=True),
+    "motor-frame-skip-5": _How(motor=True, substeps=5),
+}
+
+
+def version() -> dict[str, str]:
+    """Version of MuJoCo."""
+    import mujoco
+
+    return {"mujoco": mujoco.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A model of the scene, compiled, at its start."""
+    return _Steps(scene, HOW[method.name], step)
+
+
+def _model(mujoco: Any, scene: Scene, how: _How, step: float) -> Any:
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step / how.substeps
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{how.integrator}")
+    # beyond 1e10 MuJoCo would set the state back to the start of the model, and go on
+    flags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if how.explicit_damping:
+        flags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    spec.option.disableflags = int(flags)
+    joints = []
+    for i, mass in enumerate(scene.m):
+        body = spec.worldbody.add_body(name=f"b{i}", mass=mass, inertia=[1.0, 1.0, 1.0])
+        body.explicitinertial = True
+        joints.append(body.add_joint(name=f"j{i}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0]))
+        if how.motor:
+            motor = spec.add_actuator(name=f"m{i}", target=f"j{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            motor.set_to_motor()
+    if not how.motor:
+        _springs(spec, joints, scene)
+    return spec.compile()
+
+
+def _springs(spec: Any, joints: list[Any], scene: Scene) -> None:
+    """Springs to walls as joint springs, the first of each joint, and all others as springs of tendons."""
+    taken: set[int] = set()
+    for term in scene.terms:
+        if isinstance(term, Damping):
+            for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+                joints[i].damping = _first(joints[i].damping, c)
+        elif isinstance(term, WallSpring):
+            for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                if i in taken:
+                    _tendon(spec, {i: 1.0}, k, at)
+                    continue
+                taken.add(i)
+                joints[i].stiffness, joints[i].springref = _first(joints[i].stiffness, k), at
+        elif isinstance(term, Spring):
+            ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
+            for a, b, k, rest in ends:
+                _tendon(spec, {a: -1.0, b: 1.0}, k, rest)
+
+
+def _first(field: Any, value: float) -> Any:
+    """A coefficient in the shape of its field: a number, or from 4.0 on a polynomial's."""
+    if np.ndim(field) == 0:
+        return field + value
+    return [field[0] + value, *field[1:]]
+
+
+def _tendon(spec: Any, joints: Mapping[int, float], k: float, rest: float) -> None:
+    tendon = spec.add_tendon()
+    tendon.stiffness = _first(tendon.stiffness, k)
+    tendon.springlength = [rest, rest]
+    for i, coefficient in joints.items():
+        tendon.wrap_joint(f"j{i}", coefficient)
+
+
+class _Steps:
+    """MuJoCo's model and data in motion."""
+
+    def __init__(self, scene: Scene, how: _How, step: float) -> None:
+        import mujoco
+
+        self.force_calls = 0
+        self._step = mujoco.mj_step
+        # it would write its warnings to a file in the current folder
+        mujoco.set_mju_user_warning(_unheard)
+        self._model = _model(mujoco, scene, how, step)
+        self._data = mujoco.MjData(self._model)
+        self._q, self._v, self._control = self._data.qpos, self._data.qvel, self._data.ctrl
+        self._q[:], self._v[:] = scene.q, scene.p / scene.m
+        self._m = scene.m
+        self._force = scene.system.force if how.motor else None
+        self._substeps = how.substeps
+        self._bad_control = int(mujoco.mjtWarning.mjWARN_BADCTRL)
+        self._each = 4 if how.integrator == "RK4" else 1
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        step, model, data, v_now, q_now = self._step, self._model, self._data, self._v, self._q
+        if self._force is None:
+            for row in range(len(q)):
+                step(model, data, every)
+                q[row] = q_now
+                p[row] = v_now
+            p *= self._m
+            self.force_calls += every * len(q) * self._each
+        else:
+            dropped = data.warning[self._bad_control :]
+            with np.errstate(over="ignore", invalid="ignore"):
+                for row in range(len(q)):
+                    for _ in range(every):
+                        self._control[:] = self._force(q_now, v_now * self._m)
+                        step(model, data, self._substeps)
+                    if dropped[0].number:
+                        raise Stopped(row, "MuJoCo sets controls to 0 where one is beyond 1e10")
+                    q[row] = q_now
+                    p[row] = v_now * self._m
+            self.force_calls += every * len(q)
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """Double precision; MuJoCo takes no control beyond 1e10."""
+    return Arithmetic(overflow=1e10) if HOW[label.method].motor else Arithmetic()
+
+
+def _unheard(message: str) -> None:
+    """What MuJoCo warns of shows in the states."""
+
+
+def _method(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need) -> Method:
+    return Method(
+        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False
+    )
+
+
+ENGINE = Engine(
+    name="mujoco",
+    title="MuJoCo",
+    distribution="mujoco",
+    extra="mujoco",
+    methods=named(
+        _method("joint-spring", "semi-implicit-euler", "joint stiffness, integrator Euler", SPRINGS),
+        _method("joint-spring-implicit", "semi-implicit-euler", "joint stiffness, implicit", SPRINGS),
+        _method("joint-spring-implicitfast", "semi-implicit-euler", "joint stiffness, implicitfast", SPRINGS),
+        _method("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
+        _method("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
+        _method(
+            "joint-damping-implicitfast",
+            IMPLICIT_FRICTION,
+            "joint damping, implicitfast",
+            DAMPED,
+            Need.DAMPING,
+        ),
+        _method(
+            "joint-damping-explicit",
+            "semi-implicit-euler",
+            "joint damping, eulerdamp off",
+            DAMPED,
+            Need.DAMPING,
+        ),
+        _method("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", FORCES),
+        _method("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", FORCES),
+        _method("motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", FORCES),
+    ),
+    start=start,
+    version=version,
+    arithmetic=arithmetic,
+    convention=lambda method: "velocities of the joints, synchronised",
+    step_seconds=3e-6,
+)

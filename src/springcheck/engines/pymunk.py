@@ -1,0 +1,115 @@
+"""pymunk (Chipmunk): bodies that do not turn, pulled along x by a force or by its `DampedSpring`.
+
+Chipmunk moves positions first and velocities after, so that a force that is set before the step is that of
+the old positions, and a spring that it evaluates itself is that of the new ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
+
+
+def version() -> dict[str, str]:
+    """Versions of pymunk and of Chipmunk beneath it."""
+    import pymunk
+
+    return {"pymunk": pymunk.version, "chipmunk": pymunk.chipmunk_version}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A space with the scene's bodies at its start."""
+    return _Space(scene, step, springs=method.name == "damped-spring")
+
+
+def far(scene: Scene) -> float:
+    """A length beyond all of the motion: a `DampedSpring` knows its length alone, which has no sign [L].
+
+    A power of 2, so that adding it rounds and nothing else; every rounding of a force is k eps times this.
+    """
+    q, _ = scene.system.amplitudes
+    reach = float(np.max(np.abs(scene.q)) + np.max(q))
+    return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
+
+
+class _Space:
+    """Chipmunk's space in motion."""
+
+    def __init__(self, scene: Scene, step: float, *, springs: bool) -> None:
+        import pymunk
+
+        self.force_calls = 0
+        self.off_axis = 0.0
+        self._h, self._m = step, scene.m
+        self._space = space = pymunk.Space()
+        self._bodies = []
+        for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
+            # without a moment of inertia that is finite nothing turns
+            body = pymunk.Body(m, float("inf"))
+            body.position, body.velocity = (q, 0.0), (p / m, 0.0)
+            space.add(body)
+            self._bodies.append(body)
+        self._force = None if springs else scene.system.force
+        if springs:
+            self._add_springs(pymunk, scene)
+
+    def _add_springs(self, pymunk: object, scene: Scene) -> None:
+        length, bodies, wall = far(scene), self._bodies, self._space.static_body
+        spring = pymunk.DampedSpring  # type: ignore[attr-defined]
+        for term in scene.terms:
+            if isinstance(term, WallSpring):
+                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                    self._space.add(spring(wall, bodies[i], (at - length, 0), (0, 0), length, k, 0.0))
+            elif isinstance(term, Spring):
+                ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
+                for a, b, k, rest in ends:
+                    # from a, moved back by the length, to b
+                    self._space.add(spring(bodies[a], bodies[b], (rest - length, 0), (0, 0), length, k, 0.0))
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        step, h, bodies, force = self._space.step, self._h, self._bodies, self._force
+        here, there = np.empty(len(bodies)), np.empty(len(bodies))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row in range(len(q)):
+                for _ in range(every):
+                    if force is not None:
+                        for i, body in enumerate(bodies):
+                            here[i], there[i] = body.position.x, body.velocity.x
+                        for body, f in zip(bodies, force(here, there * self._m).tolist(), strict=True):
+                            body.force = (f, 0.0)
+                    step(h)
+                for i, body in enumerate(bodies):
+                    q[row, i], p[row, i] = body.position.x, body.velocity.x
+            self.off_axis = max(self.off_axis, *(abs(body.position.y) for body in bodies))
+            p *= self._m
+        self.force_calls += every * len(q)
+
+
+ENGINE = Engine(
+    name="pymunk",
+    title="pymunk",
+    distribution="pymunk",
+    extra="pymunk",
+    methods=named(
+        Method(
+            name="force",
+            scheme="explicit-euler",
+            about="Body.force, set before each step",
+            terms=frozenset({ANY_POTENTIAL, "damping"}),
+            default=False,
+        ),
+        Method(
+            name="damped-spring",
+            scheme="semi-implicit-euler-drift-kick",
+            about="DampedSpring without damping, its rest length far from 0",
+            default=False,
+        ),
+    ),
+    start=start,
+    version=version,
+    step_seconds=5e-6,
+)

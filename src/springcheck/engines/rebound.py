@@ -1,0 +1,101 @@
+"""REBOUND: particles without gravity, their forces added by `additional_forces`.
+
+WHFast moves particles on Kepler orbits between the kicks, which are straight lines where G = 0; it takes them
+as test particles about one that rests.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.physics.scene import Scene
+
+
+def version() -> dict[str, str]:
+    """Version of REBOUND."""
+    import rebound
+
+    return {"rebound": rebound.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A simulation at the scene's start."""
+    return _Simulation(scene, method.name, step)
+
+
+class _Simulation:
+    """REBOUND's simulation in motion."""
+
+    def __init__(self, scene: Scene, integrator: str, step: float) -> None:
+        import rebound
+
+        self.force_calls = 0
+        self.off_axis = 0.0
+        self._m, self._step, self._done = scene.m, step, 0
+        self._adaptive = integrator == "ias15"
+        self._simulation = sim = rebound.Simulation()
+        sim.G, sim.gravity, sim.integrator, sim.dt = 0.0, "none", integrator, step
+        centre = integrator == "whfast"
+        if centre:
+            # off the line, so that no particle ever meets it
+            sim.add(m=1.0, y=1.0)
+        for m, q, v in zip(scene.m.tolist(), scene.q.tolist(), (scene.p / scene.m).tolist(), strict=True):
+            sim.add(m=0.0 if centre else m, x=q, vx=v)
+        particles = _columns(sim, int(centre), scene.n)
+        self._q, self._v, self._y = particles["x"], particles["vx"], particles["y"]
+        acceleration, force = particles["ax"], scene.system.force
+
+        def forces(_: Any) -> None:
+            self.force_calls += 1
+            acceleration[:] += force(self._q, self._v * self._m) / self._m
+
+        sim.additional_forces = forces
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        steps, q_now, v_now = self._simulation.steps, self._q, self._v
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row in range(len(q)):
+                steps(every)
+                q[row] = q_now
+                p[row] = v_now
+            p *= self._m
+            self.off_axis = max(self.off_axis, float(np.max(np.abs(self._y))))
+
+
+def _columns(sim: Any, first: int, n: int) -> dict[str, Floats]:
+    """Views (n,) of the components of REBOUND's particles, from this one on."""
+    import rebound
+
+    size = ctypes.sizeof(rebound.Particle)
+    address = ctypes.addressof(sim.particles[first])
+    memory: Any = (ctypes.c_char * (size * n)).from_address(address)
+    return {
+        name: np.ndarray(
+            (n,), np.float64, buffer=memory, offset=getattr(rebound.Particle, name).offset, strides=(size,)
+        )
+        for name in ("x", "y", "vx", "ax")
+    }
+
+
+def _method(name: str, scheme: str, about: str) -> Method:
+    return Method(name=name, scheme=scheme, about=about, terms=frozenset({ANY_POTENTIAL}), default=False)
+
+
+ENGINE = Engine(
+    name="rebound",
+    title="REBOUND",
+    distribution="rebound",
+    extra="rebound",
+    methods=named(
+        _method("leapfrog", "position-verlet", "additional_forces, integrator leapfrog"),
+        _method("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0"),
+    ),
+    start=start,
+    version=version,
+    step_seconds=8e-6,
+)

@@ -1,0 +1,55 @@
+"""Schemes that come about by how a spring is attached to an engine, beside the ones that people choose.
+
+A force that is set once and held over substeps, and friction that is taken implicitly where the force is not.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from springcheck.schemes.catalogue import HALF, ONE, Scheme, Stage
+
+
+def _force_held(n: int) -> tuple[Stage, ...]:
+    """Kick and drift, n times a step, by the one force of its beginning."""
+    part = Fraction(1, n)
+    again: tuple[Stage, ...] = (("held", part), ("drift", part))
+    return (("kick", part), ("drift", part), *(again * (n - 1)))
+
+
+_ALL = (
+    *(
+        Scheme(
+            name=f"force-held-{n}",
+            title=f"semi-implicit Euler, {n} substeps by one force",
+            order=1,
+            limit=0.0,
+            symplectic=False,
+            stages=_force_held(n),
+            source="a control force held for a frame of n substeps (frame_skip): [[1 - g a, h/m], [-h k, 1]] "
+            "with g = (n + 1)/2n and a = (h w)**2, determinant 1 + a (n - 1)/2n",
+        )
+        for n in (2, 4, 5, 10)
+    ),
+    Scheme(
+        name="force-held-rk4",
+        title="constant force over the step (RK4 of a force that is held)",
+        order=1,
+        limit=0.0,
+        symplectic=False,
+        stages=(("kick", HALF), ("drift", ONE), ("held", HALF)),
+        source="a force held over infinitely many substeps; velocity Verlet that kicks twice by the old "
+        "force; determinant 1 + (h w)**2/2",
+    ),
+    Scheme(
+        name="semi-implicit-euler-implicit-friction",
+        title="semi-implicit Euler, friction implicit: v' = (v + h F/m) / (1 + h c/m)",
+        order=1,
+        limit=2.0,
+        symplectic=False,
+        stages=(("pull", ONE), ("implicit-friction", ONE), ("drift", ONE)),
+        source="MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
+    ),
+)
+
+ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}

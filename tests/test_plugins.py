@@ -1,0 +1,227 @@
+"""An engine from anywhere is found, judged and stored like ours, and a broken one takes no other down."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import engines
+from springcheck.cli import main
+from springcheck.errors import MethodError
+
+EXAMPLE = Path(__file__).parent / "plugin-example"
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_over() -> Iterator[None]:
+    yield
+    engines._brought.clear()
+    engines._points.cache_clear()
+    engines._loaded.cache_clear()
+
+
+def springcheck(folder: Path, *arguments: str, path: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "springcheck", *arguments],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example, installed by pip into a folder of its own."""
+    folder = tmp_path_factory.mktemp("site")
+    source = shutil.copytree(EXAMPLE, tmp_path_factory.mktemp("source") / "example")
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--target",
+        str(folder),
+        str(source),
+    ]
+    done = subprocess.run(pip, capture_output=True, text=True, check=False)
+    if done.returncode and not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
+        pytest.skip(f"pip cannot build a package here: {done.stderr.strip().splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_gone(
+    installed: Path, tmp_path: Path
+) -> None:
+    site = str(shutil.copytree(installed, tmp_path / "site"))
+    listed = springcheck(tmp_path, "list", path=site).stdout
+    assert "PEFRL in NumPy 1.2.3, from springcheck-pefrl 1.2.3" in listed
+    run = springcheck(
+        tmp_path, "run", "spring-uneven", "--method", "pefrl:*", "--thorough", "--json", path=site
+    )
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    assert [one["scheme"] for one in found["runs"]] == ["pefrl"]
+    judged = {one["check"]: one["passed"] for one in found["verdicts"]}
+    assert all(
+        judged[name]
+        for name in ("step-defect", "closed-form", "shadow-energy", "frequency", "order", "mirror")
+    )
+    shutil.rmtree(site)
+    assert "PEFRL" not in springcheck(tmp_path, "list").stdout
+    for command in ("inspect", "check", "plot", "identify"):
+        read = springcheck(tmp_path, command, "spring-uneven.h5")
+        assert read.returncode in (0, 1), (command, read.stderr)
+        assert "Traceback" not in read.stderr
+    again = springcheck(tmp_path, "run", "spring-uneven", "--method", "pefrl:pefrl")
+    assert again.returncode == 2
+    assert again.stderr.startswith("springcheck: unknown engine 'pefrl'")
+
+
+def test_a_scheme_of_its_own_is_carried_out_wrongly_and_the_verdicts_say_so(tmp_path: Path) -> None:
+    text = (EXAMPLE / "springcheck_pefrl.py").read_text()
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text(text.replace("self.q + float(c) * self.h", "self.q + 1.0000001 * float(c) * self.h"))
+    assert (
+        main(["run", "spring", "--method", "pefrl:*", "--engine", str(wrong), "--quiet", "-o", "x.h5"]) == 1
+    )
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_file_is_an_engine_for_one_call_and_runs_beside_the_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = str(EXAMPLE / "springcheck_pefrl.py")
+    assert main(["run", "spring", "--engine", file, "--method", "own:euler", "--json"]) == 0
+    assert [run["method"] for run in json.loads(capsys.readouterr().out)["runs"]] == [
+        "own:euler",
+        "pefrl:pefrl",
+    ]
+    assert main(["list", "--engine", file]) == 0
+    assert f"from {file}" in capsys.readouterr().out
+
+
+MINIMAL = """
+from springcheck.engines import Engine, Method, named
+class S:
+    force_calls = 0
+    def advance(self, every, q, p):
+        {advance}
+def start(scene, method, label, step):
+    {start}
+ENGINE = Engine(name={name}, title="bad", methods=named(Method(name="m", scheme={scheme}, about="")),
+                start=start, version=lambda: {version})
+"""
+
+
+def bad(path: Path, **parts: str) -> Path:
+    plain = {
+        "advance": "pass", "start": "return S()", "name": "'bad'", "scheme": "'explicit-euler'",
+        "version": "{}",
+    }  # fmt: skip
+    path.write_text(MINIMAL.format(**plain | parts))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"name": "'own'"}, "is taken by the engine of springcheck"),
+        ({"name": "'a b'"}, "must be of letters"),
+        ({"scheme": "'velocity-verlett'"}, "did you mean velocity-verlet?"),
+        (
+            {"start": "return scene.mass"},
+            "object has no attribute 'mass' (bad.py, line 8)",
+        ),
+        ({"advance": "q[0] = 1 / 0"}, "ZeroDivisionError: division by zero (bad.py, line 6)"),
+        ({"version": "1 / 0"}, "ZeroDivisionError"),
+        ({"start": "return None"}, "NoneType"),
+        ({"advance": "return ("}, "SyntaxError"),
+    ],
+    ids=str,
+)
+def test_a_bad_file_is_answered_in_one_line(
+    parts: dict[str, str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = bad(tmp_path / "bad.py", **parts)
+    assert main(["run", "spring", "--engine", str(file), "--method", "own:euler"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]
+
+
+def test_a_missing_file_is_answered_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", "--engine", "nowhere.py"]) == 2
+    assert capsys.readouterr().err == "springcheck: nowhere.py: there is no such file\n"
+
+
+class Point:
+    """An entry point of a package that is not there."""
+
+    def __init__(self, name: str, found: object) -> None:
+        self.name, self.value, self.group, self._found = name, f"somewhere:{name}", engines.GROUP, found
+        self.dist = importlib.metadata.Distribution.from_name("numpy")
+
+    def load(self) -> object:
+        if isinstance(self._found, BaseException):
+            raise self._found
+        return self._found
+
+
+def test_a_broken_plug_in_is_named_and_takes_no_other_down(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = importlib.metadata.entry_points(group=engines.GROUP)
+    broken = [
+        Point("gone", ModuleNotFoundError("No module named 'gone'")),
+        Point("raises", RuntimeError("no licence\nfound")),
+        Point("leaves", SystemExit(3)),
+        Point("number", 7),
+        Point("own", 8),
+    ]
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [*broken, *real])
+    engines._points.cache_clear()
+    assert engines.names()[0] == "own"
+    assert not {"gone", "raises", "leaves", "number"} & set(engines.names())
+    assert set(engines.unusable()) == {"gone", "raises", "leaves", "number", "own (numpy)"}
+    assert all("\n" not in reason for reason in engines.unusable().values())
+    with pytest.raises(MethodError, match=r"engine raises of numpy .* RuntimeError: no licence found"):
+        engines.parse("raises:x")
+    assert main(["run", "spring", "--method", "own:*", "--quiet"]) == 0
+    assert main(["list"]) == 0
+    assert "engine number of numpy" in capsys.readouterr().out
+
+
+def test_declaring_and_listing_engines_imports_none_of_their_libraries(tmp_path: Path) -> None:
+    code = (
+        "import sys; from springcheck import engines; "
+        "[engines.absence(n) for n in engines.names()]; print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    libraries = {engines.engine(name).imports for name in engines.names()} - {"", "scipy"}
+    assert not {name.partition(".")[0] for name in done.stdout.split()} & libraries
+
+
+def test_every_engine_is_registered_and_of_fields_that_mean_something() -> None:
+    for name in engines.names():
+        found = engines.engine(name)
+        assert found.name == name
+        assert found.step_seconds > 0
+        assert np.all([place.partition("@")[0] in found.methods for place in found.atlas])
