@@ -1,0 +1,256 @@
+"""Files of the user: only what is recognisably ours is claimed, replaced or deleted; links are not followed."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import springcheck
+from springcheck import store
+from springcheck.cli import main
+from springcheck.physics.scenefile import folder
+from springcheck.store import files, reading
+from test_store import LABELS, scene, trajectory, written
+
+OWN = ["--method", "own:euler", "--quiet"]
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:
+    capsys.readouterr()
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1, said
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.xfail(strict=True, reason="the journal claims every folder of its name")
+@pytest.mark.parametrize("name", ["thesis.txt", "command", "lock", "run-thesis.h5", "undo"])
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_a_folder_of_the_users_where_the_journal_goes_is_left_alone(
+    name: str, force: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("x.h5.parts").mkdir()
+    Path("x.h5.parts", name).write_text("years of work")
+    refused(capsys, ["run", "spring", *OWN, *force, "-o", "x.h5"], "x.h5.parts", "move it away")
+    assert Path("x.h5.parts", name).read_text() == "years of work"
+    assert [entry.name for entry in Path("x.h5.parts").iterdir()] == [name]
+
+
+@pytest.mark.xfail(strict=True, reason="a link to a folder is taken for a journal")
+def test_a_link_where_the_journal_goes_is_not_followed(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("mine").mkdir()
+    Path("x.h5.parts").symlink_to("mine", target_is_directory=True)
+    refused(capsys, ["run", "spring", *OWN, "-o", "x.h5"], "x.h5.parts", "move it away")
+    assert list(Path("mine").iterdir()) == []
+
+
+@pytest.mark.xfail(strict=True, reason="links within the journal are followed")
+@pytest.mark.parametrize("make", [os.symlink, os.link])
+@pytest.mark.parametrize("name", ["lock", "command", "undo"])
+def test_no_link_within_a_journal_reaches_what_it_leads_to(
+    make: Callable[[Any, Any], None], name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with store.open_new("x.h5", "run") as journal:
+        journal.save(trajectory(scene(), LABELS[0]), scene())
+    Path("mine").write_text("years of work")
+    Path("x.h5.parts", name).unlink(missing_ok=True)
+    make(Path("mine").absolute(), Path("x.h5.parts", name))
+    main(["run", "spring", *OWN, "--force", "-o", "x.h5"])
+    assert "Traceback" not in capsys.readouterr().err
+    assert Path("mine").read_text() == "years of work"
+
+
+@pytest.mark.xfail(strict=True, reason="the journal's folder is removed with all that is in it")
+def test_what_a_user_puts_into_a_journal_outlives_it() -> None:
+    with store.open_new("x.h5", "run") as journal:
+        journal.save(trajectory(scene(), LABELS[0]), scene())
+        Path("x.h5.parts", "notes.txt").write_text("mine")
+        journal.commit(scene())
+    assert [entry.name for entry in Path("x.h5.parts").iterdir()] == ["notes.txt"]
+    assert store.check("x.h5") == []
+    assert store.summary("x.h5").complete
+
+
+@pytest.mark.xfail(strict=True, reason="temporary files have names that a user's may have")
+def test_a_file_with_the_name_of_a_temporary_one_is_left_alone() -> None:
+    written(Path("s.h5"), scene())
+    Path("o.h5md.new").write_text("mine")
+    store.export("s.h5", LABELS[0], "o.h5md")
+    assert Path("o.h5md.new").read_text() == "mine"
+    assert sorted(path.name for path in Path().iterdir()) == ["o.h5md", "o.h5md.new", "s.h5"]
+
+
+@pytest.mark.xfail(strict=True, reason="--force replaces any file")
+@pytest.mark.parametrize("name", ["README.md", "my.conf", "data.h5"])
+@pytest.mark.parametrize("command", [["run", "my.conf", *OWN], ["stability", "my.conf", *OWN]])
+def test_force_replaces_stores_alone(
+    name: str, command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (folder() / "spring.toml").read_text()
+    for one in ("README.md", "my.conf", "data.h5"):
+        Path(one).write_text(text)
+    refused(capsys, [*command, "--force", "-o", name], name, "no store")
+    assert Path(name).read_text() == text
+    assert not Path(name + ".parts").exists()
+
+
+def test_force_replaces_a_store_that_is_damaged(tmp_path: Path) -> None:
+    written(Path("s.h5"), scene())
+    content = Path("s.h5").read_bytes()
+    Path("empty.h5").touch()
+    Path("cut.h5").write_bytes(content[: len(content) // 2])
+    Path("flipped.h5").write_bytes(content[:900] + b"\xff" + content[901:])
+    for name in ("empty.h5", "cut.h5", "flipped.h5"):
+        assert main(["run", "spring", *OWN, "--force", "-o", name]) == 0
+        assert store.check(name) == []
+
+
+@pytest.mark.xfail(strict=True, reason="figures of every store have the same names")
+def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", *OWN, "-o", "a.h5"]) == 0
+    assert main(["run", "spring", "--method", "own:implicit-euler", "--quiet", "-o", "b.h5"]) == 0
+    assert main(["plot", "a.h5"]) == 0
+    first = {path: path.read_bytes() for path in Path("figures").rglob("*.*")}
+    assert first
+    assert {path.parent for path in first} == {Path("figures/a")}
+    assert main(["plot", "b.h5"]) == 0
+    assert {path: path.read_bytes() for path in first} == first
+    assert main(["plot", "a.h5"]) == 0
+    refused(capsys, ["plot", "b.h5", "-o", "figures/a"], "figures/a", "a.h5")
+    assert {path: path.read_bytes() for path in first} == first
+    mine = next(iter(first))
+    mine.write_text("mine")
+    refused(capsys, ["plot", "a.h5"], str(mine), "move it away")
+    assert mine.read_text() == "mine"
+    mine.unlink()
+    Path("precious").write_text("mine")
+    mine.symlink_to(Path("precious").absolute())
+    main(["plot", "a.h5"])
+    assert Path("precious").read_text() == "mine"
+
+
+@pytest.mark.xfail(strict=True, reason="scene names reach file names")
+@pytest.mark.parametrize("name", ["/../../PWNED", "../PWNED", "a/PWNED", "PWNED\n\x1b[2J"])
+def test_the_scene_name_of_a_store_reaches_no_file_name(name: str, tmp_path: Path) -> None:
+    import h5py
+
+    command = ["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "s.h5"]
+    assert main(command) == 0
+    shutil.copy("s.h5", "t.h5")
+    with h5py.File("t.h5", "r+") as file:
+        file.attrs["scene_name"] = name
+    Path("in").mkdir()
+    main(["plot", "t.h5", "-o", "in"])
+    strange = [path for path in tmp_path.parent.rglob("*PWNED*") if path.parent != Path("in").absolute()]
+    assert strange == []
+    assert all(path.name.isprintable() for path in Path("in").iterdir())
+
+
+@pytest.mark.xfail(strict=True, reason="a damaged cache of numba ends every run")
+@pytest.mark.parametrize(
+    "damage", [lambda content: b"", lambda content: bytes(len(content)), lambda c: c[:99]]
+)
+def test_damaged_caches_of_compiled_code_are_compiled_anew(damage: Callable[[bytes], bytes]) -> None:
+    home = str(Path(springcheck.__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": home, "NUMBA_CACHE_DIR": str(Path("cache").absolute())}
+
+    def run() -> subprocess.CompletedProcess[str]:
+        words = ["run", "spring", *OWN, "--force"]
+        return subprocess.run(
+            [sys.executable, "-m", "springcheck", *words],
+            env=environment, capture_output=True, text=True, check=False, timeout=300,
+        )  # fmt: skip
+
+    assert run().returncode == 0
+    kept = [path for path in Path("cache").rglob("*") if path.is_file()]
+    assert kept
+    for path in kept:
+        path.write_bytes(damage(path.read_bytes()))
+    again = run()
+    assert (again.returncode, again.stderr) == (0, "")
+
+
+@pytest.mark.xfail(strict=True, reason="a file system without locks is no place for a store")
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
+def test_a_file_system_without_locks_is_used_and_it_is_said(
+    number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def no_locks(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    assert main(["run", "spring", *OWN, "-o", "s.h5"]) == 0
+    assert "locks" in capsys.readouterr().err
+    with pytest.warns(UserWarning, match="locks"):
+        first = store.open_new("t.h5", "run")
+    with first, pytest.raises(store.StoreError, match="being written by"):
+        store.open_new("t.h5", "run")
+
+
+@pytest.mark.xfail(strict=True, reason="a file system without fallocate is no place for a store")
+@pytest.mark.parametrize("number", [errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS])
+def test_a_file_system_that_reserves_no_room_is_written_all_the_same(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "posix_fallocate", refuses)
+    written(Path("s.h5"), scene())
+    assert store.check("s.h5") == []
+
+
+def damage(part: Path) -> None:
+    content = bytearray(part.read_bytes())
+    content[len(content) // 3] ^= 4
+    part.write_bytes(content)
+
+
+@pytest.mark.xfail(strict=True, reason="a damaged part stops its command for good")
+def test_only_the_damaged_part_of_a_journal_is_measured_again(capsys: pytest.CaptureFixture[str]) -> None:
+    s = scene()
+    with store.open_new("s.h5", "run") as journal:
+        for label in LABELS:
+            journal.save(trajectory(s, label), s)
+        journal.add(store.Table(name="precision/x", columns={"h": [1.0]}))
+    damage(next(Path("s.h5.parts").glob("run-own*")))
+    damage(next(Path("s.h5.parts").glob("table-*")))
+    with pytest.warns(UserWarning, match=r"own:euler.*damaged.*again"):
+        journal = store.open_new("s.h5", "run")
+    with journal:
+        assert journal.finished() == tuple(LABELS[1:])
+        assert journal.tables() == {}
+
+
+@pytest.mark.xfail(strict=True, reason="parts do not say which run they belong to")
+def test_a_part_of_another_run_is_not_taken_up() -> None:
+    s = scene()
+    for name in ("s.h5", "t.h5"):
+        with store.open_new(name, "run") as journal:
+            journal.save(trajectory(s, LABELS[name == "t.h5"]), s)
+    part = next(reading.parts_folder(Path("t.h5")).glob("run-*"))
+    shutil.copy(part, reading.parts_folder(Path("s.h5")) / part.name)
+    with pytest.warns(UserWarning, match="another run"), store.open_new("s.h5", "run") as journal:
+        assert journal.finished() == (LABELS[0],)
+
+
+def test_a_journal_whose_lock_alone_is_left_is_tidied_up() -> None:
+    Path("s.h5.parts").mkdir()
+    lock = files.Lock(Path("s.h5.parts/lock"))
+    lock.release()
+    written(Path("s.h5"), scene())
+    assert [path.name for path in Path().iterdir()] == ["s.h5"]
