@@ -1,4 +1,4 @@
-"""Files of the user: only what is recognisably ours is claimed, replaced or deleted; links are not followed."""
+"""Files of the user: only what is recognisably ours is claimed, replaced or deleted; no link is followed."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ HOMES = {
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
     "rich": ("text.py", "studies/run/text.py", "cli.py"),
-    "msgspec": ("physics/scenefile", "studies/keeper.py"),
+    "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
 }
 
 

@@ -212,10 +212,16 @@ def test_an_existing_file_is_never_touched_unless_forced(tmp_path: Path) -> None
     with pytest.raises(StoreError, match="exists"):
         store.open_new(path, "run")
     assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(StoreError, match="no store of springcheck"):
+        store.open_new(path, "run", force=True)
+    assert path.read_bytes() == b"precious"
+    path.unlink()
     s = scene()
+    written(path, s)
+    before = path.read_bytes()
     with store.open_new(path, "run", force=True) as journal:
         journal.save(trajectory(s, "own:euler"), s)
-        assert path.read_bytes() == b"precious"
+        assert path.read_bytes() == before
         journal.commit(s)
     assert list(store.read(path)) == ["own:euler"]
 

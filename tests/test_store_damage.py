@@ -157,7 +157,7 @@ CHANGES = [
     (_with(f"{BASE}/q/value", np.zeros((3, 3))), f"{BASE}/q/value"),
     (_with(f"{BASE}/p/value", np.zeros((51, 3), dtype="S3")), f"{BASE}/p/value"),
     (_with("/precision/x/h", [1.0, 2.5]), "/precision/x"),
-    (_attribute(f"/parameters/{LABELS[0]}", "frames", "many"), BASE),
+    (_attribute(f"/parameters/{LABELS[0]}", "frames", "many"), f"/parameters/{LABELS[0]}"),
     (_attribute(f"/parameters/{LABELS[0]}", "sha256", "0"), f"/parameters/{LABELS[0]}"),
 ]
 

@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
+
+LONGEST_MESSAGE = 480
+"""Characters of a message, which is one line: what a file says in it may be longer."""
+
+_STRANGE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
+"""Unicode's controls, formats (which turn the direction of writing), surrogates, and ends of lines."""
+
+
+def plain(text: object, longest: int | None = None) -> str:
+    r"""Text from a file as it may be shown: on a terminal, in a figure, in a page, in a message.
+
+    What a terminal would obey is written as its escape (``\x1b``); of what is longer than `longest`
+    characters the beginning and the end are kept.
+    """
+    shown = str(text)
+    if longest is not None and len(shown) > 2 * longest:
+        shown = shown[:longest] + shown[-longest:]
+    if not shown.isprintable():
+        shown = "".join(
+            c.encode("unicode_escape").decode() if unicodedata.category(c) in _STRANGE else c for c in shown
+        )
+    if longest is not None and len(shown) > longest:
+        half = longest // 2 - 2
+        shown = f"{shown[:half]} .. {shown[-half:]}"
+    return shown
 
 
 class SpringcheckError(Exception):
     """Something a user can mend.  The command line prints the message alone and exits with 2."""
+
+    def __str__(self) -> str:
+        return plain(super().__str__(), LONGEST_MESSAGE)
 
 
 class SceneError(SpringcheckError):
@@ -55,3 +84,10 @@ def nearest(word: str, known: Iterable[str], before: str = "") -> str:
 
     close = get_close_matches(word, list(known), n=1)
     return f", did you mean {before}{close[0]}?" if close else ""
+
+
+class StoreWarning(UserWarning):
+    """A store is written or taken up all the same, but not as it should be."""
+
+    def __str__(self) -> str:
+        return plain(super().__str__(), LONGEST_MESSAGE)

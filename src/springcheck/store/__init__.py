@@ -4,7 +4,8 @@ Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `r
 `end`, `summary`, `read_tables`, `verdicts`, `comparison`.
 """
 
-from springcheck.store.checking import Finding, check
+from springcheck.errors import StoreError, StoreWarning
+from springcheck.store.checking import Finding, check, doubts
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import room
@@ -14,8 +15,8 @@ from springcheck.store.layout import machine, size
 from springcheck.store.reading import (
     Run,
     Summary,
-    attributes,
     comparison,
+    decoded,
     document,
     end,
     read,
@@ -28,6 +29,7 @@ from springcheck.store.reading import (
     verdicts,
     windows,
 )
+from springcheck.store.records import attributes
 from springcheck.store.tables import Table
 
 __all__ = [
@@ -36,12 +38,16 @@ __all__ = [
     "Foreign",
     "Journal",
     "Run",
+    "StoreError",
+    "StoreWarning",
     "Summary",
     "Table",
     "attributes",
     "check",
     "comparison",
+    "decoded",
     "document",
+    "doubts",
     "end",
     "export",
     "machine",

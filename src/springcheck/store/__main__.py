@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 from pathlib import Path
 
 from springcheck.errors import StoreError
 from springcheck.store import checking, foreign, trust
+
+
+def limit(seconds: int, memory: int) -> None:
+    """Take no more time and memory than this [s, B], write no file, and die with the process that asked."""
+    try:
+        import resource
+    except ImportError:
+        # Windows has no such limits; the process that asked waits no longer than its own
+        return
+    for what, most in (
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_AS, memory),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, 0),
+    ):
+        # macOS knows no RLIMIT_AS
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(what, (most, most))
+    if sys.platform == "linux":
+        import ctypes
+        import signal
+
+        parent_died = 1  # PR_SET_PDEATHSIG
+        ctypes.CDLL(None).prctl(parent_died, signal.SIGKILL)
 
 
 def main(kind: str, path: Path) -> str:
@@ -22,4 +47,5 @@ def main(kind: str, path: Path) -> str:
 
 
 if __name__ == "__main__":
+    limit(int(sys.argv[3]), int(sys.argv[4]))
     sys.stdout.write(main(sys.argv[1], Path(sys.argv[2])))

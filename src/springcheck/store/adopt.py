@@ -34,7 +34,7 @@ def adopt(part: Path, temporary: Path) -> tuple[seal.Extent, ...]:
         size = file.seek(0, os.SEEK_END)
         pieces = list(seal.gaps(known.extents, size))
         content = [b"".join(seal.blocks(file, start, length)) for start, length in pieces]
-    head = json.dumps({"name": part.name, "size": size, "pieces": pieces}).encode()
+    head = json.dumps({"name": part.name, "run": known.run, "size": size, "pieces": pieces}).encode()
     files.put_bytes(b"\n".join([head, b"".join(content)]), _undo(part.parent))
     part.replace(temporary)
     files.sync_folder(part.parent)
@@ -46,15 +46,21 @@ def settled(folder: Path) -> None:
     _undo(folder).unlink(missing_ok=True)
 
 
-def recover(folder: Path, temporary: Path) -> None:
-    """Put an adopted part back that never became the collection."""
+def recover(folder: Path, temporary: Path, run: str) -> None:
+    """Put a part of this run back that was adopted and never became the collection."""
     undo = _undo(folder)
-    if not undo.is_file():
-        return
-    if temporary.is_file():
-        head, body = undo.read_bytes().split(b"\n", 1)
+    try:
+        with files.own(undo) as kept:
+            head, body = kept.read().split(b"\n", 1)
         known = json.loads(head)
-        with temporary.open("rb+") as file:
+        if known["run"] != run or Path(known["name"]).name != known["name"]:
+            raise ValueError("of another run")
+    except FileNotFoundError:
+        return
+    except (ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{undo} stands where the journal of a store goes; move it away") from error
+    if temporary.is_file():
+        with files.own(temporary, create=True) as file:
             start = 0
             for offset, length in known["pieces"]:
                 file.seek(offset)

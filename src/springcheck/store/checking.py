@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
+import msgspec
 
 from springcheck.errors import StoreError
-from springcheck.store import files, layout, reading, seal, tables, trust
-from springcheck.store.draft import combined
+from springcheck.store import access, digests, files, layout, reading, records, seal, tables, trust
 from springcheck.store.layout import Column
 
-PIECE = 1 << 20
-
 NO_STORE = "no store of springcheck"
+MOST_FINDINGS = 1000
+LONGEST_CHECK = 1 << 31
+"""Bytes of a file that a command checks before it shows numbers of it; `check` reads them all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,11 +29,12 @@ class Finding:
     what: str
 
 
-def check(path: str | Path) -> list[Finding]:
+def check(path: str | Path, *, most: int | None = None) -> list[Finding]:
     """Everything wrong with a store and its journal; an empty list where all is well.
 
-    Bytes against the seal, digests, missing and misshapen datasets, H5MD structure.  Raises StoreError
-    when there is nothing to check: no such file, or one that cannot be opened at all.
+    Bytes against the seal, digests, missing and misshapen datasets, H5MD structure.  Of a file of more
+    than `most` bytes the recorded arrays are left out, and that is a finding.  Raises StoreError when
+    there is nothing to check: no such file, or one that cannot be opened at all.
     """
     path = Path(path)
     parts = reading.Parts.of(path, None)
@@ -42,14 +42,22 @@ def check(path: str | Path) -> list[Finding]:
     if not everything:
         with files.told(path, "read"), path.open("rb"):
             pass
+        if not path.is_dir():
+            raise StoreError(f"cannot read {path}: it is a device or a pipe, a store is a file")
     found: list[Finding] = []
     for part in everything:
         where = "" if part == path else f"{part.name}: "
-        found += [Finding(place=where + f.place, what=f.what) for f in check_file(part)]
+        found += [Finding(place=where + f.place, what=f.what) for f in check_file(part, most)]
     return found
 
 
-def check_file(path: Path) -> list[Finding]:
+def doubts(path: str | Path) -> list[Finding]:
+    """What cannot be trusted of a store whose numbers are about to be shown; none of a file of others."""
+    found = check(path, most=LONGEST_CHECK)
+    return [] if any(NO_STORE in finding.what for finding in found) else found
+
+
+def check_file(path: Path, most: int | None = None) -> list[Finding]:
     """The same for one file."""
     found: list[Finding] = []
     with files.told(path, "read"):
@@ -61,123 +69,160 @@ def check_file(path: Path) -> list[Finding]:
                 Finding(place="/", what="no seal at the end: cut off, or changed by another program")
             )
         else:
-            found += [
-                Finding(place=name, what="its bytes have changed since it was written")
-                for name in seal.broken(path, known)
-            ]
+            if most is None or known.end <= most:
+                found += [
+                    Finding(place=name, what="its bytes have changed since it was written")
+                    for name in seal.broken(path, known)
+                ]
+            else:
+                size = files.readable(known.end)
+                found.append(Finding(place="/observables", what=f"not checked, {size} long: check does it"))
             if seal.is_whole(path, known):
-                named = {finding.place for finding in found}
-                return found + [finding for finding in structure(path) if finding.place not in named]
+                return found + list(structure(path, arrays=False))
             found.append(
                 Finding(
                     place="/", what="bytes of groups, attributes or tables have changed since it was written"
                 )
             )
     try:
-        said = trust.guarded(path, trust.OURS)
-        said_of = [Finding(place=place, what=what) for place, what in json.loads(said)]
+        said = [Finding(place=place, what=what) for place, what in json.loads(_said(path))]
         # of what is no store nothing else needs to be said
-        found = said_of if said_of and NO_STORE in said_of[0].what else found + said_of
+        found = said if said and NO_STORE in said[0].what else found + said
+    except StoreError as error:
+        found.append(Finding(place="/", what=str(error)))
+    except ValueError:
+        found.append(Finding(place="/", what="it is damaged, reading it crashes the HDF5 library"))
+    return found
+
+
+def _said(path: Path) -> str:
+    return trust.guarded(path, trust.OURS)
+
+
+def structure(path: Path, *, arrays: bool = True) -> list[Finding]:
+    """What libhdf5 finds: H5MD, one complete set of arrays per label, digests, tables.
+
+    Without `arrays` the numbers themselves are left to the seal.
+    """
+    found: list[Finding] = []
+    try:
+        with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+            for finding in _structure(file, arrays=arrays):
+                found.append(finding)
+                if len(found) == MOST_FINDINGS:
+                    break
     except StoreError as error:
         found.append(Finding(place="/", what=str(error)))
     return found
 
 
-def structure(path: Path) -> Iterator[Finding]:
-    """What libhdf5 finds: H5MD, one complete set of arrays per label, digests, tables."""
+def _structure(file: Any, *, arrays: bool) -> Iterator[Finding]:
+    root = access.attributes(file)
+    if root.get("format") != layout.FORMAT:
+        what = {
+            layout.EXPORTED: "is an exported trajectory",
+            layout.OLDER: "was written by an older springcheck",
+        }.get(str(root.get("format")), f"is not marked as {layout.FORMAT!r}")
+        yield Finding(place="/", what=f"{what}, {NO_STORE}")
+        return
+    head = access.group_at(file, "h5md")
+    if head is None or access.attributes(head).get("version") != [1, 1]:
+        yield Finding(place="/h5md", what="missing, or not version 1.1")
+    for name in ("author", "creator"):
+        group = access.group_at(file, f"h5md/{name}")
+        if group is None or "name" not in access.attributes(group):
+            yield Finding(place=f"/h5md/{name}", what="missing")
+    trees = ("parameters", "observables", "particles")
+    for label in sorted({label for tree in trees for label in access.children(file, tree)}):
+        try:
+            yield from _trajectory(file, label, arrays=arrays)
+        except files.BROKEN as error:
+            yield Finding(place=f"/observables/{label}", what=f"cannot be read: {files.cause(error)}")
+        except StoreError as error:
+            yield Finding(place=f"/observables/{label}", what=str(error))
+    if "part" in root:
+        return
+    yield from _contents(file, root)
+
+
+def _contents(file: Any, root: dict[str, Any]) -> Iterator[Finding]:
+    """What is missing, added or another than its digest."""
     try:
-        with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-            marked = file.attrs.get("format")
-            if marked == layout.EXPORTED:
-                yield Finding(place="/", what=f"is an exported trajectory, {NO_STORE}")
-                return
-            if marked != layout.FORMAT:
-                yield Finding(place="/", what=f"is not marked as {layout.FORMAT!r}: {NO_STORE}")
-                return
-            if "h5md" not in file or file["h5md"].attrs.get("version", np.zeros(2)).tolist() != [1, 1]:
-                yield Finding(place="/h5md", what="missing, or not version 1.1")
-            for name in ("author", "creator"):
-                if f"h5md/{name}" not in file or "name" not in file[f"h5md/{name}"].attrs:
-                    yield Finding(place=f"/h5md/{name}", what="missing")
-            labels = set(file.get("parameters", ())) | set(file.get("observables", ()))
-            for label in sorted(labels | set(file.get("particles", ()))):
-                yield from _each(file, label)
-            for name in [*tables.names(file), *({"comparison", "verdicts"} & set(file))]:
-                if tables.digest(file[name]) != file[name].attrs.get("sha256"):
-                    yield Finding(place=f"/{name}", what="does not match its sha256")
-    except StoreError as error:
-        yield Finding(place="/", what=str(error))
+        kept = msgspec.json.decode(str(root.get(digests.KEY)), type=dict[str, str])
+    except (msgspec.MsgspecError, RecursionError):
+        yield Finding(place="/", what="the list of its digests is missing")
+        return
+    now = digests.contents(file, tables.all_names(file))
+    for place in sorted(kept.keys() | now.keys()):
+        if place not in now:
+            yield Finding(place=place, what="missing")
+        elif place not in kept:
+            yield Finding(place=place, what="was added after it was written")
+        elif kept[place] != now[place]:
+            whole = "attributes" if place == "/" or place.startswith("/parameters/") else "content"
+            yield Finding(place=place, what=f"its {whole} changed since it was written (sha256)")
 
 
-def _each(file: Any, label: str) -> Iterator[Finding]:
-    """One trajectory; whatever cannot be read is a finding of its own."""
-    try:
-        yield from _trajectory(file, label)
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError, MemoryError) as error:
-        yield Finding(place=f"/observables/{label}", what=f"cannot be read: {files.cause(error)}")
-
-
-def _trajectory(file: Any, label: str) -> Iterator[Finding]:
+def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Finding]:
     place = f"/parameters/{label}"
-    if place not in file:
+    group = access.group_at(file, place)
+    if group is None:
         yield Finding(place=place, what="missing")
         return
-    known = file[place].attrs
-    for name in ("sha256", "frames", "particles", "scene", "kind", "quantities"):
-        if name not in known:
-            yield Finding(place=place, what=f"attribute {name} is missing")
-            return
-    frames, n = int(known["frames"]), int(known["particles"])
-    quantities = str(known["quantities"]).split()
-    digests: dict[str, str] = {}
+    try:
+        known = records.record(place, access.attributes(group))
+    except StoreError as error:
+        yield Finding(place=place, what=str(error))
+        return
+    found: dict[str, str] = {}
     whole = True
     columns: dict[str, Column] = {}
-    for name in quantities:
-        shape = (frames,) if name == "energy" else (frames, n)
-        wanted = {"value": shape, "time": (frames,), "step": (frames,)}
-        for kind, expected in wanted.items():
+    for name in known.kept:
+        shape = (known.frames,) if name == "energy" else (known.frames, known.particles)
+        for kind, expected in (("value", shape), ("time", shape[:1]), ("step", shape[:1])):
             at = f"/observables/{label}/{name}/{kind}"
-            if not isinstance(file.get(at), h5py.Dataset):
-                yield Finding(place=at, what="missing")
-            elif file[at].shape != expected:
-                yield Finding(place=at, what=f"has shape {file[at].shape}, not {expected}")
-            elif file[at].dtype.kind not in "fi":
-                yield Finding(place=at, what=f"is of type {file[at].dtype}, not numbers")
-            elif kind == "value" or (kind == "time" and "time" not in digests):
-                key = "time" if kind == "time" else name
-                digests[key] = _digest(file[at])
-                columns[key] = Column(path=at, shape=expected)
-                if file[at].attrs.get("sha256") != digests[key]:
-                    whole = False
-                    yield Finding(place=at, what="does not match its sha256")
-    if whole and len(digests) == len(quantities) + 1 and combined(digests, columns) != known["sha256"]:
+            try:
+                dataset = access.array(file, at, expected, "i" if kind == "step" else "f")
+            except StoreError as error:
+                whole = False
+                yield Finding(place=at, what=str(error))
+                continue
+            key = name if kind == "value" else kind
+            if not arrays or key in found or kind == "step":
+                continue
+            found[key] = digests.of_array(dataset)
+            columns[key] = Column(path=at, shape=expected)
+            if access.attributes(dataset).get("sha256") != found[key]:
+                whole = False
+                yield Finding(place=at, what="does not match its sha256")
+    if arrays and whole and digests.combined(found, columns) != known.sha256:
         yield Finding(place=place, what="its sha256 is not that of the numbers")
-    if known["kind"] == "particles":
-        yield from _particles(file, label, quantities, frames, n)
+    if known.kind == "particles":
+        yield from _particles(file, label, known)
 
 
-def _particles(file: Any, label: str, quantities: list[str], frames: int, n: int) -> Iterator[Finding]:
+def _particles(file: Any, label: str, known: records.Record) -> Iterator[Finding]:
     base = f"/particles/{label}"
+    shape = (known.frames, known.particles, 3)
     for name, source in (("position", "q"), ("velocity", "p")):
-        if source not in quantities:
+        if source not in known.kept:
             continue
-        for kind, expected in (("value", (frames, n, 3)), ("time", (frames,)), ("step", (frames,))):
-            at = f"{base}/{name}/{kind}"
-            if not isinstance(file.get(at), h5py.Dataset):
-                yield Finding(place=at, what="missing")
-            elif file[at].shape != expected:
-                yield Finding(place=at, what=f"has shape {file[at].shape}, not {expected}")
-            elif kind != "step" and "unit" not in file[at].attrs:
-                yield Finding(place=at, what="attribute unit is missing")
-    if {"q", "p"} & set(quantities):
-        box = file.get(f"{base}/box")
-        if box is None or not {"dimension", "boundary"} <= set(box.attrs):
+        at = f"{base}/{name}/value"
+        view = access.find(file, at)
+        whose = name if name in access.children(file, f"observables/{label}") else source
+        inside = [(".", f"/observables/{label}/{whose}/value")]
+        if not isinstance(view, h5py.Dataset):
+            yield Finding(place=at, what="missing")
+        elif not view.is_virtual or [(x.file_name, x.dset_name) for x in view.virtual_sources()] != inside:
+            yield Finding(place=at, what=f"is no view of the recorded {whose}")
+        elif view.shape != shape:
+            yield Finding(place=at, what=f"has shape {view.shape}, not {shape}")
+        elif "unit" not in access.attributes(view):
+            yield Finding(place=at, what="attribute unit is missing")
+        for kind in ("time", "step"):
+            if access.find(file, f"{base}/{name}/{kind}") is None:
+                yield Finding(place=f"{base}/{name}/{kind}", what="missing")
+    if {"q", "p"} & set(known.kept):
+        box = access.group_at(file, f"{base}/box")
+        if box is None or not {"dimension", "boundary"} <= access.attributes(box).keys():
             yield Finding(place=f"{base}/box", what="missing, or without dimension and boundary")
-
-
-def _digest(dataset: Any) -> str:
-    total = hashlib.sha256()
-    rows = max(1, PIECE // max(1, int(np.prod(dataset.shape[1:]))))
-    for start in range(0, len(dataset), rows):
-        total.update(np.ascontiguousarray(dataset[start : start + rows], dtype="<f8").data)
-    return total.hexdigest()

@@ -20,8 +20,9 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import files, layout, seal
-from springcheck.store.layout import Column, Scalar
+from springcheck.store import digests, files, layout, seal
+from springcheck.store.access import Scalar
+from springcheck.store.layout import Column
 
 BUFFER = 1 << 22
 """Bytes that one array collects before they are written."""
@@ -30,12 +31,12 @@ BUFFER = 1 << 22
 class Draft:
     """A streaming writer of one trajectory; a context that leaves nothing behind without `finish`."""
 
-    def __init__(self, path: Path, label: str, scene: Scene, *, sequence: int = 0) -> None:
-        """`path` is where the finished part goes; `sequence` is the label's place in the store."""
+    def __init__(self, path: Path, label: str, scene: Scene, *, sequence: int = 0, run: str = "") -> None:
+        """`path` is where the finished part of this run goes; `sequence` is its place in the store."""
         layout.check_label(label)
-        self.path, self.label, self.scene, self.sequence = path, label, scene, sequence
+        self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
         self.rows = 0
-        self._temporary = path.with_name(path.name + ".new")
+        self._temporary = files.temporary(path)
         self._columns = layout.columns(label, scene, scene.frames)
         self._hash = {name: hashlib.sha256() for name in self._columns}
         widest = max(column.size for column in self._columns.values()) // scene.frames
@@ -146,7 +147,7 @@ class Draft:
             content = content[self._files[name].write(content) :]
 
     def _shorten(self) -> None:
-        long, offsets = self._temporary.with_name(self._temporary.name + ".long"), self._offsets
+        long, offsets = files.temporary(self.path), self._offsets
         self._temporary.replace(long)
         try:
             self._create(self.rows)
@@ -159,8 +160,8 @@ class Draft:
             long.unlink(missing_ok=True)
 
     def _complete(self, attributes: Mapping[str, Scalar | None]) -> str:
-        digests = {name: total.hexdigest() for name, total in self._hash.items()}
-        digest = combined(digests, self._columns)
+        found = {name: total.hexdigest() for name, total in self._hash.items()}
+        digest = digests.combined(found, self._columns)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         given = {name: value for name, value in attributes.items() if value is not None}
         text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.to_toml()])
@@ -182,12 +183,12 @@ class Draft:
             }
             layout.write_attributes(parameters, {**layout.machine(), **given, **known})
             for name, column in self._columns.items():
-                layout.write_attributes(file[column.path], {"sha256": digests[name]})
+                layout.write_attributes(file[column.path], {"sha256": found[name]})
         extents = [
-            seal.Extent(name=column.path, offset=self._offsets[name], size=column.size, sha256=digests[name])
+            seal.Extent(name=column.path, offset=self._offsets[name], size=column.size, sha256=found[name])
             for name, column in self._columns.items()
         ]
-        seal.attach(self._temporary, extents)
+        seal.attach(self._temporary, extents, self.run)
         return digest
 
     def _close(self) -> None:
@@ -207,19 +208,6 @@ class Draft:
         self._close()
         with contextlib.suppress(OSError):
             self._temporary.unlink(missing_ok=True)
-
-
-def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
-    """The digest of a trajectory: sha256 over the sha256 of time, q, p and energy, with their shapes.
-
-    Little-endian float64, nothing of clock or machine: equal exactly when two runs agree bit for bit.
-    """
-    lines = [
-        f"{name} {columns[name].shape} {digests[name]}"
-        for name in ("time", "q", "p", "energy")
-        if name in digests
-    ]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 def _lay_out(

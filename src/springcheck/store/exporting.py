@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 from springcheck.errors import StoreError
-from springcheck.store import files, layout, reading
-
-_ELEMENTS = ("position", "velocity")
+from springcheck.store import access, files, layout, reading
 
 
 def export(path: str | Path, label: str, out: str | Path) -> None:
@@ -18,56 +17,64 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
     without particles, and a path that exists.
     """
     path, out = Path(path), Path(out)
-    if out.exists():
+    if os.path.lexists(out):
         raise StoreError(f"{out} exists: remove it or name another file")
     folder = out.absolute().parent
     if not folder.is_dir():
         raise StoreError(f"cannot write {out}: there is no folder {folder}")
     if out.suffix != ".h5md":
         raise StoreError(f"{out}: the name must end in .h5md, readers go by it")
-    source = reading.source_of(path, label)
-    with reading.opened(source) as file:
-        group = file.get(f"particles/{label}")
-        if group is None:
+    with reading.opened(reading.source_of(path, label)) as file:
+        known, attributes = reading.known_of(file, label)
+        if known.kind != "particles" or not {"q", "p"} & set(known.kept):
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
-        total = sum(group[name]["value"].size * 8 for name in _ELEMENTS if name in group)
-        temporary = out.with_name(out.name + ".new")
+        base, wide = f"observables/{label}", (known.frames, known.particles)
+        velocity = "velocity" if "velocity" in access.children(file, base) else "p"
+        arrays = {
+            element: access.array(file, f"{base}/{name}/value", wide)
+            for element, kept, name in (("position", "q", "q"), ("velocity", "p", velocity))
+            if kept in known.kept
+        }
+        first = f"{base}/{known.kept[0]}"
+        columns = {
+            "time": access.array(file, f"{first}/time", wide[:1]),
+            "step": access.array(file, f"{first}/step", wide[:1], "i"),
+            "mass": access.array(file, f"particles/{label}/mass", wide[1:]),
+        }
+        made = files.temporary(out)
         with files.told(out, "write"):
             try:
-                _write(temporary, file, group, label, total)
-                files.put(temporary, out)
+                size = sum(2 * values.size * 8 for values in arrays.values())
+                with layout.fresh(made, size + 24 * known.frames) as target:
+                    layout.begin(target)
+                    layout.write_attributes(target, {"format": layout.EXPORTED})
+                    group = target.create_group("particles/trajectory")
+                    _write(group, arrays, columns, layout.UNITS[known.kind, known.units])
+                    layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
+                files.put(made, out)
             finally:
-                temporary.unlink(missing_ok=True)
+                made.unlink(missing_ok=True)
 
 
-def _write(path: Path, file: Any, group: Any, label: str, total: int) -> None:
-    with layout.fresh(path, 2 * total) as out:
-        layout.begin(out)
-        layout.write_attributes(out, {"format": layout.EXPORTED})
-        target = out.create_group("particles/trajectory")
-        file.copy(group["box"], target, "box")
-        first: Any = None
-        for name in _ELEMENTS:
-            if name not in group:
-                continue
-            made = target.create_group(name)
-            _copy_values(group[name]["value"], made)
-            if first is None:
-                first = made
-                file.copy(group[name]["time"], made, "time")
-                file.copy(group[name]["step"], made, "step")
-            else:
-                made["time"], made["step"] = first["time"], first["step"]
-        file.copy(group["mass"], target, "mass")
-        layout.write_attributes(out.create_group("parameters/trajectory"), reading.parameters(file, label))
+def _write(group: Any, arrays: dict[str, Any], columns: dict[str, Any], unit: layout.UnitsOf) -> None:
+    layout.write_box(group)
+    first = next(iter(arrays))
+    for name, source in arrays.items():
+        element = group.create_group(name)
+        _copy_values(source, element)
+        layout.write_unit(element["value"], unit["q" if name == "position" else "velocity"])
+        for kind in ("time", "step"):
+            # two elements share them
+            element[kind] = group[f"{first}/{kind}"] if name != first else columns[kind][()]
+        layout.write_unit(element["time"], unit["time"])
+    group["mass"] = columns["mass"][()]
+    layout.write_unit(group["mass"], unit["mass"])
 
 
 def _copy_values(source: Any, target: Any) -> None:
-    """Copy (frames, n, 3) in pieces: only x is written, y and z are the fill value of their chunks."""
-    frames, n, _ = source.shape
+    """Write (frames, n) as x of (frames, n, 3), in pieces; y and z are the fill value of their chunks."""
+    frames, n = source.shape
     rows = max(1, min(frames, layout.CHUNK // (8 * n)))
-    made = target.create_dataset("value", source.shape, "<f8", chunks=(rows, n, 1), fillvalue=0.0)
+    made = target.create_dataset("value", (frames, n, 3), "<f8", chunks=(rows, n, 1), fillvalue=0.0)
     for start in range(0, frames, rows):
-        made[start : start + rows, :, 0] = source[start : start + rows, :, 0]
-    for key in ("unit", "units"):
-        layout.write_attributes(made, {key: source.attrs[key]})
+        made[start : start + rows, :, 0] = source[start : start + rows]

@@ -8,18 +8,29 @@ import json
 import os
 import platform
 import re
+import secrets
 import shutil
+import stat
 import sys
+import time
+import warnings
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, StoreWarning
 
 JOURNAL = ".parts"
 """Ending of the folder of a store that is being written."""
+JOURNAL_FORMAT = "springcheck journal 1"
+
+TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
+"""Names of files that are being written: of a user's files none is called so."""
+
+UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK}
+"""What a file system says that does not offer an operation."""
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",
@@ -62,22 +73,26 @@ def shown(path: Path) -> Path:
     return path
 
 
+BROKEN = (
+    OSError,
+    KeyError,
+    ValueError,
+    TypeError,
+    RuntimeError,
+    AttributeError,
+    IndexError,
+    ArithmeticError,
+    MemoryError,
+)
+"""What reading a damaged file may raise."""
+
+
 @contextlib.contextmanager
 def told(path: Path, doing: str) -> Iterator[None]:
     """Turn whatever goes wrong with a file into a StoreError of one line: "cannot `doing` path: why"."""
     try:
         yield
-    except (
-        OSError,
-        KeyError,
-        ValueError,
-        TypeError,
-        RuntimeError,
-        AttributeError,
-        IndexError,
-        OverflowError,
-        MemoryError,
-    ) as error:
+    except BROKEN as error:
         raise StoreError(f"cannot {doing} {shown(path)}: {cause(error)}") from error
 
 
@@ -105,16 +120,45 @@ def readable(size: float) -> str:
 def reserve(file: BinaryIO, size: int) -> None:
     """Take up `size` bytes on the disk now, so that no later write can find it full.
 
-    libhdf5 cannot close a file whose last write failed; with the room taken beforehand none fails.
+    libhdf5 cannot close a file whose last write failed; with the room taken beforehand none fails.  Where
+    the system cannot reserve, zeros are written.
     """
     if hasattr(os, "posix_fallocate"):
-        os.posix_fallocate(file.fileno(), 0, size)
-    else:
-        file.seek(0, os.SEEK_END)
-        block = bytes(1 << 20)
-        for start in range(file.tell(), size, len(block)):
-            file.write(block[: size - start])
-        file.flush()
+        try:
+            os.posix_fallocate(file.fileno(), 0, size)
+            return
+        except OSError as error:
+            if error.errno not in UNSUPPORTED:
+                raise
+    file.seek(0, os.SEEK_END)
+    block = bytes(1 << 20)
+    for start in range(file.tell(), size, len(block)):
+        file.write(block[: size - start])
+    file.flush()
+
+
+def created(path: Path) -> BinaryIO:
+    """A new file, open for reading and writing; FileExistsError where anything has its name, a link too."""
+    how = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    return os.fdopen(os.open(path, how, 0o666), "rb+")
+
+
+def own(path: Path, *, create: bool = False) -> BinaryIO:
+    """A file of a journal, open for reading, with `create` for writing as well.
+
+    ValueError where it is no plain file with one name: a link would lead to a file of the user's.
+    """
+    how = os.O_RDWR | os.O_CREAT if create else os.O_RDONLY
+    for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"):
+        how |= getattr(os, flag, 0)
+    if path.is_symlink():
+        raise ValueError(f"{path} is a link")
+    handle = os.open(path, how, 0o666)
+    status = os.fstat(handle)
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+        os.close(handle)
+        raise ValueError(f"{path} is no file of its own")
+    return os.fdopen(handle, "rb+" if create else "rb")
 
 
 def sync_folder(folder: Path) -> None:
@@ -124,61 +168,96 @@ def sync_folder(folder: Path) -> None:
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
+    except OSError as error:
+        if error.errno not in UNSUPPORTED:
+            raise
     finally:
         os.close(handle)
 
 
-def put(temporary: Path, path: Path) -> None:
+def temporary(path: Path) -> Path:
+    """A name beside `path` for a file that takes its place when it is complete."""
+    return path.with_name(f"springcheck-{secrets.token_hex(8)}.new")
+
+
+def put(complete: Path, path: Path) -> None:
     """Move a complete file to its place: fsync, os.replace, fsync of the folder."""
-    with temporary.open("rb+") as file:
+    with complete.open("rb+") as file:
         os.fsync(file.fileno())
-    temporary.replace(path)
+    complete.replace(path)
     sync_folder(path.absolute().parent)
 
 
 def put_bytes(content: bytes, path: Path) -> None:
     """Write a small file whole or not at all."""
-    temporary = path.with_name(path.name + ".new")
+    made = temporary(path)
     try:
-        temporary.write_bytes(content)
-        put(temporary, path)
+        with created(made) as file:
+            file.write(content)
+        put(made, path)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        made.unlink(missing_ok=True)
         raise
 
 
 class Lock:
-    """One writer at a time.  The lock is the system's, so that it ends with its process, killed or not."""
+    """One writer at a time.  The lock is the system's, so that it ends with its process, killed or not.
+
+    Where the file system has no locks, the file itself says who writes, and a `StoreWarning` that two
+    writers on two machines would not see each other.
+    """
 
     def __init__(self, path: Path) -> None:
         """Take the lock file `path`, or raise StoreError that says who holds it."""
         self.path = path
         while True:
-            self._file = path.open("a+b")
-            if not _taken(self._file):
-                holder = self._holder()
+            try:
+                self._file = own(path, create=True)
+            except (ValueError, OSError) as error:
+                raise StoreError(f"{path} stands where the lock of a store goes; move it away") from error
+            try:
+                self._take()
+                # between open and lock the last holder may have removed the file: then its name is free again
+                with contextlib.suppress(FileNotFoundError):
+                    if os.path.samestat(path.stat(), os.fstat(self._file.fileno())):
+                        break
+            except BaseException:
                 self._file.close()
-                raise StoreError(f"{path.parent} is being written by {holder}: wait for it, or stop it first")
-            # between open and lock the last holder may have removed the file: then its name is free again
-            with contextlib.suppress(FileNotFoundError):
-                if os.path.samestat(path.stat(), os.fstat(self._file.fileno())):
-                    break
+                raise
             self._file.close()
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        self._file.truncate(0)
-        self._file.write(json.dumps({"pid": os.getpid(), "host": platform.node(), "since": now}).encode())
-        self._file.flush()
 
-    def _holder(self) -> str:
+    def _take(self) -> None:
+        taken = _taken(self._file)
         self._file.seek(0)
-        try:
-            who = json.loads(self._file.read())
-            return f"process {who['pid']} on {who['host']} since {who['since']}"
-        except (ValueError, KeyError, TypeError, OSError):
-            return "another process"
+        content = self._file.read(4096)
+        who = _holder(content)
+        self._system = taken is not None
+        if taken is False or (not self._system and _alive(who)):
+            by = f"process {who['pid']} on {who['host']} since {who['since']}" if who else "another process"
+            raise StoreError(f"{self.path.parent} is being written by {by}: wait for it, or stop it first")
+        # a full disk may have cut it off
+        if content and not who and not content.startswith(b'{"pid": '):
+            raise StoreError(f"{self.path} stands where the lock of a store goes; move it away")
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        mine = {"pid": os.getpid(), "host": platform.node(), "since": now, "token": secrets.token_hex(4)}
+        self._write(json.dumps(mine).encode())
+        if not self._system:
+            time.sleep(0.05)
+            if _holder(self.path.read_bytes()) != mine:
+                raise StoreError(f"{self.path.parent} is being written by another process")
+            said = f"{self.path.parent}: this file system has no locks; let no second program write the store"
+            warnings.warn(said, StoreWarning, stacklevel=4)
+
+    def _write(self, content: bytes) -> None:
+        self._file.seek(0)
+        self._file.truncate(0)
+        self._file.write(content)
+        self._file.flush()
 
     def release(self) -> None:
         """Give the lock back; its file stays until the journal goes."""
+        if not self._file.closed and not self._system:
+            self._write(b"")
         self._file.close()
 
     def __enter__(self) -> Lock:
@@ -190,7 +269,32 @@ class Lock:
         self.release()
 
 
-def _taken(file: BinaryIO) -> bool:
+def _holder(content: bytes) -> dict[str, Any]:
+    """Who holds a lock, from what its file says; nothing where it is no lock file of ours."""
+    try:
+        who = json.loads(content)
+        return dict(who) if {"pid", "host", "since"} <= set(who) and isinstance(who["pid"], int) else {}
+    except (ValueError, TypeError, RecursionError):
+        return {}
+
+
+def _alive(who: dict[str, Any]) -> bool:
+    """Whether a holder still runs, as far as can be known from here."""
+    if not who:
+        return False
+    if who["host"] != platform.node():
+        return True
+    try:
+        os.kill(who["pid"], 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _taken(file: BinaryIO) -> bool | None:
+    """Whether the system gave the lock; None where it has none to give."""
     if sys.platform == "win32":
         import msvcrt
 
@@ -205,4 +309,8 @@ def _taken(file: BinaryIO) -> bool:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
+    except OSError as error:
+        if error.errno not in UNSUPPORTED:
+            raise
+        return None
     return True

@@ -12,10 +12,12 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.errors import StoreError
-from springcheck.store import files, trust
+from springcheck.store import access, files, trust
 
-EXPANSION = 1100
-"""More than deflate can expand (1032); an array that claims more than this times the file is damaged."""
+MOST_NUMBERS = 1 << 24
+"""Positions of one particle group that are read [numbers]: frames beyond are left out."""
+MOST_FRAMES = 1 << 25
+"""Frames of a file that is looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,39 +53,37 @@ def read_foreign(path: str | Path, most: int | None = None) -> dict[str, Foreign
 def load(path: Path, most: int | None = None) -> dict[str, Foreign]:
     """The same in this process, whatever the file does to libhdf5."""
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-        groups = file.get("particles")
-        if not isinstance(groups, h5py.Group) or not len(groups):
+        names = access.children(file, "particles")
+        if not names:
             raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
-        found = dict(_groups(path, groups, most))
+        found = dict(_groups(path, file, names, most))
         if not found:
-            names = ", ".join(groups)
             raise StoreError(
-                f"{path} has no group under /particles with both position and velocity ({names}): "
+                f"{path} has no group under /particles with both position and velocity ({', '.join(names)}): "
                 "write velocities too, nothing can be told from positions alone"
             )
         return found
 
 
-def _groups(path: Path, groups: Any, most: int | None) -> Iterator[tuple[str, Foreign]]:
-    for name in groups:
-        group = groups.get(name)
-        if not isinstance(group, h5py.Group) or not {"position", "velocity"} <= set(group):
+def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:
+    for name in names:
+        group = access.find(file, f"particles/{name}")
+        if not isinstance(group, h5py.Group) or not {"position", "velocity"} <= set(access.members(group)):
             continue
-        q, v = group["position"], group["velocity"]
-        t, rows_q, rows_v = _common(path, name, q, v)
-        if most is not None and len(t) > most:
-            t, rows_q, rows_v = t[:most], _first(rows_q, most), _first(rows_v, most)
-        values = [_values(path, q["value"], rows_q), _values(path, v["value"], rows_v)]
-        if values[0].ndim != 3 or values[0].shape != values[1].shape or len(values[0]) == 0:
-            raise StoreError(
-                f"{path}: position {values[0].shape} and velocity {values[1].shape} of {name} are not "
-                "both (frames, particles, dimensions)"
-            )
-        units = {
-            key: _unit(node) for key, node in (("q", q["value"]), ("v", v["value"]), ("t", q.get("time")))
-        }
-        mass, units["mass"] = _mass(path, group)
-        kinds = [q["value"].dtype, v["value"].dtype]
+        q, v = _numbers(path, group, "position/value"), _numbers(path, group, "velocity/value")
+        if q.ndim != 3 or q.shape[1:] != v.shape[1:] or not q.size:
+            raise _unlike(path, name, q.shape, v.shape)
+        t, rows_q, rows_v = _common(path, name, group, len(q), len(v))
+        kept = max(1, MOST_NUMBERS // (q.shape[1] * q.shape[2]))
+        kept = kept if most is None else min(most, kept)
+        if len(t) > kept:
+            t, rows_q, rows_v = t[:kept], _first(rows_q, kept), _first(rows_v, kept)
+        values = [np.asarray(dataset[rows], np.float64) for dataset, rows in ((q, rows_q), (v, rows_v))]
+        if values[0].shape != values[1].shape:
+            raise _unlike(path, name, values[0].shape, values[1].shape)
+        time = access.find(group, "position/time")
+        units = {key: _unit(node) for key, node in (("q", q), ("v", v), ("t", time))}
+        mass, units["mass"] = _mass(path, group, q.shape[1])
         yield (
             name,
             Foreign(
@@ -93,9 +93,17 @@ def _groups(path: Path, groups: Any, most: int | None) -> Iterator[tuple[str, Fo
                 v=values[1],
                 mass=mass,
                 units={key: unit for key, unit in units.items() if unit},
-                roundoff=max(float(np.finfo(kind).eps) / 2 for kind in kinds),
+                roundoff=max(
+                    float(np.finfo(kind).eps) / 2 if kind.kind == "f" else 0.5 for kind in (q.dtype, v.dtype)
+                ),
             ),
         )
+
+
+def _unlike(path: Path, name: str, q: tuple[int, ...], v: tuple[int, ...]) -> StoreError:
+    return StoreError(
+        f"{path}: position {q} and velocity {v} of {name} are not both (frames, particles, dimensions)"
+    )
 
 
 def _first(rows: Any, most: int) -> Any:
@@ -103,60 +111,61 @@ def _first(rows: Any, most: int) -> Any:
     return slice(0, most) if isinstance(rows, slice) else rows[:most]
 
 
-def _values(path: Path, dataset: Any, rows: Any = ()) -> Floats:
-    """A dataset, or rows of it, as float64; StoreError where it is none or larger than its file."""
-    if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu":
-        raise StoreError(f"{path}: {getattr(dataset, 'name', 'a dataset')} is no array of numbers")
-    claimed = dataset.size * dataset.dtype.itemsize
-    if claimed > EXPANSION * path.stat().st_size:
-        raise StoreError(f"{path} is damaged: {dataset.name} claims {files.readable(claimed)}")
-    return np.asarray(dataset[rows], dtype=np.float64)
+def _numbers(path: Path, group: Any, name: str) -> Any:
+    """A dataset of numbers; StoreError where it is none, or does not lie in the file."""
+    dataset = access.dataset_at(group, name, packed=True)
+    if dataset.dtype.kind not in "fiu" or dataset.shape is None:
+        raise StoreError(f"{path}: {dataset.name} is no array of numbers")
+    return dataset
 
 
-def _common(path: Path, name: str, q: Any, v: Any) -> tuple[Floats, Any, Any]:
+def _common(path: Path, name: str, group: Any, frames: int, frames_v: int) -> tuple[Floats, Any, Any]:
     """Times, and the rows of positions and of velocities that share a step."""
-    t = _axis(path, q, "time")
-    t_v = _axis(path, v, "time")
+    t = _axis(path, group, "position", "time", frames)
+    t_v = _axis(path, group, "velocity", "time", frames_v)
     if t.shape == t_v.shape and np.array_equal(t, t_v):
         return t, slice(None), slice(None)
-    step, step_v = _axis(path, q, "step"), _axis(path, v, "step")
+    step = _axis(path, group, "position", "step", frames)
+    step_v = _axis(path, group, "velocity", "step", frames_v)
     _, rows, rows_v = np.intersect1d(step, step_v, return_indices=True)
     if len(rows) == 0:
         raise StoreError(f"{path}: no position and velocity of {name} belong to the same step")
     return t[rows], rows, rows_v
 
 
-def _axis(path: Path, element: Any, name: str) -> Floats:
+def _axis(path: Path, group: Any, element: str, name: str, frames: int) -> Floats:
     """Time or step of every frame; a scalar means a fixed interval (H5MD 1.1), with an optional offset."""
-    if name not in element:
+    if frames > MOST_FRAMES:
+        raise StoreError(f"{path}: {group.name}/{element} has {frames} frames, more than can be looked at")
+    if access.find(group, f"{element}/{name}") is None:
         if name == "time":
-            raise StoreError(f"{path}: {element.name} has no time: nothing can be told without it")
-        return _axis(path, element, "time")
-    values = _values(path, element[name])
-    frames = len(element["value"])
-    if values.ndim == 0:
-        offset = float(np.asarray(element[name].attrs.get("offset", 0)))
-        return np.asarray(offset + np.arange(frames) * float(values))
-    if values.shape != (frames,):
-        raise StoreError(f"{path}: {element.name} has {frames} frames and {name} of shape {values.shape}")
-    return values
+            raise StoreError(f"{path}: {group.name}/{element} has no time: nothing can be told without it")
+        return _axis(path, group, element, "time", frames)
+    dataset = _numbers(path, group, f"{element}/{name}")
+    if dataset.ndim == 0:
+        offset = access.attributes(dataset).get("offset", 0.0)
+        if not isinstance(offset, int | float):
+            raise StoreError(f"{path}: offset of {dataset.name} is no number")
+        return np.asarray(float(offset) + np.arange(frames) * float(dataset[()]))
+    if dataset.shape != (frames,):
+        raise StoreError(
+            f"{path}: {group.name}/{element} has {frames} frames and {name} of shape {dataset.shape}"
+        )
+    return np.asarray(dataset[()], np.float64)
 
 
-def _mass(path: Path, group: Any) -> tuple[Floats | None, str]:
-    if "mass" not in group:
+def _mass(path: Path, group: Any, n: int) -> tuple[Floats | None, str]:
+    node = access.find(group, "mass")
+    if node is None:
         return None, ""
-    node = group["mass"]
-    dataset = node["value"] if isinstance(node, h5py.Group) else node
-    values = _values(path, dataset)
-    n = group["position"]["value"].shape[1]
-    values = values[0] if values.ndim == 2 and len(values) else values
-    if values.shape not in {(), (n,)}:
-        raise StoreError(f"{path}: mass of {group.name} has shape {values.shape}, not ({n},)")
+    dataset = _numbers(path, group, "mass/value" if isinstance(node, h5py.Group) else "mass")
+    per_frame = dataset.ndim == 2 and len(dataset) > 0
+    if (dataset.shape[1:] if per_frame else dataset.shape) not in {(), (n,)}:
+        raise StoreError(f"{path}: mass of {group.name} has shape {dataset.shape}, not ({n},)")
+    values = np.asarray(dataset[0] if per_frame else dataset[()], np.float64)
     return np.broadcast_to(values, (n,)).copy(), _unit(dataset)
 
 
 def _unit(node: Any) -> str:
-    if node is None:
-        return ""
-    unit = node.attrs.get("unit", node.attrs.get("units", ""))
-    return unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
+    known = {} if node is None else access.attributes(node)
+    return str(known.get("unit", known.get("units", "")))

@@ -10,20 +10,22 @@ from __future__ import annotations
 
 import contextlib
 import json
-import shutil
+import os
+import re
 import uuid
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 import h5py
 
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, StoreWarning
 from springcheck.physics.scene import Scene
-from springcheck.store import adopt, files, layout, merge, reading, tables
+from springcheck.store import adopt, files, layout, merge, reading, records, seal, tables
+from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.layout import Scalar
 from springcheck.store.reading import Parts, parts_folder
 from springcheck.store.tables import Table
 from springcheck.trajectory import Comparison, Trajectory, Verdict
@@ -52,13 +54,17 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         # --force would put a file in the place of /dev/null
         raise StoreError(f"cannot write {path}: it is a device or a pipe, a store is a file")
     if path.suffix == ".toml":
-        # a slip of the hand with --force would cost the scene
         raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")
     parts = parts_folder(path)
-    if parts.exists() and not parts.is_dir():
-        raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
-    if path.exists() and not force and not parts.is_dir():
-        raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
+    with files.told(path, "write"):
+        if not _is_free(parts):
+            raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
+        if path.exists() and not force and not parts.is_dir():
+            raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
+        if path.exists() and not _is_ours(path):
+            raise StoreError(
+                f"{path} is no store of springcheck, and is not replaced; -o writes another file"
+            )
     with files.told(folder, "write into"):
         parts.mkdir(exist_ok=True)
         lock = files.Lock(parts / "lock")
@@ -72,14 +78,40 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     return Journal(path, run, lock)
 
 
+_NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table)-.*\.h5|{files.TEMPORARY.pattern}")
+"""What files of a journal are called: nothing else in its folder is ever touched."""
+
+
+def _is_free(parts: Path) -> bool:
+    """Whether a journal may be here: there is nothing yet, or it is recognisably one of ours."""
+    if not os.path.lexists(parts):
+        return True
+    if parts.is_symlink() or not parts.is_dir():
+        return False
+    known = {entry.name for entry in parts.iterdir()}
+    if "command" in known:
+        with contextlib.suppress(StoreError):
+            return reading.claim(parts) is not None
+        return False
+    # what a kill at the very beginning or end has left; the lock is looked at as it is taken
+    return all(name == "lock" or files.TEMPORARY.fullmatch(name) for name in known)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file is a store of ours, whole or damaged, or empty."""
+    with path.open("rb") as file:
+        start = file.read(1 << 20)
+    return not start or (start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start)
+
+
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal that is taken up or started."""
     known = reading.claim(parts)
     if known is not None and (not force or known["forced"]):
         if known["command"] == command:
-            adopt.recover(parts, parts / COLLECTION)
-            for left in parts.glob("*.new*"):
-                left.unlink()
+            adopt.recover(parts, parts / COLLECTION, known["run"])
+            _remove(parts, lambda name: name.endswith(".new"))
+            _look_at_parts(parts, known["run"])
             return known["run"]
         if not force:
             raise StoreError(
@@ -88,31 +120,53 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
             )
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
-    for old in parts.iterdir():
-        if old.name != "lock":
-            old.unlink()
+    _remove(parts, lambda name: name not in {"lock", "command"})
     run = uuid.uuid4().hex
-    files.put_bytes(json.dumps({"run": run, "command": command, "forced": force}).encode(), parts / "command")
+    content = {"format": files.JOURNAL_FORMAT, "run": run, "command": command, "forced": force}
+    files.put_bytes(json.dumps(content).encode(), parts / "command")
     files.sync_folder(path.absolute().parent)
     return run
+
+
+def _look_at_parts(parts: Path, run: str) -> None:
+    """Remove the damaged parts of a run, and say so: they alone are measured again."""
+    for part in sorted(parts.glob("*-*.h5")):
+        name = unquote(part.stem.partition("-")[2])
+        known = seal.find(part)
+        if known is not None and known.run != run:
+            said = f"{part} is a part of another run and is left out: {name} is measured again"
+        elif known is None or not seal.is_whole(part, known) or seal.broken(part, known):
+            part.unlink()
+            said = f"{part} was damaged and is removed: {name} is measured again"
+        else:
+            continue
+        warnings.warn(said, StoreWarning, stacklevel=5)
+
+
+def _remove(parts: Path, which: Callable[[str], bool]) -> None:
+    """Delete files of a journal, those of its names alone."""
+    for entry in parts.iterdir():
+        if _NAMES.fullmatch(entry.name) and which(entry.name):
+            entry.unlink(missing_ok=True)
 
 
 def _leave(parts: Path) -> None:
     """Remove a journal that holds nothing but its lock."""
     with contextlib.suppress(OSError):
-        if {entry.name for entry in parts.iterdir()} <= {"lock"}:
-            shutil.rmtree(parts)
+        if {entry.name for entry in parts.iterdir()} == {"lock"}:
+            (parts / "lock").unlink()
+        parts.rmdir()
 
 
-def _give_up(temporary: Path) -> None:
+def _give_up(temporary: Path, run: str) -> None:
     """After a commit that failed: the adopted part goes back, the disk is free again.
 
     Not while libhdf5 still holds the file, which it might write to later; then the next writer does it.
     """
     held = h5py.h5f.get_obj_ids(h5py.h5f.OBJ_ALL, h5py.h5f.OBJ_FILE)
     if not any(Path(h5py.h5f.get_name(one).decode()) == temporary for one in held):
-        with contextlib.suppress(OSError):
-            adopt.recover(temporary.parent, temporary)
+        with contextlib.suppress(OSError, StoreError):
+            adopt.recover(temporary.parent, temporary, run)
             temporary.unlink(missing_ok=True)
 
 
@@ -137,19 +191,20 @@ class Journal:
         """A writer of one trajectory (see `Draft`)."""
         # the one writer need look at what is there only once
         self._sequence = (self._sequence or len(self.sources())) + 1
-        return Draft(self._part("run", label), label, scene, sequence=self._sequence)
+        path = self._part("run", label)
+        return Draft(path, label, scene, sequence=self._sequence, run=self.run)
 
     def save(self, trajectory: Trajectory, scene: Scene) -> str:
         """Store a trajectory that is at hand in full -> digest."""
         with self.draft(trajectory.label, scene) as draft:
             draft.append(trajectory.t, trajectory.q, trajectory.p, trajectory.energy)
-            return draft.finish(reading.attributes(trajectory))
+            return draft.finish(records.attributes(trajectory))
 
     def add(self, table: Table) -> None:
         """Store one table; once this returns it outlives crashes."""
         if table.name.split("/")[0] in layout.RESERVED:
             raise ValueError(f"a table cannot be called {table.name!r}")
-        image = merge.image({"part": table.name}, [table])
+        image = merge.image({"part": table.name, "run": self.run}, [table])
         with files.told(self.folder, "write"):
             files.put_bytes(image, self._part("table", table.name))
 
@@ -183,9 +238,10 @@ class Journal:
         temporary = self.folder / COLLECTION
         with files.told(self.path, "write"):
             try:
+                temporary.unlink(missing_ok=True)
                 merge.collection(temporary, found, root, extra, documents or {})
             except BaseException:
-                _give_up(temporary)
+                _give_up(temporary, self.run)
                 raise
             files.put(temporary, self.path)
             adopt.settled(self.folder)
@@ -197,7 +253,10 @@ class Journal:
     def _end(self) -> None:
         """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
         (self.folder / "command").unlink()
-        shutil.rmtree(self.folder)
+        _remove(self.folder, lambda _: True)
+        with contextlib.suppress(OSError):
+            # what a user has put into it stays
+            self.folder.rmdir()
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"

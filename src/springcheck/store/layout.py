@@ -32,13 +32,13 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
-from springcheck.store import files
+from springcheck.store import access, files
+from springcheck.store.access import Scalar
 
-Scalar: TypeAlias = str | float | int | bool
-
-FORMAT = "springcheck store 1"
+FORMAT = "springcheck store 2"
+OLDER = "springcheck store 1"
 EXPORTED = "springcheck trajectory 1"
-"""Format of a store, and of a trajectory on its own."""
+"""Format of a store, of one by an older version, and of a trajectory on its own."""
 LIBVER = ("v110", "v110")
 """Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
 
@@ -56,7 +56,8 @@ _MD_ROTOR = {**_MD, "q": "rad", "p": "u nm2 ps-1", "velocity": "rad ps-1", "mass
 _SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass": "kg m2"}
 _SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
 _BARE = dict.fromkeys(_MD, "1")
-_UNITS: Mapping[tuple[str, str], Mapping[str, str]] = {
+UnitsOf: TypeAlias = Mapping[str, str]
+UNITS: Mapping[tuple[str, str], UnitsOf] = {
     ("particles", "md"): _MD,
     ("particles", "reduced"): _MD,
     ("particles", "si"): _SI,
@@ -86,13 +87,16 @@ class Column:
 
 def check_label(label: str) -> None:
     """Raise StoreError for a label that cannot be the name of a group."""
-    if not label or "/" in label or label in {".", ".."} or "\0" in label:
-        raise StoreError(f"{label!r} cannot name a trajectory: no '/', '.', '..' and not empty")
+    if not access.is_name(label) or "/" in label or label in {".", ".."}:
+        raise StoreError(
+            f"{label!r} cannot name a trajectory: it is empty, longer than {access.LONGEST_NAME} characters, "
+            "not printable, or holds '/' or is '.' or '..'"
+        )
 
 
-def units(scene: Scene) -> Mapping[str, str]:
+def units(scene: Scene) -> UnitsOf:
     """Unit strings of q, p, energy, velocity, time and mass."""
-    return _UNITS[scene.kind, scene.units]
+    return UNITS[scene.kind, scene.units]
 
 
 def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
@@ -129,7 +133,7 @@ def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
 
 def begin(file: Any) -> None:
     """The head of every file of ours: /h5md and what it is."""
-    write_attributes(file, {"NX_class": "NXroot", "format": FORMAT})
+    write_attributes(file, {"NX_class": "NXroot"})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
@@ -139,7 +143,9 @@ def begin(file: Any) -> None:
 
 @lru_cache(maxsize=1)
 def _empty() -> bytes:
+    """A file that holds nothing but its format, which so stands at the beginning of every file of ours."""
     with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        write_attributes(file, {"format": FORMAT})
         file.flush()
         return bytes(file.id.get_file_image())
 
@@ -152,7 +158,8 @@ def fresh(path: Path, size: int) -> Iterator[Any]:
     never the one to find the disk full.
     """
     files.room(path, size)
-    path.write_bytes(_empty())
+    with files.created(path) as raw:
+        raw.write(_empty())
     with reopened(path, size) as file:
         yield file
 
@@ -221,9 +228,7 @@ def _link(element: Any, time: Any, step: Any) -> None:
 def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column], frames: int) -> None:
     unit = units(scene)
     group = file.create_group(f"particles/{label}")
-    box = group.create_group("box")
-    box.attrs["dimension"] = 3
-    write_attributes(box, {"boundary": ["none"] * 3})
+    write_box(group)
     time, step = file[found["time"].path], file[found["step"].path]
     for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
         if source not in found:
@@ -233,10 +238,22 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
         view[:, :, 0] = h5py.VirtualSource(".", found[source].path, found[source].shape, "<f8")
         element.create_virtual_dataset("value", view, fillvalue=0.0)
         text = unit["q"] if name == "position" else unit["velocity"]
-        write_attributes(element["value"], {"unit": text, "units": text})
+        write_unit(element["value"], text)
         _link(element, time, step)
     group["mass"] = scene.m.astype("<f8")
-    write_attributes(group["mass"], {"unit": unit["mass"], "units": unit["mass"]})
+    write_unit(group["mass"], unit["mass"])
+
+
+def write_unit(dataset: Any, unit: str) -> None:
+    """The unit under the names of H5MD and of NeXus."""
+    write_attributes(dataset, {"unit": unit, "units": unit})
+
+
+def write_box(group: Any) -> None:
+    """The box of a particle group: three dimensions without borders."""
+    box = group.create_group("box")
+    box.attrs["dimension"] = 3
+    write_attributes(box, {"boundary": ["none"] * 3})
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,8 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import adopt, files, layout, seal, tables
-from springcheck.store.layout import Scalar
+from springcheck.store import adopt, digests, files, layout, seal, tables
+from springcheck.store.access import Scalar
 from springcheck.store.reading import Parts
 from springcheck.store.tables import Table
 
@@ -59,6 +60,8 @@ def collection(
         _plots(file)
         extents = _extents(file)
         _check_tables(file, path)
+        found_digests = digests.contents(file, tables.all_names(file))
+        layout.write_attributes(file, {digests.KEY: json.dumps(found_digests, separators=(",", ":"))})
     there = {(extent.offset, extent.sha256) for extent in kept}
     with path.open("rb") as raw:
         for extent in extents:
@@ -66,19 +69,19 @@ def collection(
                 continue
             if seal.digest(raw, extent.offset, extent.size) != extent.sha256:
                 raise StoreError(f"{extent.name} was damaged on its way into {path}: check disk and memory")
-    seal.attach(path, extents)
+    seal.attach(path, extents, str(root["run"]))
 
 
 def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
     """A small sealed file of tables, as bytes."""
     with h5py.File("image", "w", driver="core", backing_store=False, libver=layout.LIBVER) as file:
         layout.begin(file)
-        layout.write_attributes(file, root)
+        layout.write_attributes(file, {"format": layout.FORMAT, **root})
         for table in content:
             tables.write(file, table)
         file.flush()
         body: bytes = file.id.get_file_image()
-    return seal.sealed(body)
+    return seal.sealed(body, str(root["run"]))
 
 
 def _bytes(table: Table) -> int:
@@ -125,7 +128,7 @@ def _extents(file: Any) -> list[seal.Extent]:
 
 def _check_tables(file: Any, path: Path) -> None:
     for name in tables.names(file):
-        if tables.digest(file[name]) != file[name].attrs["sha256"]:
+        if digests.of_table(file[name]) != file[name].attrs["sha256"]:
             raise StoreError(f"table {name} was damaged on its way into {path}: check disk and memory")
 
 

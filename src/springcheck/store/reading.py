@@ -8,19 +8,20 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 from urllib.parse import unquote
 
 import h5py
+import msgspec
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic
 from springcheck.errors import StoreError
-from springcheck.store import files, layout, tables, trust
-from springcheck.store.layout import Scalar
+from springcheck.store import access, files, layout, records, seal, tables, trust
+from springcheck.store.access import Scalar
+from springcheck.store.records import Record
 from springcheck.store.tables import Table
-from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
+from springcheck.trajectory import Comparison, Outcome, Trajectory, Verdict
 
 MAPPED = 1 << 26
 """Arrays larger than this [B] are mapped into memory, not read: their pages come when they are used."""
@@ -34,20 +35,28 @@ def parts_folder(path: Path) -> Path:
 
 
 def claim(parts: Path) -> dict[str, str] | None:
-    """Run id and command of a journal, and whether --force began it; None where there is no journal."""
+    """Run id and command of a journal of ours, and whether --force began it; None where there is none.
+
+    StoreError where what stands there cannot be read as ours.
+    """
     try:
-        found = json.loads((parts / "command").read_bytes())
-        forced = "forced" if found.get("forced") else ""
+        with files.own(parts / "command") as file:
+            found = json.loads(file.read(1 << 26))
+        if found["format"] != files.JOURNAL_FORMAT:
+            raise ValueError("another format")
+        forced = "forced" if found["forced"] else ""
         return {"run": str(found["run"]), "command": str(found["command"]), "forced": forced}
     except FileNotFoundError:
         return None
     except (ValueError, KeyError, TypeError, OSError) as error:
-        raise StoreError(f"cannot read {parts / 'command'}: remove it, or start over with --force") from error
+        raise StoreError(
+            f"cannot read {parts / 'command'}, which stands where the journal goes; move it away"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The files that make up a store: the collection, if it belongs to the run, and the parts."""
+    """The files that make up a store: the collection, if it belongs to the run, and the run's parts."""
 
     collection: Path | None
     parts: list[Path]
@@ -69,15 +78,19 @@ class Parts:
         if run is None and path.is_file() and not own:
             return cls(collection=path, parts=[])
         parts = sorted(folder.glob("*-*.h5")) if known is not None else []
-        return cls(collection=path if own else None, parts=parts)
+        return cls(
+            collection=path if own else None,
+            parts=[part for part in parts if (found := seal.find(part)) is None or found.run == known],
+        )
 
 
 def _run_of(path: Path) -> str:
-    try:
-        with opened(path) as file:
-            return str(file.attrs.get("run", ""))
-    except StoreError:
-        return ""
+    found = seal.find(path)
+    if found is not None:
+        return found.run
+    with contextlib.suppress(StoreError), opened(path) as file:
+        return str(access.attributes(file).get("run", ""))
+    return ""
 
 
 @contextlib.contextmanager
@@ -85,11 +98,14 @@ def opened(path: Path) -> Iterator[Any]:
     """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
     trust.trust(path, trust.OURS)
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-        if file.attrs.get("format") == layout.EXPORTED:
+        marked = access.attributes(file).get("format")
+        if marked == layout.EXPORTED:
             raise StoreError(
                 f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
             )
-        if file.attrs.get("format") != layout.FORMAT:
+        if marked == layout.OLDER:
+            raise StoreError(f"{path} was written by an older springcheck: run its scene again")
+        if marked != layout.FORMAT:
             raise StoreError(f"cannot read {path}: it is HDF5, but no store of springcheck")
         yield file
 
@@ -100,130 +116,52 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
     if found.collection is None and not found.parts and run is None:
         with files.told(path, "read"), path.open("rb"):
             pass
-    listed: list[tuple[float, str, Path]] = []
+    listed: list[tuple[int, str, Path]] = []
     if found.collection is not None:
         with opened(found.collection) as file:
             listed += [
-                (_sequence(file, label), label, found.collection) for label in file.get("parameters", ())
+                (known_of(file, label)[0].sequence, label, found.collection)
+                for label in access.children(file, "parameters")
             ]
     known = {label for _, label, _ in listed}
     for part in found.parts:
         kind, label = part.stem.split("-", 1)
         if kind == "run" and unquote(label) not in known:
             with opened(part) as file:
-                listed.append((_sequence(file, unquote(label)), unquote(label), part))
+                listed.append((known_of(file, unquote(label))[0].sequence, unquote(label), part))
     return {label: source for _, label, source in sorted(listed)}
 
 
-def _sequence(file: Any, label: str) -> float:
-    return float(file[f"parameters/{label}"].attrs.get("sequence", 0))
-
-
-def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
-    """What `Draft.finish` stores of a trajectory besides its numbers, which are not looked at."""
-    a = trajectory.arithmetic
-    origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
-    return {
-        "method": trajectory.label,
-        "scheme": trajectory.scheme,
-        "step": trajectory.step,
-        "every": trajectory.every,
-        "outcome": trajectory.outcome.status,
-        "outcome_step": trajectory.outcome.step,
-        "outcome_message": trajectory.outcome.message,
-        "start_seconds": trajectory.timing.start,
-        "run_seconds": trajectory.timing.run,
-        "force_calls": trajectory.force_calls,
-        "tolerance": trajectory.tolerance,
-        "arithmetic": a.name,
-        "state_roundoff": a.state,
-        "force_roundoff": a.force,
-        "force_quantum": a.quantum,
-        "force_overflow": a.overflow,
-        "parameter_precision": a.parameters,
-        "force_excess": a.excess,
-        "keeps_displacement": a.keeps_displacement,
-        "rebuilds_velocity": trajectory.rebuilds_velocity,
-        "off_axis": trajectory.off_axis,
-        **origin,
-    }
-
-
-def parameters(file: Any, label: str) -> dict[str, Scalar]:
-    """All that is known of a trajectory besides its numbers."""
-    group = file.get(f"parameters/{label}")
+def known_of(file: Any, label: str) -> tuple[Record, dict[str, Any]]:
+    """All that is known of a trajectory besides its numbers: with types, and as it stands there."""
+    group = access.group_at(file, f"parameters/{label}")
     if group is None:
         raise StoreError(f"{file.filename} holds no trajectory {label!r}")
-    return {str(key): tables.scalar(value) for key, value in group.attrs.items()}
+    known = access.attributes(group)
+    return records.record(f"cannot read {file.filename}, {label}", known), known
 
 
-def _trajectory(
-    label: str, known: Mapping[str, Any], arrays: Mapping[str, Floats | None], stride: int = 1
-) -> Trajectory:
-    n = int(known["particles"])
-    empty = np.empty((0, n))
-    t, q, p = arrays["time"], arrays["q"], arrays["p"]
-    assert t is not None
-    default = Arithmetic()
-    return Trajectory(
-        label=label,
-        scheme=str(known.get("scheme", "")),
-        t=t,
-        q=empty if q is None else q,
-        p=empty if p is None else p,
-        energy=arrays["energy"],
-        step=float(known.get("step", np.nan)),
-        every=int(known.get("every", 1)) * stride,
-        outcome=Outcome(
-            status=cast(Any, known.get("outcome", "complete")),
-            step=int(known.get("outcome_step", 0)),
-            message=str(known.get("outcome_message", "")),
-        ),
-        timing=Timing(
-            start=float(known.get("start_seconds", np.nan)), run=float(known.get("run_seconds", np.nan))
-        ),
-        force_calls=int(known.get("force_calls", 0)),
-        tolerance=float(known["tolerance"]) if "tolerance" in known else None,
-        arithmetic=Arithmetic(
-            name=str(known.get("arithmetic", default.name)),
-            state=float(known.get("state_roundoff", default.state)),
-            force=float(known.get("force_roundoff", default.force)),
-            quantum=float(known.get("force_quantum", default.quantum)),
-            overflow=float(known.get("force_overflow", default.overflow)),
-            parameters=cast(Any, known.get("parameter_precision", default.parameters)),
-            excess=float(known.get("force_excess", default.excess)),
-            keeps_displacement=bool(known.get("keeps_displacement", False)),
-        ),
-        rebuilds_velocity=bool(known.get("rebuilds_velocity", False)),
-        off_axis=float(known["off_axis"]) if "off_axis" in known else None,
-        origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
-    )
-
-
-def _datasets(file: Any, label: str) -> dict[str, Any]:
-    """The arrays of a trajectory: time, and q, p, energy or None."""
-    group = file[f"observables/{label}"]
-    found = {name: group[name]["value"] if name in group else None for name in ("q", "p", "energy")}
-    kept = [name for name, value in found.items() if value is not None]
-    if not kept:
-        raise KeyError(f"no numbers of {label}")
-    return {"time": group[kept[0]]["time"], **found}
+def _datasets(file: Any, label: str, known: Record) -> dict[str, Any]:
+    """The arrays of a trajectory, looked at: time, and of q, p and energy those that are recorded."""
+    base = f"observables/{label}"
+    wide = (known.frames, known.particles)
+    found = {"time": access.array(file, f"{base}/{known.kept[0]}/time", (known.frames,))}
+    for name in known.kept:
+        shape = wide[:1] if name == "energy" else wide
+        found[name] = access.array(file, f"{base}/{name}/value", shape)
+    return found
 
 
 def _whole(path: Path, dataset: Any) -> Floats:
     size = dataset.size * dataset.dtype.itemsize
-    offset = dataset.id.get_offset()
-    if size > MAPPED and offset is not None:
+    if size > MAPPED:
+        offset = dataset.id.get_offset()
         return np.memmap(path, mode="r", dtype=dataset.dtype, offset=offset, shape=dataset.shape)
     values = np.asarray(dataset[()], dtype=np.float64)
     expected = dataset.attrs.get("sha256")
-    if expected is not None and _sha256(values) != expected:
+    if expected is not None and hashlib.sha256(np.ascontiguousarray(values).data).hexdigest() != expected:
         raise StoreError(f"cannot read {path}: {dataset.name} is damaged, it does not match its sha256")
     return values
-
-
-def _sha256(values: Floats) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").data).hexdigest()
 
 
 def read(path: str | Path) -> dict[str, Trajectory]:
@@ -239,12 +177,9 @@ def read_one(path: str | Path, label: str) -> Trajectory:
     """One trajectory of one file."""
     path = Path(path)
     with opened(path) as file:
-        known = parameters(file, label)
-        arrays = {
-            name: None if dataset is None else _whole(path, dataset)
-            for name, dataset in _datasets(file, label).items()
-        }
-        return _trajectory(label, known, arrays)
+        known, rest = known_of(file, label)
+        datasets = _datasets(file, label, known)
+        return records.trajectory(label, known, rest, {x: _whole(path, y) for x, y in datasets.items()})
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
@@ -252,41 +187,41 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
 
     With a stride only every stride-th piece is read, and the last.
     """
-    source = source_of(Path(path), label)
-    with opened(source) as file:
-        known = parameters(file, label)
-        datasets = _datasets(file, label)
-        frames = len(datasets["time"])
-        starts = range(0, max(1, frames - 1), rows)
+    with opened(source_of(Path(path), label)) as file:
+        known, rest = known_of(file, label)
+        datasets = _datasets(file, label, known)
+        starts = range(0, max(1, known.frames - 1), rows)
         for start in sorted({*starts[::stride], starts[-1]}):
-            piece = _trajectory(label, known, _rows(datasets, slice(start, start + rows + 1)))
+            piece = records.trajectory(label, known, rest, _rows(datasets, slice(start, start + rows + 1)))
             end = start + len(piece.t) - 1
             # a piece ends where it ends; only the last one with what became of the run
-            if end < frames - 1:
+            if end < known.frames - 1:
                 piece = replace(piece, outcome=Outcome(status="continued", step=end * piece.every))
             yield piece
 
 
 def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, int]:
     """Every stride-th frame, at most `max_frames` of them, and the stride."""
-    source = source_of(Path(path), label)
-    with opened(source) as file:
-        known = parameters(file, label)
-        datasets = _datasets(file, label)
-        stride = max(1, -(-len(datasets["time"]) // max_frames))
-        return _trajectory(label, known, _rows(datasets, slice(None, None, stride)), stride), stride
+    with opened(source_of(Path(path), label)) as file:
+        known, rest = known_of(file, label)
+        datasets = _datasets(file, label, known)
+        stride = max(1, -(-known.frames // max_frames))
+        kept = _rows(datasets, slice(None, None, stride))
+        return records.trajectory(label, known, rest, kept, stride), stride
 
 
 def end(path: str | Path, label: str, rows: int) -> Trajectory:
     """The last `rows` frames of a trajectory."""
-    source = source_of(Path(path), label)
-    with opened(source) as file:
-        return _trajectory(label, parameters(file, label), _rows(_datasets(file, label), slice(-rows, None)))
+    with opened(source_of(Path(path), label)) as file:
+        known, rest = known_of(file, label)
+        return records.trajectory(
+            label, known, rest, _rows(_datasets(file, label, known), slice(-rows, None))
+        )
 
 
-def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats | None]:
+def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats]:
     return {
-        name: None if dataset is None else np.asarray(dataset[rows], dtype=np.float64)
+        name: dataset[slice(*rows.indices(len(dataset)))].astype(np.float64, copy=False)
         for name, dataset in datasets.items()
     }
 
@@ -326,32 +261,32 @@ class Summary:
 def summary(path: str | Path) -> Summary:
     """What is in a store, at no cost that grows with its length."""
     path = Path(path)
-    found = sources(path)
     runs = []
-    for label, source in found.items():
+    for label, source in sources(path).items():
         with opened(source) as file:
-            datasets = _datasets(file, label)
+            known, rest = known_of(file, label)
+            _datasets(file, label, known)
             runs.append(
                 Run(
                     label=label,
-                    frames=len(datasets["time"]),
-                    n=int(parameters(file, label)["particles"]),
-                    quantities=tuple(name for name in ("q", "p", "energy") if datasets[name] is not None),
-                    parameters=parameters(file, label),
+                    frames=known.frames,
+                    n=known.particles,
+                    quantities=known.kept,
+                    parameters=rest,
                 )
             )
     root: dict[str, Scalar] = {}
     documents: tuple[str, ...] = ()
     if path.is_file():
         with opened(path) as file:
-            root = {str(key): tables.scalar(value) for key, value in file.attrs.items()}
-            documents = tuple(file.get("documents", ()))
+            root = access.attributes(file)
+            documents = tuple(access.children(file, "documents"))
     everything = [path] if path.is_file() else []
     everything += [part for part in Parts.of(path, None).parts if part.is_file()]
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in everything),
-        complete=path.is_file() and bool(root.get("complete", False)) and not _is_claimed(path),
+        complete=path.is_file() and root.get("complete") is True and not _is_claimed(path),
         root=root,
         runs=tuple(runs),
         tables=tuple(_tables(path)),
@@ -360,11 +295,11 @@ def summary(path: str | Path) -> Summary:
 
 
 def _is_claimed(path: Path) -> bool:
-    """Whether a journal stands beside a store; what a kill at its very end has left of one is none."""
+    """Whether a journal of ours stands beside a store; what a kill at its very end has left is none."""
     try:
         return claim(parts_folder(path)) is not None
     except StoreError:
-        return True
+        return False
 
 
 def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
@@ -382,9 +317,10 @@ def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
 
 def _table(path: Path, name: str) -> Table:
     with opened(path) as file:
-        if name not in file:
+        group = access.group_at(file, name)
+        if group is None:
             raise StoreError(f"{path} holds no {name}")
-        return tables.read(file[name], name)
+        return tables.read(group, name)
 
 
 def read_tables(path: str | Path, run: str | None = None) -> dict[str, Table]:
@@ -394,30 +330,32 @@ def read_tables(path: str | Path, run: str | None = None) -> dict[str, Table]:
 
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:
     """The verdicts of a store; none where it has none."""
-    path = Path(path)
-    with opened(path) as file:
-        if "verdicts" not in file:
-            return ()
-    with files.told(path, "read"):
-        return tables.to_verdicts(_table(path, "verdicts"))
+    with opened(Path(path)) as file:
+        group = access.group_at(file, "verdicts")
+        return () if group is None else tables.to_verdicts(tables.read(group, "verdicts"))
 
 
 def comparison(path: str | Path) -> Comparison | None:
     """The matrix of differences between the trajectories of a store."""
-    path = Path(path)
-    with opened(path) as file:
-        if "comparison" not in file:
-            return None
-    with files.told(path, "read"):
-        return tables.to_comparison(_table(path, "comparison"))
+    with opened(Path(path)) as file:
+        group = access.group_at(file, "comparison")
+        return None if group is None else tables.to_comparison(tables.read(group, "comparison"))
 
 
 def document(path: str | Path, name: str) -> str:
     """A text that was stored with `commit`."""
     with opened(Path(path)) as file:
-        if name not in file.get("documents", {}):
+        if name not in access.children(file, "documents"):
             raise StoreError(f"{path} holds no document {name!r}")
-        return str(file["documents"][name].asstr()[()])
+        return access.text(file, f"documents/{name}")
+
+
+def decoded(path: str | Path, name: str) -> Any:
+    """A document of JSON.  StoreError where it is none, or nested deeper than any of ours."""
+    try:
+        return msgspec.json.decode(document(path, name).encode())
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise StoreError(f"{path}: its document {name} is no JSON: {error}") from error
 
 
 def scene_text(path: str | Path) -> str:
@@ -427,8 +365,9 @@ def scene_text(path: str | Path) -> str:
     if not path.is_file():
         source = next(iter(sources(path).values()), path)
     with opened(source) as file:
-        if "scene" in file.attrs:
-            return str(file.attrs["scene"])
-        for label in file.get("parameters", ()):
-            return str(file[f"parameters/{label}"].attrs["scene"])
+        known = access.attributes(file)
+        if "scene" in known:
+            return str(known["scene"])
+        for label in access.children(file, "parameters"):
+            return known_of(file, label)[0].scene
     raise StoreError(f"{path} holds no scene")

@@ -17,7 +17,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+import msgspec
+
 BLOCK = 1 << 22
+LONGEST = 1 << 24
+"""Bytes of the line of JSON."""
+LARGEST_REST = 1 << 30
+"""Bytes of groups, attributes and tables."""
 _FOOT_SIZE = len("springcheck seal 1 ") + 16 + 1 + 64 + 1
 
 
@@ -33,11 +39,12 @@ class Extent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seal:
-    """What the bytes of a file were when it was written.  `end` is where HDF5 ends [B]."""
+    """What the bytes of a file were when it was written, and by which run.  `end` is where HDF5 ends [B]."""
 
     end: int
     extents: tuple[Extent, ...]
     rest: str
+    run: str = ""
 
 
 def digest(file: BinaryIO, start: int, size: int) -> str:
@@ -79,19 +86,19 @@ def rest(file: BinaryIO, extents: Iterable[Extent], end: int) -> str:
     return total.hexdigest()
 
 
-def attach(path: Path, extents: Iterable[Extent]) -> None:
-    """Seal a complete HDF5 file."""
+def attach(path: Path, extents: Iterable[Extent], run: str = "") -> None:
+    """Seal a complete HDF5 file of a run."""
     kept = tuple(extents)
     with path.open("rb+") as file:
         end = file.seek(0, 2)
-        seal = Seal(end=end, extents=kept, rest=rest(file, kept, end))
+        seal = Seal(end=end, extents=kept, rest=rest(file, kept, end), run=run)
         file.seek(end)
         file.write(encoded(seal))
 
 
-def sealed(body: bytes) -> bytes:
+def sealed(body: bytes, run: str = "") -> bytes:
     """A file without arrays, with its seal."""
-    return body + encoded(Seal(end=len(body), extents=(), rest=hashlib.sha256(body).hexdigest()))
+    return body + encoded(Seal(end=len(body), extents=(), rest=hashlib.sha256(body).hexdigest(), run=run))
 
 
 def encoded(seal: Seal) -> bytes:
@@ -114,22 +121,28 @@ def find(path: Path) -> Seal | None:
         foot = file.read()
         try:
             length = int(foot[19:35])
-            if not 0 < length <= size - _FOOT_SIZE:
+            if not 0 < length <= min(LONGEST, size - _FOOT_SIZE):
                 return None
             file.seek(size - _FOOT_SIZE - length)
             line = file.read(length)
             if foot != _foot(line):
                 return None
-            found = json.loads(line)
-            extents = tuple(Extent(**extent) for extent in found["extents"])
-            seal = Seal(end=found["end"], extents=extents, rest=found["rest"])
-        except (ValueError, KeyError, TypeError, OverflowError):
+            seal = msgspec.json.decode(line, type=Seal)
+        except (ValueError, msgspec.MsgspecError, RecursionError):
             return None
-        return seal
+    # arrays one after the other, as they must be to be read in no more time than the file takes
+    position = 0
+    for extent in sorted(seal.extents, key=lambda extent: extent.offset):
+        if extent.size < 0 or extent.offset < position:
+            return None
+        position = extent.offset + extent.size
+    return seal if position <= seal.end == size - _FOOT_SIZE - length else None
 
 
 def is_whole(path: Path, seal: Seal) -> bool:
     """Whether everything but the arrays is as it was sealed.  Milliseconds, however long the arrays."""
+    if seal.end - sum(extent.size for extent in seal.extents) > LARGEST_REST:
+        return False
     with path.open("rb") as file:
         return rest(file, seal.extents, seal.end) == seal.rest
 

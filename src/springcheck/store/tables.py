@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import h5py
+import msgspec
 import numpy as np
 
-from springcheck.store.layout import RESERVED, Scalar, write_attributes
+from springcheck.errors import StoreError
+from springcheck.store import access, digests
+from springcheck.store.access import Scalar
+from springcheck.store.layout import RESERVED, write_attributes
 from springcheck.trajectory import Comparison, Verdict
 
 _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""
+DEEPEST = 8
+"""Groups that a table lies in."""
 _PASSED = {None: -1, False: 0, True: 1}
 
 
@@ -70,74 +75,64 @@ def write(file: Any, table: Table) -> None:
         if name in table.units:
             unit = table.units[name]
             write_attributes(group[name], {"unit": unit, "units": unit})
-    write_attributes(group, {"sha256": digest(group)})
-
-
-def digest(group: Any) -> str:
-    """sha256 of a table's columns: names, shapes and values."""
-    total = hashlib.sha256()
-    for name in sorted(group):
-        values = _values(group[name])
-        total.update(f"{name} {values.shape} {values.dtype.str}\n".encode())
-        if values.dtype.kind == "O":
-            total.update("\0".join(str(x) for x in values.ravel()).encode("utf-8", "surrogatepass"))
-        else:
-            total.update(np.ascontiguousarray(values).tobytes())
-    return total.hexdigest()
+    write_attributes(group, {"sha256": digests.of_table(group)})
 
 
 def read(group: Any, name: str) -> Table:
-    """A table as it was written."""
+    """A table as it was written.  StoreError where it is none."""
+    known = access.attributes(group)
     left = {"kind", "NX_class", "signal", "axes", "auxiliary_signals", _STYLE, "sha256"}
-    signal = str(group.attrs.get("signal", ""))
-    axes = tuple(str(axis) for axis in group.attrs.get("axes", ()))
-    style = json.loads(group.attrs.get(_STYLE, "{}"))
-    scales = [*style.get("axes_scale_types", ()), style.get("signal_scale_type")]
+    signal = str(known.get("signal", ""))
+    axes = tuple(map(str, _listed(known.get("axes"))))
+    try:
+        style = msgspec.json.decode(str(known.get(_STYLE, "{}")), type=dict[str, Any])
+    except (msgspec.MsgspecError, RecursionError):
+        style = {}
+    scales = [*_listed(style.get("axes_scale_types")), style.get("signal_scale_type")]
+    columns = {column: access.dataset_at(group, column) for column in access.members(group)}
+    units = {column: access.attributes(dataset).get("unit") for column, dataset in columns.items()}
     return Table(
         name=name,
-        columns={column: _values(group[column]) for column in group},
-        units={column: group[column].attrs["unit"] for column in group if "unit" in group[column].attrs},
-        attributes={key: scalar(value) for key, value in group.attrs.items() if key not in left},
+        columns={column: access.column(dataset) for column, dataset in columns.items()},
+        units={column: str(unit) for column, unit in units.items() if unit is not None},
+        attributes={key: value for key, value in known.items() if key not in left},
         signal=signal,
         axes=axes,
-        auxiliary=tuple(str(column) for column in group.attrs.get("auxiliary_signals", ())),
+        auxiliary=tuple(map(str, _listed(known.get("auxiliary_signals")))),
         log=tuple(column for column, scale in zip((*axes, signal), scales, strict=False) if scale == "log"),
     )
 
 
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
 def names(file: Any) -> Iterator[str]:
     """Names of the tables of an open file, but for those that every store has."""
-    for top in file:
-        if top not in RESERVED and isinstance(file.get(top), h5py.Group):
-            yield from _within(file[top], top)
+    seen: set[int] = set()
+    for top in access.members(file):
+        if top not in RESERVED:
+            yield from _within(file[top], top, seen)
 
 
-def _within(group: Any, name: str, depth: int = 0) -> Iterator[str]:
-    if group.attrs.get("kind") == "table":
+def all_names(file: Any) -> list[str]:
+    """Names of all tables of an open file."""
+    return [*names(file), *(name for name in ("comparison", "verdicts") if name in access.members(file))]
+
+
+def _within(node: Any, name: str, seen: set[int], depth: int = 0) -> Iterator[str]:
+    """Tables at and below a node, each once however often it is linked."""
+    address = h5py.h5o.get_info(node.id).addr
+    if not isinstance(node, h5py.Group) or address in seen or depth > DEEPEST:
+        return
+    seen.add(address)
+    if len(seen) > access.MOST_MEMBERS:
+        raise access.refuse(node, "is one of more tables than any of our stores has")
+    if access.attributes(node).get("kind") == "table":
         yield name
-    elif depth < 8:
-        for child in group:
-            if isinstance(group.get(child), h5py.Group):
-                yield from _within(group[child], f"{name}/{child}", depth + 1)
-
-
-def _values(dataset: Any) -> np.ndarray:
-    if h5py.check_string_dtype(dataset.dtype) is not None:
-        return np.asarray(dataset.asstr()[()], dtype=object)
-    return np.asarray(dataset[()])
-
-
-def scalar(value: Any) -> Scalar:
-    """An attribute as a plain Python value; arrays as text."""
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    if isinstance(value, np.bool_ | bool):
-        return bool(value)
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, np.floating):
-        return float(value)
-    return value if isinstance(value, str | int | float) else str(value)
+    else:
+        for child in access.members(node):
+            yield from _within(node[child], f"{name}/{child}", seen, depth + 1)
 
 
 def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
@@ -158,21 +153,27 @@ def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
 
 
 def to_verdicts(table: Table) -> tuple[Verdict, ...]:
-    """The verdicts of such a table."""
-    columns = [table.columns[name] for name in ("method", "check", "value", "bound", "unit", "passed", "why")]
+    """The verdicts of such a table.  StoreError where it is none."""
+    names = ("method", "check", "unit", "why")
+    texts = [_column(table, name, "O") for name in names]
+    value, bound, passed = (_column(table, name, kind) for name, kind in _NUMBERS.items())
+    if len({len(column) for column in (*texts, value, bound, passed)}) > 1 or set(passed) - {-1, 0, 1}:
+        raise StoreError("the table of verdicts is none of ours: its columns do not fit together")
     back = {number: passed for passed, number in _PASSED.items()}
     return tuple(
-        Verdict(
-            method=str(method),
-            check=str(check),
-            value=float(value),
-            bound=float(bound),
-            unit=str(unit),
-            passed=back[int(passed)],
-            why=str(why),
-        )
-        for method, check, value, bound, unit, passed, why in zip(*columns, strict=True)
+        Verdict(value=float(x), bound=float(y), passed=back[int(z)], **dict(zip(names, row, strict=True)))
+        for *row, x, y, z in zip(*texts, value, bound, passed, strict=True)
     )
+
+
+_NUMBERS = {"value": "f", "bound": "f", "passed": "i"}
+
+
+def _column(table: Table, name: str, kind: str, dimensions: int = 1) -> np.ndarray:
+    found = np.asarray(table.columns.get(name))
+    if found.dtype.kind != kind or found.ndim != dimensions or name not in table.columns:
+        raise StoreError(f"table {table.name} has no column {name} of the kind that we write")
+    return found
 
 
 def of_comparison(comparison: Comparison) -> Table:
@@ -188,8 +189,9 @@ def of_comparison(comparison: Comparison) -> Table:
 
 
 def to_comparison(table: Table) -> Comparison:
-    """The comparison of such a table."""
-    return Comparison(
-        labels=tuple(str(label) for label in table.columns["labels"]),
-        max_difference=np.asarray(table.columns["max_difference"], dtype=np.float64),
-    )
+    """The comparison of such a table.  StoreError where it is none."""
+    labels = tuple(map(str, _column(table, "labels", "O")))
+    found = _column(table, "max_difference", "f", 2)
+    if found.shape != (len(labels), len(labels)):
+        raise StoreError(f"the comparison of {len(labels)} trajectories has shape {found.shape}")
+    return Comparison(labels=labels, max_difference=found)

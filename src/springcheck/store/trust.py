@@ -1,7 +1,7 @@
 """Whether libhdf5 may be let loose on a file: it can crash, or never end, on a damaged one.
 
 A file that carries our seal is checked against it, in milliseconds.  Any other is first read by a process
-of its own, whose end tells; what survives that is read again here.
+of its own, with little memory and time, whose end tells; what survives that is read again here.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ OURS, FOREIGN = "ours", "foreign"
 """What a file is read as when it is tried."""
 
 MODULE = "springcheck.store"
-LIMIT, SPEED = 20.0, 5e6
+LIMIT, SPEED = 8.0, 1e8
 """Seconds that reading a file may take, whatever its size, and bytes a second on top."""
+MEMORY = 1 << 30
+"""Bytes of memory that it may take."""
 
 
 def trust(path: Path, kind: str) -> None:
@@ -73,18 +75,20 @@ def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
     """What the process says, and whether it lived to say it."""
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+    # BLAS would take memory for a thread of each core
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    limit = LIMIT + path.stat().st_size / SPEED
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-m", MODULE, kind, str(path)],
+            [sys.executable, "-P", "-m", MODULE, kind, str(path), str(int(limit) + 1), str(MEMORY)],
             capture_output=True,
-            text=True,
-            timeout=LIMIT + path.stat().st_size / SPEED,
+            timeout=2 * limit,
             check=False,
             stdin=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": paths},
+            env={**os.environ, **threads, "PYTHONPATH": paths},
         )
     except subprocess.TimeoutExpired:
         return "it is damaged, reading it does not end", False
     if done.returncode:
-        return "it is damaged, reading it crashes the HDF5 library", False
-    return done.stdout.strip(), True
+        return "it is damaged, reading it crashes the HDF5 library, or asks for too much of it", False
+    return done.stdout.decode("utf-8", "backslashreplace").strip(), True

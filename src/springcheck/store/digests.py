@@ -1,0 +1,105 @@
+"""What a collection holds, under sha256: numbers, attributes, tables, documents, and that none is missing.
+
+The seal (see `seal`) ends with the first edit by another program.  These digests stay, and tell what was
+changed and what was not.  Nobody needs a key to write them: they find accidents and careless edits, not
+a forger.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+
+from springcheck.store import access
+from springcheck.store.layout import Column
+
+PIECE = 1 << 20
+"""Numbers that are read at a time."""
+
+KEY = "digests"
+"""The attribute of the root that keeps them."""
+
+
+def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
+    """The digest of a trajectory: sha256 over the sha256 of time, q, p and energy, with their shapes.
+
+    Little-endian float64, nothing of clock or machine: equal exactly when two runs agree bit for bit.
+    """
+    lines = [
+        f"{name} {columns[name].shape} {digests[name]}"
+        for name in ("time", "q", "p", "energy")
+        if name in digests
+    ]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def of_array(dataset: Any) -> str:
+    """sha256 of a recorded array, in bounded memory."""
+    total = hashlib.sha256()
+    rows = max(1, PIECE // max(1, int(np.prod(dataset.shape[1:]))))
+    for start in range(0, len(dataset), rows):
+        total.update(np.ascontiguousarray(dataset[start : start + rows]).data)
+    return total.hexdigest()
+
+
+def of_table(group: Any) -> str:
+    """sha256 of a table: its columns with names, shapes, values and attributes, and its own attributes."""
+    total = hashlib.sha256(_attributes(group, "sha256"))
+    for name in sorted(access.members(group)):
+        dataset = access.dataset_at(group, name)
+        values = access.column(dataset)
+        total.update(f"{name} {values.shape} {values.dtype.str}\n".encode() + _attributes(dataset))
+        if values.dtype.kind == "O":
+            total.update("\0".join(map(str, values.ravel())).encode("utf-8", "surrogatepass"))
+        else:
+            total.update(np.ascontiguousarray(values).tobytes())
+    return total.hexdigest()
+
+
+def of_run(file: Any, label: str) -> str:
+    """sha256 of all attributes of a trajectory, the digests of its arrays among them, and of its masses."""
+    total = hashlib.sha256()
+    for tree in ("parameters", "observables", "particles"):
+        group = access.group_at(file, f"{tree}/{label}")
+        for path, node in () if group is None else _below(group, set()):
+            total.update(f"{tree}{path}\n".encode() + _attributes(node))
+            if path == "/mass" and isinstance(node, h5py.Dataset):
+                total.update(access.column(access.dataset_at(group, "mass")).tobytes())
+    return total.hexdigest()
+
+
+def contents(file: Any, tables: Iterable[str]) -> dict[str, str]:
+    """Everything in a collection by its place -> sha256."""
+    found = {"/": hashlib.sha256(_attributes(file, KEY)).hexdigest()}
+    for label in access.children(file, "parameters"):
+        found[f"/parameters/{label}"] = of_run(file, label)
+    for name in tables:
+        found[f"/{name}"] = of_table(access.group_at(file, name))
+    for name in access.children(file, "documents"):
+        text = access.text(file, f"documents/{name}")
+        found[f"/documents/{name}"] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+    return found
+
+
+def _attributes(node: Any, *left_out: str) -> bytes:
+    kept = sorted((key, value) for key, value in access.attributes(node).items() if key not in left_out)
+    return repr(kept).encode("utf-8", "surrogatepass")
+
+
+def _below(group: Any, seen: set[int], path: str = "") -> Iterator[tuple[str, Any]]:
+    """A group and all in it by path, each once, however it is linked."""
+    yield path, group
+    for name in sorted(access.members(group)):
+        node = group[name]
+        address = h5py.h5o.get_info(node.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if isinstance(node, h5py.Group):
+            yield from _below(node, seen, f"{path}/{name}")
+        elif isinstance(node, h5py.Dataset):
+            yield f"{path}/{name}", node

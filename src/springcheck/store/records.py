@@ -1,0 +1,137 @@
+"""What is kept of a trajectory besides its numbers: attributes, read back with types and limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import Arithmetic
+from springcheck.errors import StoreError
+from springcheck.physics.scene import Kind, Units
+from springcheck.store.access import Scalar
+from springcheck.trajectory import Outcome, Timing, Trajectory
+
+Count = Annotated[int, msgspec.Meta(ge=0, lt=2**53)]
+Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]
+Name = Annotated[str, msgspec.Meta(max_length=200)]
+Message = Annotated[str, msgspec.Meta(max_length=1 << 20)]
+_DOUBLE = Arithmetic()
+
+
+class Record(msgspec.Struct, frozen=True, kw_only=True):
+    """The attributes of /parameters/<label>, but for those that only people read."""
+
+    scene: str
+    scene_name: Name = ""
+    units: Units
+    kind: Kind
+    frames: Size
+    particles: Size
+    quantities: Name
+    sequence: Count = 0
+    sha256: Name
+    scheme: Name = ""
+    step: float = math.nan
+    every: Size = 1
+    outcome: Literal["complete", "diverged", "stopped", "interrupted"] = "complete"
+    outcome_step: Count = 0
+    outcome_message: Message = ""
+    start_seconds: float = math.nan
+    run_seconds: float = math.nan
+    force_calls: Count = 0
+    tolerance: float | None = None
+    arithmetic: Name = _DOUBLE.name
+    state_roundoff: float = _DOUBLE.state
+    force_roundoff: float = _DOUBLE.force
+    force_quantum: float = _DOUBLE.quantum
+    force_overflow: float = _DOUBLE.overflow
+    parameter_precision: Literal["double", "single"] = _DOUBLE.parameters
+    force_excess: float = _DOUBLE.excess
+    keeps_displacement: bool = False
+    rebuilds_velocity: bool = False
+    off_axis: float | None = None
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """The quantities that are recorded."""
+        return tuple(name for name in ("q", "p", "energy") if name in self.quantities.split())
+
+
+def record(place: str, known: Mapping[str, Any]) -> Record:
+    """Attributes with their types; StoreError that names the one that has another, or is missing."""
+    try:
+        found = msgspec.convert(known, Record)
+    except msgspec.ValidationError as error:
+        raise StoreError(f"{place}: {error}") from error
+    if not found.kept:
+        raise StoreError(f"{place}: records no quantity")
+    return found
+
+
+def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
+    """What `Draft.finish` stores of a trajectory besides its numbers, which are not looked at."""
+    a = trajectory.arithmetic
+    origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
+    return {
+        "method": trajectory.label,
+        "scheme": trajectory.scheme,
+        "step": trajectory.step,
+        "every": trajectory.every,
+        "outcome": trajectory.outcome.status,
+        "outcome_step": trajectory.outcome.step,
+        "outcome_message": trajectory.outcome.message,
+        "start_seconds": trajectory.timing.start,
+        "run_seconds": trajectory.timing.run,
+        "force_calls": trajectory.force_calls,
+        "tolerance": trajectory.tolerance,
+        "arithmetic": a.name,
+        "state_roundoff": a.state,
+        "force_roundoff": a.force,
+        "force_quantum": a.quantum,
+        "force_overflow": a.overflow,
+        "parameter_precision": a.parameters,
+        "force_excess": a.excess,
+        "keeps_displacement": a.keeps_displacement,
+        "rebuilds_velocity": trajectory.rebuilds_velocity,
+        "off_axis": trajectory.off_axis,
+        **origin,
+    }
+
+
+def trajectory(
+    label: str, x: Record, known: Mapping[str, Any], arrays: Mapping[str, Floats], stride: int = 1
+) -> Trajectory:
+    """A trajectory, or every stride-th frame of it, from its record and its arrays."""
+    empty = np.empty((0, x.particles))
+    return Trajectory(
+        label=label,
+        scheme=x.scheme,
+        t=arrays["time"],
+        q=arrays.get("q", empty),
+        p=arrays.get("p", empty),
+        energy=arrays.get("energy"),
+        step=x.step,
+        every=x.every * stride,
+        outcome=Outcome(status=x.outcome, step=x.outcome_step, message=x.outcome_message),
+        timing=Timing(start=x.start_seconds, run=x.run_seconds),
+        force_calls=x.force_calls,
+        tolerance=x.tolerance,
+        arithmetic=Arithmetic(
+            name=x.arithmetic,
+            state=x.state_roundoff,
+            force=x.force_roundoff,
+            quantum=x.force_quantum,
+            overflow=x.force_overflow,
+            parameters=x.parameter_precision,
+            excess=x.force_excess,
+            keeps_displacement=x.keeps_displacement,
+        ),
+        rebuilds_velocity=x.rebuilds_velocity,
+        off_axis=x.off_axis,
+        origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
+    )
