@@ -11,6 +11,7 @@ import json
 import math
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springcheck import interrupts
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, StoreError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study, engine_option
 
@@ -38,11 +39,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
     interrupts.announce(f"interrupted; {what}")
     try:
-        if getattr(options, "engine", None):
-            from springcheck import doors
+        with _said(), _readable(options):
+            if getattr(options, "engine", None):
+                from springcheck import doors
 
-            doors.bring(options)
-        return command(options)
+                doors.bring(options)
+            return command(options)
     except KeyboardInterrupt:
         return _interrupted(what)
     except Exception as error:
@@ -52,6 +54,54 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(error, SpringcheckError | OSError):
             return _mistake(error)
         raise
+
+
+@contextmanager
+def _said() -> Iterator[None]:
+    """Warnings about stores as lines on standard error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", StoreWarning)
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+            if issubclass(category, StoreWarning):
+                print(f"springcheck: {message}", file=sys.stderr)
+            else:
+                shown(message, category, *rest, **named)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def _readable(options: argparse.Namespace) -> Iterator[None]:
+    """The last line of defence of commands that read a file: whatever is in it, no traceback."""
+    path = getattr(options, "file", None) or getattr(options, "source", None)
+    try:
+        yield
+    except (SpringcheckError, OSError):
+        raise
+    except Exception as error:
+        if path is None or interrupts.seen():
+            raise
+        trace = error.__traceback__
+        while trace is not None and trace.tb_next is not None:
+            trace = trace.tb_next
+        where = f", line {trace.tb_lineno} of {Path(trace.tb_frame.f_code.co_filename).name}" if trace else ""
+        raise StoreError(f"{path}: cannot be made sense of ({type(error).__name__}{where})") from error
+
+
+def _doubts(file: str) -> list[dict[str, str]]:
+    """Say first of a store what of it cannot be trusted; the same for JSON."""
+    from springcheck import store
+
+    found = store.doubts(Path(file))
+    if found:
+        first = "; ".join(f"{one.place} {one.what}" for one in found[:3])
+        more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
+        said = plain(f"{file} is not what was written: {first}", 400)
+        print(f"springcheck: {said}{more}", file=sys.stderr)
+    return [{"place": one.place, "what": one.what} for one in found]
 
 
 def _interrupted(what: str) -> int:
@@ -100,7 +150,7 @@ def _parser() -> argparse.ArgumentParser:
 
     plot = commands.add_parser("plot", help="draw what is in a store, as PNG and SVG")
     plot.add_argument("file", metavar="FILE")
-    plot.add_argument("-o", "--output", metavar="FOLDER", default="figures", help="default: figures")
+    plot.add_argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name")
     plot.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
     plot.set_defaults(command=_plot)
 
@@ -171,13 +221,15 @@ def _document(data: Any) -> None:
 
 
 def _study(study: Study, options: argparse.Namespace) -> int:
+    source = getattr(options, "source", None)
+    doubts = _doubts(source) if source else []
     with _progress(options, study.name) as progress:
         found = study.perform(options, progress)
     if options.json:
-        _document(found.document())
+        _document({**found.document(), **({"not_trusted": doubts} if source else {})})
     elif not options.quiet:
         _show(study.lines(found, options))
-    return found.status
+    return found.status or int(bool(doubts))
 
 
 @contextmanager
@@ -216,12 +268,13 @@ def _inspect(options: argparse.Namespace) -> int:
 
     if options.rows < 1:
         raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
+    doubts = _doubts(options.file)
     found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=options.rows)
     if options.json:
-        _document(inspect.document(found))
+        _document({"not_trusted": doubts, **inspect.document(found)})
     else:
         _show(inspect.lines(found, options))
-    return 0
+    return int(bool(doubts))
 
 
 def _identify(options: argparse.Namespace) -> int:
@@ -231,6 +284,7 @@ def _identify(options: argparse.Namespace) -> int:
     if (options.file is None) == (options.stepper is None):
         raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
     if options.stepper is not None:
+        doubts = []
         found = {options.stepper: identify.identify_stepper(identify.load_stepper(options.stepper))}
     else:
         stated = {"mass": options.mass, "stiffness": options.stiffness, "step": options.step}
@@ -238,6 +292,7 @@ def _identify(options: argparse.Namespace) -> int:
             if value is not None and not (math.isfinite(value) and (value > 0 or name != "mass")):
                 raise SpringcheckError(f"--{name} {value}: a finite number is needed, a mass above 0")
         found = {}
+        doubts = _doubts(options.file)
         for states in files.read(Path(options.file), options.trajectory):
             try:
                 found[states.label] = files.identify_states(states, **stated)
@@ -245,20 +300,25 @@ def _identify(options: argparse.Namespace) -> int:
                 raise type(error)(f"{options.file}, {states.label}: {error}") from error
     documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
     if options.json:
-        _document(documents[0] if len(documents) == 1 else {"identifications": documents})
+        document = documents[0] if len(documents) == 1 else {"identifications": documents}
+        _document({**document, "not_trusted": doubts})
     else:
         _show([line for label, one in found.items() for line in text.identification(label, one)])
-    return 0 if all(one.fits or one.verdict == "adaptive" for one in found.values()) else 1
+    fits = all(one.fits or one.verdict == "adaptive" for one in found.values())
+    return 0 if fits and not doubts else 1
 
 
 def _plot(options: argparse.Namespace) -> int:
     from springcheck import plot
+    from springcheck.figures import folder
 
-    written, notes = plot.draw(Path(options.file), Path(options.output))
+    path = Path(options.file)
+    doubts = _doubts(options.file)
+    written, notes = plot.draw(path, Path(options.output or folder.folder_of(path)))
     if not options.quiet:
         for line in (*notes, *written):
-            print(line)
-    return 0
+            print(plain(line))
+    return int(bool(doubts))
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -266,7 +326,7 @@ def _check(options: argparse.Namespace) -> int:
 
     findings = store.check(Path(options.file))
     for finding in findings:
-        print(f"{options.file}: {finding.place}: {finding.what}")
+        print(plain(f"{options.file}: {finding.place}: {finding.what}"))
     if not findings:
         ended = store.summary(Path(options.file)).complete
         rest = "" if ended else "; unfinished: the command that writes it goes on when it is given again"
@@ -277,9 +337,11 @@ def _check(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from springcheck import store
 
-    store.export(Path(options.file), options.label, Path(options.output))
-    print(f"{options.output}: {options.label}")
-    return 0
+    doubts = store.export(Path(options.file), options.label, Path(options.output))
+    if doubts:
+        _doubts(options.file)
+    print(plain(f"{options.output}: {options.label}"))
+    return int(bool(doubts))
 
 
 def _list(options: argparse.Namespace) -> int:

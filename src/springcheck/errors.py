@@ -74,10 +74,6 @@ def told(error: BaseException, file: object = "") -> str:
     return f"{type(error).__name__}{': ' if message else ''}{message}{where}"
 
 
-LONGEST_MESSAGE = 500
-"""Characters of a foreign message that are shown."""
-
-
 def nearest(word: str, known: Iterable[str], before: str = "") -> str:
     """ ", did you mean ...?" where one of the known words is close, else nothing."""
     from difflib import get_close_matches

@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springcheck import inspect, store
 from springcheck.errors import SpringcheckError
+from springcheck.figures import folder
 from springcheck.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def draw(path: Path, folder: Path) -> tuple[list[Path], list[str]]:
+def draw(path: Path, into: Path) -> tuple[list[Path], list[str]]:
     """Draw the studies of a store into a folder -> the files, and notes on what they leave out.
 
-    SpringcheckError where there is nothing to draw.
+    Figures of this store are replaced, and nothing else.  SpringcheckError where there is nothing to draw.
     """
+    if into.exists() and not into.is_dir():
+        raise SpringcheckError(f"{into} is a file: figures need a folder, name another one with -o")
     summary = store.summary(path)
     studies = list(inspect.held(summary))
     if not studies:
         rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
         raise SpringcheckError(f"{path}: holds no trajectory and no study to draw{rest}")
-    written: list[Path] = []
     notes: list[str] = []
-    for study, found in studies:
-        written += study.draw(found, folder)
-        notes += getattr(found, "notes", ())
-    if not written:
-        raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
-    return written, notes
+    with tempfile.TemporaryDirectory() as name:
+        written: list[Path] = []
+        for study, found in studies:
+            written += study.draw(found, Path(name))
+            notes += getattr(found, "notes", ())
+        if not written:
+            raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
+        return folder.put(written, into, path), notes
 
 
 def phase(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:

@@ -11,6 +11,8 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
 from rich.text import Text
 
+from springcheck import errors
+
 Lines = list[RenderableType]
 Cell = str | Text
 Row = Sequence[Cell] | Text
@@ -21,8 +23,8 @@ GAP = 2
 
 
 def plain(text: str = "", style: str = "") -> Text:
-    """A line of text that is never taken for markup."""
-    return Text(text, style=style)
+    """A line of text from any file: nothing in it is markup, nothing a control character."""
+    return Text(errors.plain(text), style=style)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ marker change with the colour, so that a grey print can be read too.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,13 +16,17 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, plain
 from springcheck.store import files
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+
+LONGEST_LINE = 120
+"""Characters of a line of text, and of a file's name."""
 
 _RC: dict[Any, Any] = {
     "font.size": 9.0,
@@ -57,21 +62,41 @@ def look(i: int) -> dict[str, Any]:
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG; StoreError where the folder cannot be written."""
+    """Write a figure as PNG and SVG; StoreError where the folder cannot be written.
+
+    Its texts may come from any file: control characters are escaped, and what is no formula stays text.
+    """
     if folder.exists() and not folder.is_dir():
         raise StoreError(f"{folder} is a file: figures need a folder, name another one with -o")
+    texts = figure.findobj(Text)
+    for text in texts:
+        shown = "\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n"))
+        if shown != text.get_text():
+            text.set_text(shown)
+    safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for ending in ("png", "svg"):
-            path = folder / f"{name}.{ending}"
-            drawn = BytesIO()
-            with warnings.catch_warnings():
-                # a title may be in any script: what the font has not is drawn as boxes
-                warnings.filterwarnings("ignore", message="Glyph .* missing from")
-                figure.savefig(drawn, format=ending, metadata={"Date": None} if ending == "svg" else None)
-            files.put_bytes(drawn.getvalue(), path)
+            path = folder / f"{safe}.{ending}"
+            try:
+                drawn = _drawn(figure, ending)
+            except ValueError:
+                # a title with dollars that is no formula
+                for text in texts:
+                    text.set_parse_math(False)
+                drawn = _drawn(figure, ending)
+            files.put_bytes(drawn, path)
             written.append(path)
     except OSError as error:
         raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error
     return written
+
+
+def _drawn(figure: Figure, ending: str) -> bytes:
+    drawn = BytesIO()
+    with warnings.catch_warnings():
+        # a title may be in any script: what the font has not is drawn as boxes
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(drawn, format=ending, metadata={"Date": None} if ending == "svg" else None)
+    return drawn.getvalue()

@@ -40,8 +40,8 @@ def refuse(node: Any, why: str) -> StoreError:
 
 
 def is_name(name: str) -> bool:
-    """Whether a group or dataset may be called so: printable, and not too long."""
-    return 0 < len(name) <= LONGEST_NAME and name.isprintable()
+    """Whether a group or dataset may be called so: printable, not too long, no formula to a figure."""
+    return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "$" not in name
 
 
 def members(group: Any) -> list[str]:

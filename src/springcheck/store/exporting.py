@@ -7,14 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from springcheck.errors import StoreError
-from springcheck.store import access, files, layout, reading
+from springcheck.store import access, checking, files, layout, reading
+from springcheck.store.checking import Finding
 
 
-def export(path: str | Path, label: str, out: str | Path) -> None:
+def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
     """Write one trajectory as plain H5MD: one group ``/particles/trajectory``, no virtual datasets.
 
-    MDAnalysis wants that name, and the ending .h5md.  Raises StoreError for an unknown label, a scene
-    without particles, and a path that exists.
+    MDAnalysis wants that name, and the ending .h5md.  Returns what else of the store cannot be trusted.
+    Raises StoreError for an unknown label, a scene without particles, a path that exists, and a
+    trajectory that is not what was written: a clean file is not made of it.
     """
     path, out = Path(path), Path(out)
     if os.path.lexists(out):
@@ -24,7 +26,13 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
         raise StoreError(f"cannot write {out}: there is no folder {folder}")
     if out.suffix != ".h5md":
         raise StoreError(f"{out}: the name must end in .h5md, readers go by it")
-    with reading.opened(reading.source_of(path, label)) as file:
+    source = reading.source_of(path, label)
+    found = checking.check(path)
+    for finding in found:
+        place = finding.place.partition(": ")[2] or finding.place
+        if place.split("/")[1:3] in (["observables", label], ["parameters", label]):
+            raise StoreError(f"{path} is not what was written: {place} {finding.what}; nothing is exported")
+    with reading.opened(source) as file:
         known, attributes = reading.known_of(file, label)
         if known.kind != "particles" or not {"q", "p"} & set(known.kept):
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
@@ -54,6 +62,7 @@ def export(path: str | Path, label: str, out: str | Path) -> None:
                 files.put(made, out)
             finally:
                 made.unlink(missing_ok=True)
+    return found
 
 
 def _write(group: Any, arrays: dict[str, Any], columns: dict[str, Any], unit: layout.UnitsOf) -> None:

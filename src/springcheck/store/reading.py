@@ -17,7 +17,7 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.errors import StoreError
-from springcheck.store import access, files, layout, records, seal, tables, trust
+from springcheck.store import access, digests, files, layout, records, seal, tables, trust
 from springcheck.store.access import Scalar
 from springcheck.store.records import Record
 from springcheck.store.tables import Table
@@ -180,6 +180,14 @@ def read_one(path: str | Path, label: str) -> Trajectory:
         known, rest = known_of(file, label)
         datasets = _datasets(file, label, known)
         return records.trajectory(label, known, rest, {x: _whole(path, y) for x, y in datasets.items()})
+
+
+def digest(path: str | Path, label: str) -> str:
+    """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
+    with opened(source_of(Path(path), label)) as file:
+        datasets = _datasets(file, label, known_of(file, label)[0])
+        columns = {name: layout.Column(path=name, shape=x.shape) for name, x in datasets.items()}
+        return digests.combined({name: digests.of_array(x) for name, x in datasets.items()}, columns)
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:

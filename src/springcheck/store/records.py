@@ -38,7 +38,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     scheme: Name = ""
     step: float = math.nan
     every: Size = 1
-    outcome: Literal["complete", "diverged", "stopped", "interrupted"] = "complete"
+    outcome: Literal["complete", "diverged", "stopped"] = "complete"
     outcome_step: Count = 0
     outcome_message: Message = ""
     start_seconds: float = math.nan

@@ -40,6 +40,7 @@ T = TypeVar("T")
 Table = store.Table
 
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
+digest = store.digest
 """Trajectories of a store, read in pieces."""
 
 
@@ -214,13 +215,10 @@ class Kept:
 
 def restored(path: str | Path, name: str, build: Callable[[Kept], T]) -> T:
     """A study of a store.  StoreError where the file holds none, or a part of it is missing."""
-    text = store.document(path, name)
     try:
-        kept = Kept(path=Path(path), document=json.loads(text), tables=store.read_tables(path))
+        kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.read_tables(path))
         return build(kept)
-    except json.JSONDecodeError as error:
-        raise StoreError(f"{path}: the document of its study is no JSON: {error}") from error
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
 
 

@@ -273,7 +273,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 found.append(
                     Repeat(
                         method=name,
-                        equal=digest == before["sha256"],
+                        equal=digest == keeper.digest(path, name),
+                        as_written=digest == before["sha256"],
                         difference=_difference(scene, path, source, name),
                         changed=tuple(
                             f"{key} {before.get('origin.' + key)} -> {value}"

@@ -80,7 +80,9 @@ class Repeat:
 
     method: str
     equal: bool
-    """Bit for bit, by the digests."""
+    """Bit for bit the numbers that the store holds."""
+    as_written: bool
+    """Bit for bit those that it held when it was written, by their digest."""
     difference: float
     """Largest, relative to the initial energy norm; NaN where the two do not have the same frames."""
     changed: tuple[str, ...]

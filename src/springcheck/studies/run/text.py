@@ -183,6 +183,8 @@ def _repeat(one: Repeat) -> Text:
     if one.equal:
         return plain(f"{one.method}: equal bit for bit")
     why = f"; {', '.join(one.changed)}" if one.changed else ""
+    if one.as_written:
+        why = "; equal bit for bit to what was written: the store was changed since"
     return plain(
         f"{one.method}: NOT equal, differs by up to {one.difference:.1e} of the start{why}", "bold red"
     )
