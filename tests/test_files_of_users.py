@@ -37,7 +37,6 @@ def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: st
         assert word in said
 
 
-@pytest.mark.xfail(strict=True, reason="the journal claims every folder of its name")
 @pytest.mark.parametrize("name", ["thesis.txt", "command", "lock", "run-thesis.h5", "undo"])
 @pytest.mark.parametrize("force", [[], ["--force"]])
 def test_a_folder_of_the_users_where_the_journal_goes_is_left_alone(
@@ -50,7 +49,6 @@ def test_a_folder_of_the_users_where_the_journal_goes_is_left_alone(
     assert [entry.name for entry in Path("x.h5.parts").iterdir()] == [name]
 
 
-@pytest.mark.xfail(strict=True, reason="a link to a folder is taken for a journal")
 def test_a_link_where_the_journal_goes_is_not_followed(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine").mkdir()
     Path("x.h5.parts").symlink_to("mine", target_is_directory=True)
@@ -58,7 +56,6 @@ def test_a_link_where_the_journal_goes_is_not_followed(capsys: pytest.CaptureFix
     assert list(Path("mine").iterdir()) == []
 
 
-@pytest.mark.xfail(strict=True, reason="links within the journal are followed")
 @pytest.mark.parametrize("make", [os.symlink, os.link])
 @pytest.mark.parametrize("name", ["lock", "command", "undo"])
 def test_no_link_within_a_journal_reaches_what_it_leads_to(
@@ -74,7 +71,6 @@ def test_no_link_within_a_journal_reaches_what_it_leads_to(
     assert Path("mine").read_text() == "years of work"
 
 
-@pytest.mark.xfail(strict=True, reason="the journal's folder is removed with all that is in it")
 def test_what_a_user_puts_into_a_journal_outlives_it() -> None:
     with store.open_new("x.h5", "run") as journal:
         journal.save(trajectory(scene(), LABELS[0]), scene())
@@ -85,7 +81,6 @@ def test_what_a_user_puts_into_a_journal_outlives_it() -> None:
     assert store.summary("x.h5").complete
 
 
-@pytest.mark.xfail(strict=True, reason="temporary files have names that a user's may have")
 def test_a_file_with_the_name_of_a_temporary_one_is_left_alone() -> None:
     written(Path("s.h5"), scene())
     Path("o.h5md.new").write_text("mine")
@@ -94,7 +89,6 @@ def test_a_file_with_the_name_of_a_temporary_one_is_left_alone() -> None:
     assert sorted(path.name for path in Path().iterdir()) == ["o.h5md", "o.h5md.new", "s.h5"]
 
 
-@pytest.mark.xfail(strict=True, reason="--force replaces any file")
 @pytest.mark.parametrize("name", ["README.md", "my.conf", "data.h5"])
 @pytest.mark.parametrize("command", [["run", "my.conf", *OWN], ["stability", "my.conf", *OWN]])
 def test_force_replaces_stores_alone(
@@ -119,12 +113,11 @@ def test_force_replaces_a_store_that_is_damaged(tmp_path: Path) -> None:
         assert store.check(name) == []
 
 
-@pytest.mark.xfail(strict=True, reason="figures of every store have the same names")
 def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", *OWN, "-o", "a.h5"]) == 0
     assert main(["run", "spring", "--method", "own:implicit-euler", "--quiet", "-o", "b.h5"]) == 0
     assert main(["plot", "a.h5"]) == 0
-    first = {path: path.read_bytes() for path in Path("figures").rglob("*.*")}
+    first = {path: path.read_bytes() for path in Path("figures").rglob("*.[ps]*g")}
     assert first
     assert {path.parent for path in first} == {Path("figures/a")}
     assert main(["plot", "b.h5"]) == 0
@@ -143,7 +136,6 @@ def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str])
     assert Path("precious").read_text() == "mine"
 
 
-@pytest.mark.xfail(strict=True, reason="scene names reach file names")
 @pytest.mark.parametrize("name", ["/../../PWNED", "../PWNED", "a/PWNED", "PWNED\n\x1b[2J"])
 def test_the_scene_name_of_a_store_reaches_no_file_name(name: str, tmp_path: Path) -> None:
     import h5py
@@ -155,8 +147,8 @@ def test_the_scene_name_of_a_store_reaches_no_file_name(name: str, tmp_path: Pat
         file.attrs["scene_name"] = name
     Path("in").mkdir()
     main(["plot", "t.h5", "-o", "in"])
-    strange = [path for path in tmp_path.parent.rglob("*PWNED*") if path.parent != Path("in").absolute()]
-    assert strange == []
+    assert [path for path in tmp_path.rglob("*PWNED*") if path.parent != tmp_path / "in"] == []
+    assert list(tmp_path.parent.glob("*PWNED*")) == list(Path("/").glob("*PWNED*")) == []
     assert all(path.name.isprintable() for path in Path("in").iterdir())
 
 
@@ -184,7 +176,6 @@ def test_damaged_caches_of_compiled_code_are_compiled_anew(damage: Callable[[byt
     assert (again.returncode, again.stderr) == (0, "")
 
 
-@pytest.mark.xfail(strict=True, reason="a file system without locks is no place for a store")
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
 def test_a_file_system_without_locks_is_used_and_it_is_said(
     number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -201,7 +192,6 @@ def test_a_file_system_without_locks_is_used_and_it_is_said(
         store.open_new("t.h5", "run")
 
 
-@pytest.mark.xfail(strict=True, reason="a file system without fallocate is no place for a store")
 @pytest.mark.parametrize("number", [errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS])
 def test_a_file_system_that_reserves_no_room_is_written_all_the_same(
     number: int, monkeypatch: pytest.MonkeyPatch
@@ -220,7 +210,6 @@ def damage(part: Path) -> None:
     part.write_bytes(content)
 
 
-@pytest.mark.xfail(strict=True, reason="a damaged part stops its command for good")
 def test_only_the_damaged_part_of_a_journal_is_measured_again(capsys: pytest.CaptureFixture[str]) -> None:
     s = scene()
     with store.open_new("s.h5", "run") as journal:
@@ -229,14 +218,13 @@ def test_only_the_damaged_part_of_a_journal_is_measured_again(capsys: pytest.Cap
         journal.add(store.Table(name="precision/x", columns={"h": [1.0]}))
     damage(next(Path("s.h5.parts").glob("run-own*")))
     damage(next(Path("s.h5.parts").glob("table-*")))
-    with pytest.warns(UserWarning, match=r"own:euler.*damaged.*again"):
+    with pytest.warns(UserWarning, match=r"damaged.*own:euler is measured again"):
         journal = store.open_new("s.h5", "run")
     with journal:
         assert journal.finished() == tuple(LABELS[1:])
         assert journal.tables() == {}
 
 
-@pytest.mark.xfail(strict=True, reason="parts do not say which run they belong to")
 def test_a_part_of_another_run_is_not_taken_up() -> None:
     s = scene()
     for name in ("s.h5", "t.h5"):

@@ -171,27 +171,27 @@ def attributes(node: Any) -> dict[str, Any]:
     if count > MOST_ATTRIBUTES:
         raise refuse(node, f"has {count} attributes, more than any of ours")
     found: dict[str, Any] = {}
-    for name in node.attrs:
+    for i in range(count):
+        known = h5py.h5a.open(node.id, index=i)
+        name = known.name if isinstance(known.name, str) else known.name.decode("utf-8", "backslashreplace")
         if not is_name(name):
             raise refuse(node, "has an attribute whose name is no text, or too long")
-        known = h5py.h5a.open(node.id, name.encode())
-        items = int(np.prod(known.shape or (), dtype=object))
-        if items > MOST_ITEMS or known.get_storage_size() > LONGEST_TEXT:
-            raise refuse(node, f"has an attribute {name} of {items} items")
-        found[name] = _value(known, node.attrs, name)
+        found[name] = _value(node, known, name)
     return found
 
 
-def _value(known: Any, attrs: Any, name: str) -> Any:
-    kind = known.dtype.kind
-    if known.shape is None or known.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+def _value(node: Any, known: Any, name: str) -> Any:
+    shape, kind = known.shape, known.dtype
+    if shape is None:
         return "<nothing>"
-    if kind not in "fiubSO" or (kind == "O" and h5py.check_string_dtype(known.dtype) is None):
-        return f"<{known.dtype}>"
-    value = attrs[name]
-    if isinstance(value, np.ndarray):
-        return [scalar(x) for x in value.ravel()]
-    return scalar(value)
+    if kind.kind not in "fiubSO" or (kind.kind == "O" and h5py.check_string_dtype(kind) is None):
+        return f"<{kind}>"
+    items = int(np.prod(shape, dtype=object)) if shape else 1
+    if items > MOST_ITEMS or known.get_storage_size() > LONGEST_TEXT:
+        raise refuse(node, f"has an attribute {name} of {items} items")
+    values = np.empty(shape, kind)
+    known.read(values)
+    return [scalar(value) for value in values.ravel()] if shape else scalar(values[()])
 
 
 def scalar(value: Any) -> Scalar:

@@ -235,8 +235,7 @@ class Lock:
         if taken is False or (not self._system and _alive(who)):
             by = f"process {who['pid']} on {who['host']} since {who['since']}" if who else "another process"
             raise StoreError(f"{self.path.parent} is being written by {by}: wait for it, or stop it first")
-        # a full disk may have cut it off
-        if content and not who and not content.startswith(b'{"pid": '):
+        if not who and not _is_torn(content):
             raise StoreError(f"{self.path} stands where the lock of a store goes; move it away")
         now = datetime.now(UTC).isoformat(timespec="seconds")
         mine = {"pid": os.getpid(), "host": platform.node(), "since": now, "token": secrets.token_hex(4)}
@@ -276,6 +275,12 @@ def _holder(content: bytes) -> dict[str, Any]:
         return dict(who) if {"pid", "host", "since"} <= set(who) and isinstance(who["pid"], int) else {}
     except (ValueError, TypeError, RecursionError):
         return {}
+
+
+def _is_torn(content: bytes) -> bool:
+    """Whether a full disk or a loss of power has left this of a lock file of ours: it is never synced."""
+    whole, left = b'{"pid": ', content.replace(b"\0", b"")
+    return left.startswith(whole) or whole.startswith(left)
 
 
 def _alive(who: dict[str, Any]) -> bool:
