@@ -1,4 +1,4 @@
-"""Folders of figures: one for each store, in which the figures of that store are replaced and nothing else."""
+"""Folders of figures, one for each store: the figures of that store are replaced in it, and nothing else."""
 
 from __future__ import annotations
 
