@@ -15,10 +15,9 @@ import pytest
 
 from springcheck import simulate
 from springcheck.arrays import Reals
-from springcheck.engines.own import kernels
+from springcheck.engines.own import forces, kernels, layout
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring
 from springcheck.studies.run import measure as session
 
@@ -112,44 +111,48 @@ def test_a_frame_is_recorded_only_as_often_as_asked(tmp_path: Path) -> None:
     assert {shape[0] for path, shape in arrays.items() if path.startswith("observables")} == {5}
 
 
-def forces_of(scene: Scene) -> list[str]:
-    """Which loops the interpreted kernel of a scene calls in one step, in order."""
-    called: list[str] = []
-
-    def watched(law: Callable[..., None]) -> Callable[..., None]:
-        def loop(*arguments: Any) -> None:
-            called.append(law.__name__)
-            law(*arguments)
-
-        loop.__name__ = law.__name__
-        return loop
-
-    laws = dict(kernels.LAWS)
-    try:
-        kernels.LAWS.update({key: watched(law) for key, law in laws.items()})
-        q, p = np.empty((2, 1, scene.n))
-        own.prepare(scene, "euler", scene.step, compiled=False).advance(1, q, p)
-    finally:
-        kernels.LAWS.update(laws)
-    return called
-
-
 @pytest.mark.parametrize(
     ("name", "loops"),
     [
         ("spring", []),
         ("free", []),
-        ("anharmonic", ["wall_springs", "quartics"]),
-        ("pendulum", ["cosines"]),
-        ("morse-bond", ["morses"]),
-        ("carbon-monoxide", ["springs"]),
-        ("chain", ["wall_springs", "springs"]),
-        ("rlc-circuit", ["wall_springs", "dampings"]),
+        ("anharmonic", ["wall-spring", "quartic"]),
+        ("pendulum", ["cosine"]),
+        ("morse-bond", ["morse"]),
+        ("carbon-monoxide", ["tensions"]),
+        ("chain", ["tensions"]),
+        ("rlc-circuit", ["held", "slowed"]),
     ],
 )
-def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(name: str, loops: list[str]) -> None:
-    """A single spring has a loop of its own, without any."""
-    assert forces_of(scenes.load_scene(name)) == loops
+def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(
+    name: str, loops: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows have loops of their own, index lists are walked where they hold something; a spring needs none."""
+    called: list[str] = []
+
+    def watch(loop: str) -> None:
+        original = getattr(forces, loop)
+
+        def watched(*arguments: Any) -> None:
+            called.append(loop)
+            original(*arguments)
+
+        for module in (forces, kernels):
+            if hasattr(module, loop):
+                monkeypatch.setattr(module, loop, watched)
+
+    def by_index(terms: Any, *arguments: Any) -> None:
+        called.extend(key for key, rows in zip(layout.KINDS, terms, strict=True) if len(rows[0]))
+        indexed(terms, *arguments)
+
+    indexed = forces.indexed
+    monkeypatch.setattr(forces, "indexed", by_index)
+    for loop in ("held", "tensions", "slowed"):
+        watch(loop)
+    scene = scenes.load_scene(name)
+    q, p = np.empty((2, 1, scene.n))
+    own.prepare(scene, "explicit-euler", scene.step, compiled=False).advance(1, q, p)
+    assert called == loops
 
 
 def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: Need) -> None:

@@ -283,7 +283,7 @@ def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -
         for compiled in (False, True):
             q, p = np.empty((2, 20, scene.n))
             with np.errstate(all="ignore"):
-                own.prepare(scene, method.name, scene.step, compiled=compiled).advance(3, q, p)
+                own.prepare(scene, method.scheme, scene.step, compiled=compiled).advance(3, q, p)
             states.append((q, p))
         assert np.array_equal(states[0][0], states[1][0], equal_nan=True)
         assert np.array_equal(states[0][1], states[1][1], equal_nan=True)

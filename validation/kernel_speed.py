@@ -1,33 +1,31 @@
 """The own methods run about as fast as C, and a short run does not pay for a compiler.
 
-Claim, each a ratio of times taken side by side in this run (C with the same operations, the division by
-the mass included, and every number known at run time only):
+Claim, each a ratio of times taken side by side in this run, in one thread (C with the same operations, the
+division by the mass included, every number known at run time only, gcc -O3 -march=native -ffp-contract=off;
+of two ways to write the chain in C the faster one counts):
 
-* one spring, 1e8 unrecorded steps: at most 1.2 times C at -O2 -ffp-contract=off;
-* one spring, every step recorded: at most 2 times that unrecorded C;
-* 4096 springs: at most 1.5 times C at -O3 -march=native -ffp-contract=off;
-* a chain of 1,000 masses: at most 2 times a loop written by hand with NumPy; the cost of a spring and
-  step stays within the cost of memory (cache, then main memory) up to 1e6 masses;
+* one spring, unrecorded: at most 1.1 times C;
+* 4096 springs: at most 1.1 times C;
+* chains of 1,000 to 1,000,000 unequal masses and springs: at most 1.5 times C;
 * 200 steps of one spring are interpreted and import no numba.
 
-Command: python validation/kernel_speed.py        (40 s; without a C compiler `cc` its ratios are left out)
+Command: python validation/kernel_speed.py        (2 min; without a C compiler `cc` its ratios are left out)
 
-Expected (AMD EPYC, Zen 4, one core, gcc 12, numba 0.68; nanoseconds a spring and step, minimum of 5 to 7):
+Processor time of the thread is taken, not the clock on the wall, so that what else runs counts little; the
+rounds go through all jobs in turn, and a ratio is that of the least times.
 
-                                        explicit   semi-implicit   implicit
-    one spring, unrecorded                   3.8             7.6         11
-    one spring, every step recorded          3.9             7.7         11
-    C -O2, unrecorded                        5.9             7.6         11
-    unrecorded / C                          0.64            1.00       1.03
-    recorded / unrecorded C                 0.66            1.01       0.97
-    4096 springs                            0.31            0.31       0.31
-    C -O3 -march=native                     0.32            0.32       0.32
-    4096 springs / C                        0.99            0.99       0.98
-    chain of 1,000 masses                    2.1             2.1        6.1
-    chain of 1,000,000 masses                2.7             2.7        6.8
+Expected (Intel Xeon, Sapphire Rapids, gcc 12, numba 0.68; nanoseconds a mass and step, least of 9 rounds, C
+in brackets):
 
-A chain of 1,000 by NumPy takes 7.3, of 1,000,000 3.8: ratios 0.29 and 0.71.  200 interpreted steps take
-75 us, start included.  Exit status 0 when every ratio holds, 1 otherwise.
+                                        explicit        semi-implicit   implicit Euler
+    one spring                          6.8 (9.4)       13.9 (13.5)     16.2 (15.7)
+    4096 springs                        1.0 (0.85)      1.0 (0.84)      1.7 (0.86)
+    chain of 1,000 masses               1.2 (1.0)       1.2 (1.0)       8.9 (7.0)
+    chain of 10,000 masses              1.7 (1.2)       1.6 (1.2)       8.8 (7.0)
+    chain of 100,000 masses             1.8 (1.9)       1.8 (2.1)       12.6 (7.3)
+    chain of 1,000,000 masses           2.6 (2.9)       2.6 (3.2)       15.7 (7.9)
+
+Exit status 0 when every ratio holds, 1 otherwise.
 """
 
 from __future__ import annotations
@@ -40,22 +38,26 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, thread_time
+from typing import Any
 
 import numpy as np
 
 from arguments import arguments
 from springcheck.arrays import Floats
-from springcheck.engines.own import simulation
+from springcheck.engines.own import simulation, solver, tiles
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, Term, WallSpring
 
-METHODS = ("euler", "semi-implicit-euler", "implicit-euler")
-REPEATS = 7
-STEPS = 100_000_000
-RECORDED = 10_000_000
-CHUNK = 50_000
-SPRINGS, SPRING_STEPS, FRAMES = 4096, 5_000, 500
+BLOG = ("explicit-euler", "semi-implicit-euler", "implicit-euler")
+OTHERS = ("velocity-verlet", "implicit-midpoint", "rk4", "yoshida4")
+"""Timed too, without a claim."""
+ROUNDS = 9
+STEPS = 2_000_000
+SPRINGS, SPRING_STEPS = 4096, 1_000
+SIZES = (1_000, 10_000, 100_000, 1_000_000)
+WORK = 4_000_000
+"""Masses times steps of one run of a chain, at least 12 steps."""
 H = 0.01
 
 C = """
@@ -65,7 +67,7 @@ void name(long steps, double h, double m, double k, double d, double *state) { \
     for (long i = 0; i < steps; i++) { body } \\
     state[0] = q; state[1] = p; \\
 }
-LOOP(one_euler, double x = q; q = x + (p / m) * h; p = p + (-k * x) * h;)
+LOOP(one_explicit_euler, double x = q; q = x + (p / m) * h; p = p + (-k * x) * h;)
 LOOP(one_semi_implicit_euler, p = p + (-k * q) * h; q = q + (p / m) * h;)
 LOOP(one_implicit_euler, p = (p + (-k * q) * h) * d; q = q + (p / m) * h;)
 
@@ -75,42 +77,114 @@ void name(long steps, long n, double h, const double *restrict m, const double *
     for (long i = 0; i < steps; i++) \\
         for (long j = 0; j < n; j++) { body } \\
 }
-SWEEP(many_euler, double x = q[j]; q[j] = x + (p[j] / m[j]) * h; p[j] = p[j] + (-k[j] * x) * h;)
+SWEEP(many_explicit_euler, double x = q[j]; q[j] = x + (p[j] / m[j]) * h; p[j] = p[j] + (-k[j] * x) * h;)
 SWEEP(many_semi_implicit_euler,
       double x = p[j] + (-k[j] * q[j]) * h; p[j] = x; q[j] = q[j] + (x / m[j]) * h;)
 SWEEP(many_implicit_euler,
       double x = (p[j] + (-k[j] * q[j]) * h) * d[j]; p[j] = x; q[j] = q[j] + (x / m[j]) * h;)
+
+/* a chain between two walls: stiffness and place of both in w */
+#define CHAIN(name) \\
+void name(long steps, long n, double h, const double *restrict m, const double *restrict k, \\
+          const double *restrict rest, const double *restrict w, const double *restrict below, \\
+          const double *restrict inverse, const double *restrict above, double *restrict f, \\
+          double *restrict q, double *restrict p)
+
+/* in one pass: the tension of the spring before is kept */
+CHAIN(chain_explicit_euler_1) {
+    for (long s = 0; s < steps; s++) {
+        double left = w[0] * (q[0] - w[1]);
+        for (long i = 0; i < n; i++) {
+            double x = q[i], y = p[i];
+            double t = i < n - 1 ? k[i] * (q[i + 1] - x - rest[i]) : -w[2] * (x - w[3]);
+            p[i] = y + (t - left) * h; q[i] = x + (y / m[i]) * h; left = t;
+        }
+    }
+}
+CHAIN(chain_semi_implicit_euler_1) {
+    for (long s = 0; s < steps; s++) {
+        double left = w[0] * (q[0] - w[1]);
+        for (long i = 0; i < n; i++) {
+            double x = q[i];
+            double t = i < n - 1 ? k[i] * (q[i + 1] - x - rest[i]) : -w[2] * (x - w[3]);
+            double y = p[i] + (t - left) * h;
+            p[i] = y; q[i] = x + (y / m[i]) * h; left = t;
+        }
+    }
+}
+/* in two: the tensions first */
+#define TENSIONS \\
+    f[0] = w[0] * (q[0] - w[1]); f[n] = -w[2] * (q[n - 1] - w[3]); \\
+    for (long i = 0; i < n - 1; i++) f[i + 1] = k[i] * (q[i + 1] - q[i] - rest[i]);
+CHAIN(chain_explicit_euler_2) {
+    for (long s = 0; s < steps; s++) {
+        TENSIONS
+        for (long i = 0; i < n; i++) {
+            double y = p[i]; p[i] = y + (f[i + 1] - f[i]) * h; q[i] = q[i] + (y / m[i]) * h;
+        }
+    }
+}
+CHAIN(chain_semi_implicit_euler_2) {
+    for (long s = 0; s < steps; s++) {
+        TENSIONS
+        for (long i = 0; i < n; i++) {
+            double y = p[i] + (f[i + 1] - f[i]) * h; p[i] = y; q[i] = q[i] + (y / m[i]) * h;
+        }
+    }
+}
+CHAIN(chain_implicit_euler_1) {
+    for (long s = 0; s < steps; s++) {
+        double left = w[0] * (q[0] - w[1]), z = 0;
+        for (long i = 0; i < n; i++) {
+            double t = i < n - 1 ? k[i] * (q[i + 1] - q[i] - rest[i]) : -w[2] * (q[i] - w[3]);
+            z = p[i] + (t - left) * h - below[i] * z; f[i] = z; left = t;
+        }
+        z = 0;
+        for (long i = n - 1; i >= 0; i--) { z = (f[i] - above[i] * z) * inverse[i]; p[i] = z; }
+        for (long i = 0; i < n; i++) q[i] = q[i] + (p[i] / m[i]) * h;
+    }
+}
+CHAIN(chain_implicit_euler_2) {
+    for (long s = 0; s < steps; s++) {
+        double left = w[0] * (q[0] - w[1]), z = 0;
+        for (long i = 0; i < n; i++) {
+            double t = i < n - 1 ? k[i] * (q[i + 1] - q[i] - rest[i]) : -w[2] * (q[i] - w[3]);
+            z = p[i] + (t - left) * h - below[i] * z; f[i] = z; left = t;
+        }
+        z = 0;
+        for (long i = n - 1; i >= 0; i--) {
+            z = (f[i] - above[i] * z) * inverse[i]; p[i] = z; q[i] = q[i] + (z / m[i]) * h;
+        }
+    }
+}
 """
 
 
-def compiled_c(folder: Path, *flags: str) -> ctypes.CDLL:
-    """The C loops, compiled with these flags."""
-    source, library = folder / "loops.c", folder / f"loops{''.join(flags)}.so"
+def compiled_c(folder: Path) -> ctypes.CDLL:
+    """The C loops."""
+    source, library = folder / "loops.c", folder / "loops.so"
     source.write_text(C)
-    subprocess.run(
-        ["cc", *flags, "-ffp-contract=off", "-shared", "-fPIC", "-o", str(library), str(source)], check=True
-    )
+    flags = ("-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC")
+    subprocess.run(["cc", *flags, "-o", str(library), str(source)], check=True)
     return ctypes.CDLL(str(library))
 
 
-def in_turn(jobs: dict[str, Callable[[], None]], repeats: int = REPEATS) -> dict[str, Floats]:
-    """Seconds of each job, (repeats,) sorted; one warm-up, and the jobs in turn within every repeat."""
+def in_turn(jobs: dict[str, Callable[[], None]], rounds: int = ROUNDS) -> dict[str, Floats]:
+    """Seconds of each job, (rounds,) sorted; one warm-up, and the jobs in turn within every round."""
     seconds: dict[str, list[float]] = {name: [] for name in jobs}
-    for repeat in range(repeats + 1):
+    for each in range(rounds + 1):
         for name, job in jobs.items():
-            begin = perf_counter()
+            begin = thread_time()
             job()
-            if repeat:
-                seconds[name].append(perf_counter() - begin)
+            if each:
+                seconds[name].append(thread_time() - begin)
     return {name: np.sort(found) for name, found in seconds.items()}
 
 
 def line(name: str, seconds: Floats, each: float) -> None:
     """Print minimum and quartiles in nanoseconds per `each`."""
-    low, first, median, third = (
-        float(x) / each * 1e9 for x in (seconds[0], *np.percentile(seconds, (25, 50, 75)))
-    )
-    print(f"  {name:42s} {low:9.3f} {first:9.3f} {median:9.3f} {third:9.3f}")
+    numbers = (float(x) / each * 1e9 for x in (seconds[0], *np.percentile(seconds, (25, 50, 75))))
+    print(f"  {name:42s}" + "".join(f" {x:9.3f}" for x in numbers))
 
 
 def ratio(name: str, seconds: float, reference: float, bound: float) -> bool:
@@ -125,152 +199,133 @@ def head(title: str, unit: str) -> None:
     print(f"\n{title}\n  {unit:42s} {'min':>9} {'25 %':>9} {'50 %':>9} {'75 %':>9}")
 
 
-def scene(m: Floats, q: Floats, p: Floats, terms: tuple[Term, ...], steps: int) -> Scene:
+def scene(m: Floats, q: Floats, p: Floats, terms: tuple[Term, ...]) -> Scene:
     """A scene of these particles and terms."""
-    return Scene(name="speed", title="", source="", m=m, q=q, p=p, terms=terms, step=H, steps=steps)
+    return Scene(name="speed", title="", source="", m=m, q=q, p=p, terms=terms, step=H, steps=1)
 
 
-def springs(n: int, steps: int) -> Scene:
+def springs(n: int) -> Scene:
     """`n` springs of different strength, each with its own particle."""
     rng = np.random.default_rng(7)
     walls = WallSpring(i=np.arange(n), k=rng.uniform(1, 3, n), at=np.zeros(n))
-    return scene(rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n), (walls,), steps)
+    return scene(rng.uniform(1, 4, n), rng.normal(size=n), rng.normal(size=n), (walls,))
 
 
-def chain(n: int, steps: int) -> Scene:
+def chain(n: int) -> Scene:
     """`n` different masses between two walls."""
     rng = np.random.default_rng(8)
     ends = WallSpring(i=np.array([0, n - 1]), k=rng.uniform(1, 3, 2), at=np.array([-1.0, float(n)]))
     links = Spring(a=np.arange(n - 1), b=np.arange(1, n), k=rng.uniform(1, 3, n - 1), rest=np.ones(n - 1))
     q = np.arange(n) + rng.normal(size=n)
-    return scene(rng.uniform(1, 4, n), q, rng.normal(size=n), (ends, links), steps)
+    return scene(rng.uniform(1, 4, n), q, rng.normal(size=n), (ends, links))
 
 
-def doubles(x: Floats) -> ctypes.Array[ctypes.c_double]:
+def doubles(x: Floats) -> Any:
     """A pointer to an array's numbers."""
-    return x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))  # type: ignore[return-value]
+    return x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+class Again:
+    """A run that starts over in every round: a method that damps or grows must not reach odd numbers."""
+
+    def __init__(self, what: Scene, scheme: str, steps: int, threads: int = 1) -> None:
+        self._start = partial(simulation.prepare, what, scheme, H, compiled=True, threads=threads)
+        self._rows = np.empty((2, 1, what.n))
+        self._steps = steps
+        self._run = self._start()
+        self._calls = 0
+
+    def __call__(self) -> None:
+        self._run.advance(self._steps, *self._rows)
+
+
+def against_c(title: str, what: Scene, steps: int, bound: float, jobs: dict[str, Callable[[], None]]) -> bool:
+    """Time the own methods beside jobs in C, whose names begin with the scheme's."""
+    mine: dict[str, Callable[[], None]] = {name: Again(what, name, steps) for name in BLOG + OTHERS}
+    found = in_turn(mine | jobs)
+    head(title, "ns a mass and step")
+    passed = True
+    for name in BLOG + OTHERS:
+        line(name, found[name], steps * what.n)
+        best = min((found[c][0] for c in jobs if c.startswith(name)), default=0.0)
+        for c in (c for c in jobs if c.startswith(name)):
+            line(c, found[c], steps * what.n)
+        if best:
+            passed &= ratio(f"{name} / C", found[name][0], best, bound)
+    return passed
 
 
 def one_spring(c: ctypes.CDLL | None) -> bool:
-    """One spring, unrecorded and recorded, against C."""
-    passed = True
-    one = springs(1, STEPS)
+    """One spring against C."""
+    one = springs(1)
     m, k = float(one.m[0]), float(one.terms[0].k[0])  # type: ignore[attr-defined]
-    for method in METHODS:
-        own = simulation.prepare(one, method, H, compiled=True)
-        last_q, last_p = np.empty((1, 1)), np.empty((1, 1))
-        rows_q, rows_p = np.empty((CHUNK, 1)), np.empty((CHUNK, 1))
+    numbers = [ctypes.c_double(x) for x in (H, m, k, 1 / (1 + H * (H * (k / m))))]
+
+    def bare(name: str) -> None:
         state = np.array([one.q[0], one.p[0]])
+        getattr(c, name)(ctypes.c_long(STEPS), *numbers, doubles(state))
 
-        def record(own: simulation.Own = own, q: Floats = rows_q, p: Floats = rows_p) -> None:
-            for _ in range(RECORDED // CHUNK):
-                own.advance(1, q, p)
-
-        def bare_c(name: str = "one_" + method.replace("-", "_"), state: Floats = state) -> None:
-            inverse = 1 / (1 + H * H * (k / m))
-            numbers = [ctypes.c_double(x) for x in (H, m, k, inverse)]
-            getattr(c, name)(ctypes.c_long(STEPS), *numbers, doubles(state))
-
-        jobs: dict[str, Callable[[], None]] = {
-            "unrecorded": partial(own.advance, STEPS, last_q, last_p),
-            "recorded": record,
-        }
-        if c:
-            jobs["C"] = bare_c
-        found = in_turn(jobs, 5)
-        head(f"own:{method}, one spring", "ns a step")
-        line("unrecorded", found["unrecorded"], STEPS)
-        line("every step recorded", found["recorded"], RECORDED)
-        if c:
-            line("C -O2, unrecorded", found["C"], STEPS)
-            reference = found["C"][0] / STEPS
-            passed &= ratio("unrecorded / C", found["unrecorded"][0] / STEPS, reference, 1.2)
-            passed &= ratio("recorded / C unrecorded", found["recorded"][0] / RECORDED, reference, 2.0)
-    return passed
+    names = {f"{name}, C": partial(bare, "one_" + name.replace("-", "_")) for name in BLOG} if c else {}
+    return against_c("One spring", one, STEPS, 1.1, dict(names))
 
 
 def many_springs(c: ctypes.CDLL | None) -> bool:
     """4096 springs side by side, against C."""
-    passed = True
-    many = springs(SPRINGS, SPRING_STEPS)
+    many = springs(SPRINGS)
     k = many.terms[0].k  # type: ignore[attr-defined]
-    inverse = 1 / (1 + H * H * (k / many.m))
-    each = SPRINGS * SPRING_STEPS
-    for method in METHODS:
-        own = simulation.prepare(many, method, H, compiled=True)
-        q, p = np.empty((1, SPRINGS)), np.empty((1, SPRINGS))
-        rows_q, rows_p = np.empty((FRAMES, SPRINGS)), np.empty((FRAMES, SPRINGS))
-        # C gets rows laid out as ours are: on cache lines and apart, or it takes up to four times as long
-        c_q, c_p, *c_rows = simulation._blocks((many.q, many.p, many.m, k, inverse))
+    # C gets rows laid out as ours are: on cache lines and apart, or it takes up to four times as long
+    q, p, *rows = tiles.staggered((many.q, many.p, many.m, k, 1 / (1 + H * (H * (k / many.m)))))
 
-        def bare_c(
-            name: str = "many_" + method.replace("-", "_"),
-            q: Floats = c_q,
-            p: Floats = c_p,
-            rows: list[Floats] = c_rows,
-        ) -> None:
-            sizes = ctypes.c_long(SPRING_STEPS), ctypes.c_long(SPRINGS), ctypes.c_double(H)
-            getattr(c, name)(*sizes, *(doubles(x) for x in (*rows, q, p)))
+    def bare(name: str) -> None:
+        sizes = ctypes.c_long(SPRING_STEPS), ctypes.c_long(SPRINGS), ctypes.c_double(H)
+        q[:], p[:] = many.q, many.p
+        getattr(c, name)(*sizes, *(doubles(x) for x in (*rows, q, p)))
 
-        jobs: dict[str, Callable[[], None]] = {
-            "own": partial(own.advance, SPRING_STEPS, q, p),
-            "recorded": partial(own.advance, 1, rows_q, rows_p),
-        }
-        if c:
-            jobs["C"] = bare_c
-        found = in_turn(jobs)
-        head(f"own:{method}, {SPRINGS} springs", "ns a spring and step")
-        line("unrecorded", found["own"], each)
-        line("every step recorded", found["recorded"], SPRINGS * FRAMES)
-        if c:
-            line("C -O3 -march=native", found["C"], each)
-            passed &= ratio("own / C", found["own"][0], found["C"][0], 1.5)
-    return passed
+    names = {f"{name}, C": partial(bare, "many_" + name.replace("-", "_")) for name in BLOG} if c else {}
+    return against_c(f"{SPRINGS} springs", many, SPRING_STEPS, 1.1, dict(names))
 
 
-def numpy_chain(what: Scene, steps: int) -> tuple[Floats, Floats]:
-    """Semi-implicit Euler of a chain as one writes it with NumPy."""
-    ends, links = what.terms
-    assert isinstance(ends, WallSpring)
+def long_chain(c: ctypes.CDLL | None, n: int) -> bool:
+    """A chain against C."""
+    what, steps = chain(n), max(WORK // n, 12)
+    walls, links = what.terms
+    assert isinstance(walls, WallSpring)
     assert isinstance(links, Spring)
-    m, q, p = what.m, what.q.copy(), what.p.copy()
-    f = np.empty_like(q)
-    for _ in range(steps):
-        tension = links.k * (q[1:] - q[:-1] - links.rest)
-        f[:-1] = tension
-        f[-1] = 0
-        f[1:] -= tension
-        f[0] -= ends.k[0] * (q[0] - ends.at[0])
-        f[-1] -= ends.k[1] * (q[-1] - ends.at[1])
-        p += f * H
-        q += p / m * H
-    return q, p
+    ends = np.array([walls.k[0], walls.at[0], walls.k[1], walls.at[1]])
+    _, factors, _ = solver.factors(what, H)
+    given = (what.q, what.p, what.m, links.k, links.rest, ends, *factors, np.zeros(n + 1))
+    q, p, *rows = tiles.staggered(given)
+
+    def bare(name: str) -> None:
+        sizes = ctypes.c_long(steps), ctypes.c_long(n), ctypes.c_double(H)
+        q[:], p[:] = what.q, what.p
+        getattr(c, name)(*sizes, *(doubles(x) for x in (*rows, q, p)))
+
+    names = {
+        f"{name}, C in {way}": partial(bare, f"chain_{name.replace('-', '_')}_{way}")
+        for name in BLOG
+        for way in (1, 2)
+    }
+    return against_c(f"A chain of {n:,} masses", what, steps, 1.5, dict(names) if c else {})
 
 
-def long_chain() -> bool:
-    """Chains of 1e3 to 1e6 masses against NumPy."""
-    passed = True
-    head("chains", "ns a spring and step")
-    for n in (1_000, 10_000, 100_000, 1_000_000):
-        steps = max(10_000_000 // n, 5)
-        what = chain(n, steps)
-        own = {method: simulation.prepare(what, method, H, compiled=True) for method in METHODS}
-        q, p = np.empty((1, n)), np.empty((1, n))
-
-        def vectorised(what: Scene = what, steps: int = steps) -> None:
-            numpy_chain(what, steps)
-
-        jobs: dict[str, Callable[[], None]] = {
-            method: partial(run.advance, steps, q, p) for method, run in own.items()
-        }
-        found = in_turn(jobs | {"numpy": vectorised}, 5)
-        for method in METHODS:
-            line(f"own:{method}, {n} masses", found[method], steps * (n + 1))
-        line(f"NumPy, semi-implicit Euler, {n} masses", found["numpy"], steps * (n + 1))
-        passed &= ratio(
-            "own:semi-implicit-euler / NumPy", found["semi-implicit-euler"][0], found["numpy"][0], 2.0
-        )
-    return passed
+def threads() -> None:
+    """Wall-clock time of one thread and of two, by a long run."""
+    head("Two threads, wall clock", "ns a mass and step")
+    for title, what, steps in (
+        ("65,536 springs", springs(65_536), 500),
+        ("chain of 1,000,000 masses", chain(1_000_000), 64),
+    ):
+        for scheme in ("semi-implicit-euler", "rk4"):
+            seconds: dict[int, list[float]] = {1: [], 2: []}
+            jobs = {count: Again(what, scheme, steps, count) for count in seconds}
+            for _ in range(5):
+                for count, job in jobs.items():
+                    begin = perf_counter()
+                    job()
+                    seconds[count].append(perf_counter() - begin)
+            for count, found in seconds.items():
+                line(f"{title}, {scheme}, {count}", np.sort(found), what.n * steps)
 
 
 SHORT = """
@@ -307,11 +362,9 @@ def main() -> int:
     """Run every part; 1 where a ratio is too large."""
     arguments(__doc__)
     with tempfile.TemporaryDirectory() as folder:
-        plain = native = None
-        if shutil.which("cc"):
-            plain = compiled_c(Path(folder), "-O2")
-            native = compiled_c(Path(folder), "-O3", "-march=native")
-        passed = [short_run(), one_spring(plain), many_springs(native), long_chain()]
+        c = compiled_c(Path(folder)) if shutil.which("cc") else None
+        passed = [short_run(), one_spring(c), many_springs(c), *(long_chain(c, n) for n in SIZES)]
+    threads()
     return 0 if all(passed) else 1
 
 

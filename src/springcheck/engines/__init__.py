@@ -342,12 +342,21 @@ def method(label: Label) -> Method:
     return engine(label.engine).methods[label.method]
 
 
+def _methods_meant(name: str, glob: str) -> list[str]:
+    """The methods of an engine that a glob may name: where it says nothing of methods, the default ones."""
+    methods = engine(name).methods
+    default = [m for m, declared in methods.items() if declared.default]
+    all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
+    return list(methods) if all_of_them else default
+
+
 def match(patterns: tuple[str, ...]) -> tuple[Label, ...]:
     """Labels that glob patterns name, each once, in the order of the engines.
 
     A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before
     `@` is the glob and the platform is carried over to every engine that has it.  `*` alone names the
-    methods that are declared as default, every other glob all that it fits.
+    methods that are declared as default, and so does `engine:*` of an engine that has such; every other
+    glob names all that it fits.
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:
@@ -358,10 +367,8 @@ def match(patterns: tuple[str, ...]) -> tuple[Label, ...]:
         found = [
             f"{name}:{m}{at}{place}"
             for name in names()
-            for m, declared in engine(name).methods.items()
-            if (declared.default or head != "*")
-            and fnmatchcase(f"{name}:{m}", head)
-            and (not at or place in engine(name).platforms)
+            for m in _methods_meant(name, head)
+            if fnmatchcase(f"{name}:{m}", head) and (not at or place in engine(name).platforms)
         ]
         if not found:
             raise MethodError(f"no method matches {pattern!r}; `springcheck list` shows them all")

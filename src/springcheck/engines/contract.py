@@ -43,7 +43,7 @@ class Method:
     """Whether it chooses its steps by the scene's tolerance; `scheme` then has no one-step map."""
     default: bool = True
     """Whether `*` names it, which is what a scene runs by unless it says otherwise.  Methods that are not
-    default are run by name, or by a glob that names their engine."""
+    default are run by name, or by a glob that spells part of it."""
     terms: frozenset[str] = frozenset({"wall-spring", "spring"})
     """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})

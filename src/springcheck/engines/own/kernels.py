@@ -1,404 +1,370 @@
 """The loops of the own methods: plain Python that runs interpreted or compiled, bit for bit the same.
 
-Interpreted, the rows `m, k, q, p ...` are lists of floats (Python's floats neither warn nor raise when
-they overflow); compiled, they are arrays.  So no kernel may contain what rounds or fails differently
-there: only + - * / on floats, in a fixed order, and no division by anything but a mass.
-Sines and exponentials are made of these too: the C library's differ in the last digit from one system
-to the next, and Python's raise where these give inf or nan.
+Interpreted, rows of numbers are lists (Python's floats neither warn nor raise when they overflow);
+compiled, they are arrays.  So no loop may contain what rounds or fails differently there: + - * / in a
+fixed order, no division by what may be 0, and the C library's sine and exponential within their range.
 
-Every kernel takes `(every, h, *constants, q, p, qs, ps)`, fills row after row of qs and ps (f, n) with
-the state `every` steps later, and returns the last state.  There are four layouts:
-
-one     a single particle on one spring at rest in 0; its state stays in two registers
-many    particles side by side, each on one wall spring: n systems in one
-joined  any terms; forces are summed over the terms in the order of `forces`, then over each term's list
-chain   springs between neighbours, for implicit Euler: its equations are tridiagonal then
-
-To add a term to `joined`: write its loop, add it to `LAWS` and `forces`, and name its fields in
-`simulation.FIELDS`.
+A step is a list of operations (see `operations`).  `splitting` carries out any such list and `tableau`
+any explicit Runge-Kutta tableau, by any force; `one_splitting` and `one_tableau` do the same for a single
+particle on one spring at rest in 0, whose state stays in two registers.  Every kernel fills row after row
+of qs and ps (f, n) with the state `every` steps later.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, TypeAlias
 
-Row: TypeAlias = Any
-"""A list of numbers, or a one-dimensional array of them."""
+from springcheck.engines.own.forces import Numbers, Slot, force_at, tensions
+
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
-Terms: TypeAlias = Any
-"""One tuple of rows for each kind of term, in the order of `LAWS`; empty where the scene has none."""
-State: TypeAlias = Any
-Kernel: TypeAlias = Callable[..., State]
+Solver: TypeAlias = Any
+"""The factors of an implicit step: see `solve`."""
 
-FLAGS = {"error_model": "numpy"}
-"""How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
-would contract and reorder.  They stand in this file because numba takes saved code for its own as long
-as this file has not changed, whatever the flags.
+KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT = range(7)
+"""Operations on (q, p), with coefficients x and y in units of time:
+
+KICK        p += x F            EULER       KICK and DRIFT, both from the old state
+DRIFT       q += y p/m          IMPLICIT    P = p + x F(Q, P), Q = q + x P/m; q = q + y P/m, p = P
+KICK_DRIFT  one after the other MIDPOINT    the same, but p = P + (P - p)
+FRICTION    p *= decay
 """
 
-BLOCK = 512
-"""Particles of `many` that are carried through all steps before the next ones: 5 rows of 4 KiB stay in
-the first-level cache.  They do not act on each other, so the order changes no number.  The rows of
-`many` are therefore cut into blocks of equal width, (blocks, width), the last one padded; and indices
-count from 0 within a block, because LLVM vectorises no loop in which an index might be negative."""
+
+def kick(x: float, f: Numbers, p: Numbers) -> None:
+    """p += x f."""
+    for i in range(len(p)):
+        p[i] = p[i] + f[i] * x
 
 
-def one_euler(every: int, h: float, m: float, k: float, q: float, p: float, qs: Rows, ps: Rows) -> State:
-    """Explicit Euler: both from the old state."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            q, p = q + (p / m) * h, p + (-k * q) * h
-        qs[row, 0] = q
-        ps[row, 0] = p
-    return q, p
+def drift(y: float, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """q += y p/m."""
+    for i in range(len(p)):
+        q[i] = q[i] + (p[i] / m[i]) * y
 
 
-def one_semi_implicit_euler(
-    every: int, h: float, m: float, k: float, q: float, p: float, qs: Row, ps: Row
-) -> State:
-    """Semi-implicit Euler: kick, then drift with the new momentum."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            p = p + (-k * q) * h
-            q = q + (p / m) * h
-        qs[row, 0] = q
-        ps[row, 0] = p
-    return q, p
+def kick_drift(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """Kick, then drift with the new momentum."""
+    for i in range(len(p)):
+        new = p[i] + f[i] * x
+        p[i] = new
+        q[i] = q[i] + (new / m[i]) * y
 
 
-def one_implicit_euler(
-    every: int, h: float, m: float, k: float, inverse: float, q: float, p: float, qs: Row, ps: Row
-) -> State:
-    """Implicit Euler: p' = (p + h F(q)) / (1 + h**2 k/m), then drift; `inverse` is 1 over the divisor."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            p = (p + (-k * q) * h) * inverse
-            q = q + (p / m) * h
-        qs[row, 0] = q
-        ps[row, 0] = p
-    return q, p
+def euler(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """Drift and kick, both from the old state."""
+    for i in range(len(p)):
+        old = p[i]
+        p[i] = old + f[i] * x
+        q[i] = q[i] + (old / m[i]) * y
 
 
-def many_euler(
-    every: int, h: float, m: Rows, k: Rows, at: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
-) -> State:
-    """Explicit Euler of independent wall springs."""
-    for block in range(len(m)):
-        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
-        first = block * len(mb)
-        for row in range(len(qs)):
-            for _ in range(every):
-                for i in range(len(mb)):
-                    x = qb[i]
-                    qb[i] = x + (pb[i] / mb[i]) * h
-                    pb[i] = pb[i] + (-kb[i] * (x - ab[i])) * h
-            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
-            for i in range(len(out_q)):
-                out_q[i] = qb[i]
-                out_p[i] = pb[i]
-    return q, p
+def held_kick_drift(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """`kick_drift` by one wall spring on every particle, whose force is not stored."""
+    for i in range(len(p)):
+        new = p[i] + (-k[i] * (q[i] - at[i])) * x
+        p[i] = new
+        q[i] = q[i] + (new / m[i]) * y
 
 
-def many_semi_implicit_euler(
-    every: int, h: float, m: Rows, k: Rows, at: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
-) -> State:
-    """Semi-implicit Euler of independent wall springs."""
-    for block in range(len(m)):
-        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
-        first = block * len(mb)
-        for row in range(len(qs)):
-            for _ in range(every):
-                for i in range(len(mb)):
-                    x = pb[i] + (-kb[i] * (qb[i] - ab[i])) * h
-                    pb[i] = x
-                    qb[i] = qb[i] + (x / mb[i]) * h
-            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
-            for i in range(len(out_q)):
-                out_q[i] = qb[i]
-                out_p[i] = pb[i]
-    return q, p
+def held_euler(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """`euler` by one wall spring on every particle, whose force is not stored."""
+    for i in range(len(p)):
+        old = p[i]
+        p[i] = old + (-k[i] * (q[i] - at[i])) * x
+        q[i] = q[i] + (old / m[i]) * y
 
 
-def many_implicit_euler(
-    every: int, h: float, m: Rows, k: Rows, at: Rows, inverse: Rows, q: Rows, p: Rows, qs: Rows, ps: Rows
-) -> State:
-    """Implicit Euler of independent wall springs, each as in `one_implicit_euler`."""
-    for block in range(len(m)):
-        mb, kb, ab, qb, pb = m[block], k[block], at[block], q[block], p[block]
-        db = inverse[block]
-        first = block * len(mb)
-        for row in range(len(qs)):
-            for _ in range(every):
-                for i in range(len(mb)):
-                    x = (pb[i] + (-kb[i] * (qb[i] - ab[i])) * h) * db[i]
-                    pb[i] = x
-                    qb[i] = qb[i] + (x / mb[i]) * h
-            out_q, out_p = qs[row, first : first + len(mb)], ps[row, first : first + len(mb)]
-            for i in range(len(out_q)):
-                out_q[i] = qb[i]
-                out_p[i] = pb[i]
-    return q, p
+def chain_kick_drift(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """`kick_drift` by the tensions of a chain."""
+    for i in range(len(p)):
+        new = p[i] + (t[i + 1] - t[i]) * x
+        p[i] = new
+        q[i] = q[i] + (new / m[i]) * y
 
 
-WHOLE = 6755399441055744.0
-"""1.5 * 2**52: adding and taking it away rounds to a whole number."""
-TWO_BY_PI = 6.36619772367581382433e-01
-PI_BY_2 = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
-"""In three parts, the first two of 33 bits: their products with numbers below 2**20 are exact."""
-LOG2_E = 1.44269504088896338700e00
-LN_2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
-EXPONENTS = (7.09782712893383973096e02, -7.45133219101941108420e02)
-"""exp overflows above the first and vanishes below the second."""
-INFINITE = float("inf")
-POWERS = tuple((float(e), 2.0**e) for e in (64, 512, 256, 128, 64, 32, 16, 8, 4, 2, 1))
+def chain_euler(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """`euler` by the tensions of a chain."""
+    for i in range(len(p)):
+        old = p[i]
+        p[i] = old + (t[i + 1] - t[i]) * x
+        q[i] = q[i] + (old / m[i]) * y
 
 
-def sine(x: float) -> float:
-    """sin(x) to 1 ulp of x or of the result, for |x| < 2**20; to eps |x| below 2**50; no meaning beyond.
+def solve(solver: Solver, f: Numbers) -> None:
+    """Solve A z = f in place, A = 1 + x c/m + x**2 K/m by its factors, which are of one of three kinds.
 
-    Polynomials of fdlibm, k_sin.c and k_cos.c (Sun Microsystems, 1993).
+    divisors      1 / A of particles that nothing joins
+    tridiagonal   multipliers of the rows before, 1 / pivots, elements to the right of the diagonal
+    banded        LU factors as LAPACK's dgbtrf stores them (Anderson et al., LAPACK Users' Guide, 1999),
+                  transposed (n, 2 lower + upper + 1) and with 1 / pivots; the interchanges of its pivoting,
+                  the order in which it takes the particles, room (n,), and the number `lower`
     """
-    turns = (x * TWO_BY_PI + WHOLE) - WHOLE
-    r = ((x - turns * PI_BY_2[0]) - turns * PI_BY_2[1]) - turns * PI_BY_2[2]
-    quarter = turns - 4.0 * ((turns * 0.25 + WHOLE) - WHOLE)
-    z = r * r
-    if quarter * quarter == 1.0:
-        c = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11
-        c = -2.75573143513906633035e-07 + z * c
-        c = 2.48015872894767294178e-05 + z * c
-        c = -1.38888888888741095749e-03 + z * c
-        c = 4.16666666666666019037e-02 + z * c
-        half = 0.5 * z
-        w = 1.0 - half
-        y = w + ((1.0 - w - half) + z * (z * c))
-        return y if quarter == 1.0 else -y
-    c = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
-    c = 2.75573137070700676789e-06 + z * c
-    c = -1.98412698298579493134e-04 + z * c
-    c = 8.33333333332248946124e-03 + z * c
-    c = -1.66666666666666324348e-01 + z * c
-    y = r + r * (z * c)
-    return y if quarter == 0.0 else -y
+    divisors, (below, inverse, above), (band, swaps, order, z, lower) = solver
+    n = len(f)
+    if len(divisors):
+        for i in range(n):
+            f[i] = f[i] * divisors[i]
+    elif len(inverse):
+        last = 0.0
+        for i in range(n):
+            last = f[i] - below[i] * last
+            f[i] = last
+        last = 0.0
+        for i in range(n - 1, -1, -1):
+            last = (f[i] - above[i] * last) * inverse[i]
+            f[i] = last
+    else:
+        for j in range(n):
+            z[j] = f[order[j]]
+        for j in range(n):
+            last = z[swaps[j]]
+            z[swaps[j]] = z[j]
+            z[j] = last
+            column = band[j]
+            diagonal = len(column) - 1 - lower
+            for i in range(1, min(lower, n - 1 - j) + 1):
+                z[j + i] -= column[diagonal + i] * last
+        for j in range(n - 1, -1, -1):
+            column = band[j]
+            diagonal = len(column) - 1 - lower
+            last = z[j] * column[diagonal]
+            z[j] = last
+            for i in range(1, min(diagonal, j) + 1):
+                z[j - i] -= column[diagonal - i] * last
+        for j in range(n):
+            f[order[j]] = z[j]
 
 
-def exponential(x: float) -> float:
-    """exp(x) to 1 ulp; inf where it overflows, 0 where it vanishes.  Polynomial of fdlibm, e_exp.c."""
-    if x > EXPONENTS[0]:
-        return INFINITE
-    if x < EXPONENTS[1]:
-        return 0.0
-    n = (x * LOG2_E + WHOLE) - WHOLE
-    high = x - n * LN_2[0]
-    low = n * LN_2[1]
-    r = high - low
-    z = r * r
-    c = -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
-    c = 6.61375632143793436117e-05 + z * c
-    c = -2.77777777770155933842e-03 + z * c
-    c = 1.66666666666666019037e-01 + z * c
-    c = r - z * c
-    y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
-    for size, power in POWERS:
-        if n >= size:
-            n = n - size
-            y = y * power
-        elif n <= -size:
-            n = n + size
-            y = y / power
-    return y
+def implicit(
+    x: float, y: float, twice: bool, solver: Solver, f: Numbers, m: Numbers, q: Numbers, p: Numbers
+) -> None:
+    """IMPLICIT, or MIDPOINT where `twice`; f holds F(q, 0) and serves as room."""
+    for i in range(len(p)):
+        f[i] = p[i] + f[i] * x
+    solve(solver, f)
+    for i in range(len(p)):
+        new = f[i]
+        q[i] = q[i] + (new / m[i]) * y
+        p[i] = new + (new - p[i]) if twice else new
 
 
-def wall_springs(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add -k (q - at) to f."""
-    i, k, at = rows
-    for s in range(len(i)):
-        f[i[s]] += -k[s] * (q[i[s]] - at[s])
-
-
-def springs(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add the tension k (q[b] - q[a] - rest) to f[a] and take it from f[b]."""
-    a, b, k, rest = rows
-    for s in range(len(a)):
-        tension = k[s] * (q[b[s]] - q[a[s]] - rest[s])
-        f[a[s]] += tension
-        f[b[s]] -= tension
-
-
-def quartics(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add -b (q - at)**3 to f."""
-    i, b, at = rows
-    for s in range(len(i)):
-        u = q[i[s]] - at[s]
-        f[i[s]] += -b[s] * (u * u * u)
-
-
-def cosines(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add -depth wave sin(wave (q - at)) to f."""
-    i, depth, wave, at = rows
-    for s in range(len(i)):
-        f[i[s]] += -(depth[s] * wave[s]) * sine(wave[s] * (q[i[s]] - at[s]))
-
-
-def morses(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add the tension 2 depth steepness x (1 - x), x = exp(-steepness u), to f[a]; take it from f[b]."""
-    a, b, depth, steepness, rest = rows
-    for s in range(len(a)):
-        x = exponential(-steepness[s] * (q[b[s]] - q[a[s]] - rest[s]))
-        tension = 2.0 * depth[s] * steepness[s] * x * (1.0 - x)
-        f[a[s]] += tension
-        f[b[s]] -= tension
-
-
-def dampings(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Add -c p/m to f."""
-    i, c, m = rows
-    for s in range(len(i)):
-        f[i[s]] += -c[s] * (p[i[s]] / m[s])
-
-
-def nothing(rows: Rows, q: Row, p: Row, f: Row) -> None:
-    """Stands in for a term that the scene does not have."""
-
-
-def forces(terms: Terms, q: Row, p: Row, f: Row) -> None:
-    """Fill f with the force on every particle."""
-    for i in range(len(f)):
-        f[i] = 0.0
-    wall_springs(terms[0], q, p, f)
-    springs(terms[1], q, p, f)
-    quartics(terms[2], q, p, f)
-    cosines(terms[3], q, p, f)
-    morses(terms[4], q, p, f)
-    dampings(terms[5], q, p, f)
-
-
-def joined_euler(
-    every: int, h: float, m: Row, terms: Terms, f: Row, q: Row, p: Row, qs: Row, ps: Row
-) -> State:
-    """Explicit Euler of any terms."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            forces(terms, q, p, f)
-            for i in range(len(m)):
-                q[i] = q[i] + (p[i] / m[i]) * h
-                p[i] = p[i] + f[i] * h
-        for i in range(len(m)):
-            qs[row, i] = q[i]
-            ps[row, i] = p[i]
-    return q, p
-
-
-def joined_semi_implicit_euler(
-    every: int, h: float, m: Row, terms: Terms, f: Row, q: Row, p: Row, qs: Row, ps: Row
-) -> State:
-    """Semi-implicit Euler of any terms."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            forces(terms, q, p, f)
-            for i in range(len(m)):
-                x = p[i] + f[i] * h
-                p[i] = x
-                q[i] = q[i] + (x / m[i]) * h
-        for i in range(len(m)):
-            qs[row, i] = q[i]
-            ps[row, i] = p[i]
-    return q, p
-
-
-def joined_implicit_euler(
-    every: int, h: float, m: Row, terms: Terms, f: Row, inverse: Rows, q: Row, p: Row, qs: Row, ps: Row
-) -> State:
-    """Implicit Euler of linear terms: p' = inverse (p + h F(q)), then drift.
-
-    `terms` hold no friction here: it is in the matrix.  `inverse` holds the columns of
-    (1 + h c/m + h**2 K / m)**-1.  Column by column every p[i] is summed in the
-    same order as in a row-wise product, and the inner loop is free of dependences.
-    """
-    for row in range(len(qs)):
-        for _ in range(every):
-            forces(terms, q, p, f)
-            for i in range(len(m)):
-                f[i] = p[i] + f[i] * h
-                p[i] = 0.0
-            for j in range(len(m)):
-                column = inverse[j]
-                x = f[j]
-                for i in range(len(m)):
-                    p[i] += column[i] * x
-            for i in range(len(m)):
-                q[i] = q[i] + (p[i] / m[i]) * h
-        for i in range(len(m)):
-            qs[row, i] = q[i]
-            ps[row, i] = p[i]
-    return q, p
-
-
-def chain_implicit_euler(
+def splitting(
     every: int,
-    h: float,
-    m: Row,
-    terms: Terms,
-    f: Row,
-    lower: Row,
-    inverse: Row,
-    upper: Row,
-    q: Row,
-    p: Row,
+    code: Numbers,
+    slot: Numbers,
+    x: Numbers,
+    y: Numbers,
+    damped: Numbers,
+    decay: Rows,
+    one: Slot,
+    two: Slot,
+    solver: Solver,
+    m: Numbers,
+    f_one: Numbers,
+    f_two: Numbers,
+    t: Numbers,
+    stale: Numbers,
+    q: Numbers,
+    p: Numbers,
+    skip: int,
     qs: Rows,
     ps: Rows,
-) -> State:
-    """Implicit Euler of neighbours: (1 + h**2 K / m) p' = p + h F(q) by its LU factors, then drift.
+) -> None:
+    """Any list of operations; operation s kicks by the force of slot[s], with coefficients x[s] and y[s].
 
-    `lower` are the multipliers of the rows before, `inverse` 1 over the pivots, `upper` the elements to
-    the right of the diagonal.
+    A force is evaluated again only when the state that it belongs to has moved: `damped` says of each
+    slot whether it depends on p, `stale` carries this over from call to call.  Rows of the result leave
+    out the first `skip` particles.
     """
+    n = len(m)
     for row in range(len(qs)):
         for _ in range(every):
-            forces(terms, q, p, f)
-            x = 0.0
-            for i in range(len(m)):
-                x = (p[i] + f[i] * h) - lower[i] * x
-                f[i] = x
-            x = 0.0
-            for i in range(len(m) - 1, -1, -1):
-                x = (f[i] - upper[i] * x) * inverse[i]
-                p[i] = x
-            for i in range(len(m)):
-                q[i] = q[i] + (p[i] / m[i]) * h
-        for i in range(len(m)):
-            qs[row, i] = q[i]
-            ps[row, i] = p[i]
+            for s in range(len(code)):
+                what = code[s]
+                if what == FRICTION:
+                    decayed = decay[slot[s]]
+                    for i in range(n):
+                        p[i] = p[i] * decayed[i]
+                elif what == DRIFT:
+                    drift(y[s], m, q, p)
+                else:
+                    force, f = (one, f_one) if slot[s] == 0 else (two, f_two)
+                    if what == KICK:
+                        if stale[slot[s]]:
+                            force_at(force, q, p, t, f)
+                        kick(x[s], f, p)
+                    elif what in (KICK_DRIFT, EULER):
+                        kick_and_drift(what == EULER, stale[slot[s]], x[s], y[s], force, m, f, t, q, p)
+                    else:
+                        force_at(force, q, p, t, f)
+                        implicit(x[s], y[s], what == MIDPOINT, solver, f, m, q, p)
+                    stale[slot[s]] = False
+                moved = what not in (KICK, FRICTION)
+                stale[0] = stale[0] or moved or damped[0]
+                stale[1] = stale[1] or moved or damped[1]
+        out_q, out_p = qs[row], ps[row]
+        for i in range(len(out_q)):
+            out_q[i] = q[skip + i]
+            out_p[i] = p[skip + i]
+
+
+def kick_and_drift(
+    both: bool,
+    stale: bool,
+    x: float,
+    y: float,
+    force: Slot,
+    m: Numbers,
+    f: Numbers,
+    t: Numbers,
+    q: Numbers,
+    p: Numbers,
+) -> None:
+    """KICK_DRIFT, or EULER where `both` are from the old state.  The force of a simple row is not stored."""
+    indices, _, (k_held, at_held), (k, rest, ends), (c, _) = force
+    simple = stale and not indices and len(c) == 0
+    if simple and len(k) == 0 and len(k_held):
+        if both:
+            held_euler(x, y, k_held, at_held, m, q, p)
+        else:
+            held_kick_drift(x, y, k_held, at_held, m, q, p)
+    elif simple and len(k) and len(k_held) == 0:
+        tensions(k, rest, ends, q, t)
+        if both:
+            chain_euler(x, y, t, m, q, p)
+        else:
+            chain_kick_drift(x, y, t, m, q, p)
+    else:
+        if stale:
+            force_at(force, q, p, t, f)
+        if both:
+            euler(x, y, f, m, q, p)
+        else:
+            kick_drift(x, y, f, m, q, p)
+
+
+def tableau(
+    every: int,
+    a: Rows,
+    b: Numbers,
+    one: Slot,
+    m: Numbers,
+    v: Rows,
+    f: Rows,
+    u: Numbers,
+    w: Numbers,
+    t: Numbers,
+    q: Numbers,
+    p: Numbers,
+    skip: int,
+    qs: Rows,
+    ps: Rows,
+) -> None:
+    """Any explicit tableau: stages (q + sum a v, p + sum a f), then the same sums by the weights b.
+
+    a (s, s) and b (s,) hold coefficients times the step; v, f (s, n) velocities and forces of the stages,
+    u and w (n,) the stage that is being formed.
+    """
+    n = len(m)
+    for row in range(len(qs)):
+        for _ in range(every):
+            for s in range(len(b)):
+                for i in range(n):
+                    u[i] = q[i]
+                    w[i] = p[i]
+                for r in range(s):
+                    add(a[s][r], v[r], u)
+                    add(a[s][r], f[r], w)
+                force_at(one, u, w, t, f[s])
+                velocity = v[s]
+                for i in range(n):
+                    velocity[i] = w[i] / m[i]
+            for s in range(len(b)):
+                add(b[s], v[s], q)
+                add(b[s], f[s], p)
+        out_q, out_p = qs[row], ps[row]
+        for i in range(len(out_q)):
+            out_q[i] = q[skip + i]
+            out_p[i] = p[skip + i]
+
+
+def add(c: float, values: Numbers, total: Numbers) -> None:
+    """total += c values, left out where c is 0."""
+    if c != 0.0:
+        for i in range(len(total)):
+            total[i] = total[i] + c * values[i]
+
+
+def one_splitting(
+    every: int,
+    code: Numbers,
+    x: Numbers,
+    y: Numbers,
+    divisor: float,
+    m: float,
+    k: float,
+    q: float,
+    p: float,
+    qs: Rows,
+    ps: Rows,
+) -> tuple[float, float]:
+    """`splitting` of one particle on one spring; returns its last state."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            for s in range(len(code)):
+                what = code[s]
+                if what == KICK_DRIFT:
+                    p = p + (-k * q) * x[s]
+                    q = q + (p / m) * y[s]
+                elif what == KICK:
+                    p = p + (-k * q) * x[s]
+                elif what == DRIFT:
+                    q = q + (p / m) * y[s]
+                elif what == EULER:
+                    q, p = q + (p / m) * y[s], p + (-k * q) * x[s]
+                elif what == IMPLICIT:
+                    p = (p + (-k * q) * x[s]) * divisor
+                    q = q + (p / m) * y[s]
+                elif what == MIDPOINT:
+                    old = p
+                    p = (p + (-k * q) * x[s]) * divisor
+                    q = q + (p / m) * y[s]
+                    p = p + (p - old)
+        qs[row, 0] = q
+        ps[row, 0] = p
     return q, p
 
 
-ELEMENTARY: tuple[Callable[[float], float], ...] = (sine, exponential)
-"""What the loops of terms call."""
-LAWS: dict[str, Callable[..., None]] = {
-    "wall-spring": wall_springs,
-    "spring": springs,
-    "quartic": quartics,
-    "cosine": cosines,
-    "morse": morses,
-    "damping": dampings,
-}
-"""The loop of each kind of term, in the order in which `forces` calls them.  A scene's kernel has
-`nothing` in the place of those that the scene lacks: they are neither compiled nor evaluated."""
-
-ONE: dict[str, Kernel] = {
-    "euler": one_euler,
-    "semi-implicit-euler": one_semi_implicit_euler,
-    "implicit-euler": one_implicit_euler,
-}
-MANY: dict[str, Kernel] = {
-    "euler": many_euler,
-    "semi-implicit-euler": many_semi_implicit_euler,
-    "implicit-euler": many_implicit_euler,
-}
-JOINED: dict[str, Kernel] = {
-    "euler": joined_euler,
-    "semi-implicit-euler": joined_semi_implicit_euler,
-    "implicit-euler": joined_implicit_euler,
-}
-CHAIN: dict[str, Kernel] = {"implicit-euler": chain_implicit_euler}
+def one_tableau(
+    every: int,
+    a: Rows,
+    b: Numbers,
+    v: Numbers,
+    f: Numbers,
+    m: float,
+    k: float,
+    q: float,
+    p: float,
+    qs: Rows,
+    ps: Rows,
+) -> tuple[float, float]:
+    """`tableau` of one particle on one spring; returns its last state."""
+    for row in range(len(qs)):
+        for _ in range(every):
+            for s in range(len(b)):
+                u, w = q, p
+                for r in range(s):
+                    c = a[s][r]
+                    if c != 0.0:
+                        u = u + c * v[r]
+                        w = w + c * f[r]
+                v[s] = w / m
+                f[s] = -k * u
+            for s in range(len(b)):
+                if b[s] != 0.0:
+                    q = q + b[s] * v[s]
+                    p = p + b[s] * f[s]
+        qs[row, 0] = q
+        ps[row, 0] = p
+    return q, p

@@ -1,0 +1,134 @@
+"""The kernels compiled by numba, their code saved beside them and loaded only as it was written.
+
+numba loads saved code without a look at it: a file cut short or zeroed ends in an exception of any kind,
+or kills the process.  So a digest of every file stands beside them, and what does not agree is removed and
+compiled anew.  It covers the sources too, because numba watches the file of the kernel
+alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import inspect
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from springcheck.engines.own import forces, kernels
+
+HELP: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+"""How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
+would contract and reorder.  Nothing is allocated, so arrays need not be counted, which would take longer
+than a step of a few hundred particles."""
+
+FLAGS: dict[str, Any] = {**HELP, "nogil": True}
+
+HELPERS: tuple[Callable[..., Any], ...] = (
+    forces.sine,
+    forces.exponential,
+    forces.indexed,
+    forces.held,
+    forces.tensions,
+    forces.pulled,
+    forces.pulled_too,
+    forces.slowed,
+    forces.force_at,
+    kernels.kick,
+    kernels.drift,
+    kernels.kick_drift,
+    kernels.euler,
+    kernels.held_kick_drift,
+    kernels.held_euler,
+    kernels.chain_kick_drift,
+    kernels.chain_euler,
+    kernels.kick_and_drift,
+    kernels.solve,
+    kernels.implicit,
+    kernels.add,
+)
+"""What the kernels call."""
+
+
+@cache
+def _registered() -> None:
+    """Make the helpers known to numba, which calls nothing that it has not been told of."""
+    from numba.extending import register_jitable
+
+    for helper in HELPERS:
+        register_jitable(**HELP)(helper)
+
+
+def compiled(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Callable[..., Any]:
+    """A kernel compiled for arguments of these types, the last two of them arrays (f, n) of any layout.
+
+    Raises:
+        ImportError: numba is not here.
+    """
+    try:
+        return _jit(kernel, _types(arguments), saved=True)
+    except ImportError:
+        raise
+    except Exception:
+        # saved code that cannot be read, or no folder to save it in: compile for this process alone
+        return _jit(kernel, _types(arguments), saved=False)
+
+
+def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    import numba
+
+    found = [numba.typeof(argument) for argument in arguments]
+    # rows may be part of a wider array
+    return (*found[:-2], *(kind.copy(layout="A") for kind in found[-2:]))
+
+
+@cache
+def _jit(kernel: Callable[..., Any], types: tuple[Any, ...], *, saved: bool) -> Callable[..., Any]:
+    import numba
+
+    _registered()
+    found: Any = numba.njit(cache=saved, **FLAGS)(kernel)
+    if saved:
+        folder = Path(found.stats.cache_path)
+        unbroken = _unbroken(folder, kernel)
+        found.compile(types)
+        if not unbroken:
+            _seal(folder, kernel)
+    else:
+        found.compile(types)
+    # other layouts of arrays are converted, never compiled for
+    found.disable_compile()
+    function: Callable[..., Any] = found
+    return function
+
+
+def _files(folder: Path, kernel: Callable[..., Any]) -> list[Path]:
+    return sorted(folder.glob(f"{Path(inspect.getfile(kernel)).stem}.{kernel.__name__}-*.nb[ci]"))
+
+
+def _digest(folder: Path, kernel: Callable[..., Any]) -> str:
+    """Of the saved code of a kernel, and of the sources that it was compiled from."""
+    sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, kernels))]
+    sums = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in _files(folder, kernel)]
+    return repr([*sums, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in sources)])
+
+
+def _unbroken(folder: Path, kernel: Callable[..., Any]) -> bool:
+    """Whether the saved code of a kernel is as it was written; removes it where it is not."""
+    with contextlib.suppress(OSError):
+        if (folder / f"{kernel.__name__}.seal").read_text() == _digest(folder, kernel):
+            return True
+    for path in _files(folder, kernel):
+        path.unlink(missing_ok=True)
+    return False
+
+
+def _seal(folder: Path, kernel: Callable[..., Any]) -> None:
+    """Write down what the saved code of a kernel is; without it the next process compiles anew."""
+    with contextlib.suppress(OSError):
+        path = folder / f"{kernel.__name__}.seal"
+        draft = path.with_suffix(f".{os.getpid()}")
+        draft.write_text(_digest(folder, kernel))
+        draft.replace(path)

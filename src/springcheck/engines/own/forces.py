@@ -1,0 +1,120 @@
+"""The forces of the own methods as loops over numbers: by index lists of any term, or along a row.
+
+See `kernels` for the rules that every loop here keeps.  A row is what needs no index: one wall spring on
+every particle, or walls at its ends alone; springs between neighbours, or none; friction.
+
+To add a term: write its loop in `indexed`, and name its fields in `layout.FIELDS`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+Numbers: TypeAlias = Any
+"""A list of numbers, or a one-dimensional array of them."""
+Slot: TypeAlias = Any
+"""A force: whether by index, the index lists of each kind of term, and the parts of a row, empty where there
+is nothing: (k, at) of a wall spring on every particle, (k, rest, walls at both ends) of a chain, (c, m) of
+friction."""
+
+INFINITE = math.inf
+LARGEST_EXPONENT = 709.782712893384
+"""exp overflows above."""
+
+
+def sine(x: float) -> float:
+    """sin(x) of the C library; not a number where x is infinite."""
+    return math.sin(x) if -INFINITE < x < INFINITE else INFINITE - INFINITE
+
+
+def exponential(x: float) -> float:
+    """exp(x) of the C library; infinite where it overflows."""
+    return INFINITE if x > LARGEST_EXPONENT else math.exp(x)
+
+
+def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
+    """Fill f with the force of index lists: summed over the terms in this order, then over each list."""
+    walls, springs, quartics, cosines, morses, dampings = terms
+    for j in range(len(f)):
+        f[j] = 0.0
+    i, k, at = walls
+    for s in range(len(i)):
+        f[i[s]] += -k[s] * (q[i[s]] - at[s])
+    a, b, k, rest = springs
+    for s in range(len(a)):
+        tension = k[s] * (q[b[s]] - q[a[s]] - rest[s])
+        f[a[s]] += tension
+        f[b[s]] -= tension
+    i, k, at = quartics
+    for s in range(len(i)):
+        u = q[i[s]] - at[s]
+        f[i[s]] += -k[s] * (u * u * u)
+    i, depth, wave, at = cosines
+    for s in range(len(i)):
+        f[i[s]] += -(depth[s] * wave[s]) * sine(wave[s] * (q[i[s]] - at[s]))
+    a, b, depth, steepness, rest = morses
+    for s in range(len(a)):
+        x = exponential(-steepness[s] * (q[b[s]] - q[a[s]] - rest[s]))
+        tension = 2.0 * depth[s] * steepness[s] * x * (1.0 - x)
+        f[a[s]] += tension
+        f[b[s]] -= tension
+    i, c, m = dampings
+    for s in range(len(i)):
+        f[i[s]] += -c[s] * (p[i[s]] / m[s])
+
+
+def held(k: Numbers, at: Numbers, q: Numbers, f: Numbers) -> None:
+    """Fill f with the force of one wall spring on every particle."""
+    for i in range(len(f)):
+        f[i] = -k[i] * (q[i] - at[i])
+
+
+def tensions(k: Numbers, rest: Numbers, ends: Numbers, q: Numbers, t: Numbers) -> None:
+    """Fill t (n+1,) with the tension before each particle of a chain, and behind the last.
+
+    `ends` are stiffness and place of the walls on both sides, the former 0 where there is none.
+    """
+    t[0] = ends[0] * (q[0] - ends[1])
+    t[len(q)] = -ends[2] * (q[len(q) - 1] - ends[3])
+    for i in range(len(k)):
+        t[i + 1] = k[i] * (q[i + 1] - q[i] - rest[i])
+
+
+def pulled(t: Numbers, f: Numbers) -> None:
+    """Fill f with the pull of the neighbours on every particle."""
+    for i in range(len(f)):
+        f[i] = t[i + 1] - t[i]
+
+
+def pulled_too(t: Numbers, f: Numbers) -> None:
+    """Add the pull of the neighbours to f."""
+    for i in range(len(f)):
+        f[i] = (f[i] - t[i]) + t[i + 1]
+
+
+def slowed(c: Numbers, m: Numbers, p: Numbers, f: Numbers) -> None:
+    """Add friction to f."""
+    for i in range(len(f)):
+        f[i] += -c[i] * (p[i] / m[i])
+
+
+def force_at(slot: Slot, q: Numbers, p: Numbers, t: Numbers, f: Numbers) -> None:
+    """Fill f with the force at (q, p)."""
+    indices, terms, (k_held, at_held), (k, rest, ends), (c, m) = slot
+    if indices:
+        indexed(terms, q, p, f)
+        return
+    if len(k_held):
+        held(k_held, at_held, q, f)
+    if len(k):
+        tensions(k, rest, ends, q, t)
+        if len(k_held):
+            pulled_too(t, f)
+        else:
+            pulled(t, f)
+    elif len(k_held) == 0:
+        for i in range(len(f)):
+            f[i] = 0.0
+    if len(c):
+        slowed(c, m, p, f)

@@ -1,0 +1,161 @@
+"""A scheme as the list of operations that the kernels carry out.
+
+A splitting is such a list already: neighbouring kicks and drifts are joined.  Explicit Euler is one
+operation.  A tableau with one implicit stage is a step of implicit Euler before or after an explicit one:
+
+* implicit Euler: IMPLICIT(h);
+* the trapezoidal rule: EULER(h/2), IMPLICIT(h/2), because its last stage is its result;
+* the implicit midpoint: P of IMPLICIT(h/2) is half way, so p' = 2 P - p and q' = q + h P/m.  The force at
+  the middle is not used: its rounding would be multiplied by h k, which a stiff spring makes large.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.own.kernels import (
+    DRIFT,
+    EULER,
+    FRICTION,
+    IMPLICIT,
+    KICK,
+    KICK_DRIFT,
+    MIDPOINT,
+)
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.schemes import Scheme, number
+
+ALL, POTENTIAL, SLOW, FAST = "all", "potential", "slow", "fast"
+_FORCE = {"kick": ALL, "pull": POTENTIAL, "slow": SLOW, "fast": FAST}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Operation:
+    """One operation of a step: `x` and `y` are times, `force` names what kicks."""
+
+    code: int
+    x: float = 0.0
+    y: float = 0.0
+    force: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """A step as operations, or as an explicit tableau (`a`, `b`, times the step) by all terms."""
+
+    operations: tuple[Operation, ...] = ()
+    a: Floats | None = None
+    b: Floats | None = None
+    forces: tuple[str, ...] = (ALL,)
+    damped: tuple[bool, ...] = (False, False)
+    """Of each force: whether it depends on the momenta."""
+
+    @property
+    def implicit_step(self) -> float:
+        """x of the implicit operations, 0 where there is none."""
+        return next((o.x for o in self.operations if o.code in (IMPLICIT, MIDPOINT)), 0.0)
+
+    @property
+    def decays(self) -> tuple[float, ...]:
+        """x of the frictions, in the order of their rows."""
+        return tuple(o.x for o in self.operations if o.code == FRICTION)
+
+    @property
+    def slots(self) -> tuple[int, ...]:
+        """Of each operation the number of its force, or of its row of decays."""
+        frictions = iter(range(len(self.operations)))
+        return tuple(
+            next(frictions) if o.code == FRICTION else self.forces.index(o.force) if o.force else 0
+            for o in self.operations
+        )
+
+    @property
+    def evaluations(self) -> tuple[int, int]:
+        """Evaluations of the force in the first step, and in each later one: none where the state stayed."""
+        if self.b is not None:
+            return len(self.b), len(self.b)
+        stale, counts = [True, True], [0, 0]
+        for cycle in range(2):
+            for o, slot in zip(self.operations, self.slots, strict=True):
+                if o.code not in (FRICTION, DRIFT):
+                    counts[cycle] += stale[slot]
+                    stale[slot] = False
+                moved = o.code not in (FRICTION, KICK)
+                stale = [old or moved or damped for old, damped in zip(stale, self.damped, strict=True)]
+        return counts[0], counts[1]
+
+
+def program(scheme: Scheme, scene: Scene, h: float) -> Program:
+    """The operations of a step of length h.
+
+    Raises:
+        MethodError: a scheme that the kernels do not have: adaptive, or with several implicit stages.
+    """
+    if scheme.stages:
+        found = _splitting(scheme, h)
+    elif scheme.implicit:
+        found = _implicit(scheme, h)
+    elif len(scheme.b) == 1:
+        found = (Operation(code=EULER, x=h, y=h, force=ALL),)
+    elif scheme.b:
+        a = np.zeros((len(scheme.b), len(scheme.b)))
+        for i, row in enumerate(scheme.a):
+            a[i, : len(row)] = [float(number(c, np.float64) * h) for c in row]
+        return Program(a=a, b=np.array([float(number(c, np.float64) * h) for c in scheme.b]))
+    else:
+        raise MethodError(f"own: the scheme {scheme.name} has neither stages nor a tableau to carry out")
+    damped = scene.system.is_damped
+    if not damped:
+        found = tuple(_without_friction(o) for o in found if o.code != FRICTION)
+    forces = tuple(dict.fromkeys(o.force for o in found if o.force))
+    if len(forces) > 2:
+        raise MethodError(
+            f"own: the scheme {scheme.name} needs {len(forces)} forces apart, and two are served"
+        )
+    depends = tuple(damped and name in (ALL, SLOW) for name in (*forces, "", "")[:2])
+    return Program(operations=found, forces=forces or (ALL,), damped=depends)
+
+
+def _without_friction(o: Operation) -> Operation:
+    return Operation(code=o.code, x=o.x, y=o.y, force=POTENTIAL if o.force == ALL else o.force)
+
+
+def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
+    found: list[Operation] = []
+    for kind, c in scheme.stages:
+        x = float(number(c, np.float64) * h)
+        if kind == "friction":
+            found.append(Operation(code=FRICTION, x=x))
+        elif kind != "drift":
+            found.append(Operation(code=KICK, x=x, force=_FORCE[kind]))
+        elif found and found[-1].code == KICK:
+            found[-1] = Operation(code=KICK_DRIFT, x=found[-1].x, y=x, force=found[-1].force)
+        else:
+            found.append(Operation(code=DRIFT, y=x))
+    return tuple(found)
+
+
+def _implicit(scheme: Scheme, h: float) -> tuple[Operation, ...]:
+    a, b = scheme.a, scheme.b
+    s = len(b)
+    x = float(number(a[-1][s - 1], np.float64) * h)
+    explicit = all(not c for row in a[:-1] for c in row)
+    if explicit and s <= 2 and tuple(a[-1]) == tuple(b):
+        first = float(number(a[-1][0], np.float64) * h)
+        before = (Operation(code=EULER, x=first, y=first, force=ALL),) if s == 2 else ()
+        return (*before, Operation(code=IMPLICIT, x=x, y=x, force=POTENTIAL))
+    if s == 1 and b[0] == 1 and a[0][0] * 2 == 1:
+        return (Operation(code=MIDPOINT, x=x, y=h, force=POTENTIAL),)
+    raise MethodError(f"own: the implicit scheme {scheme.name} has no solver here")
+
+
+def terms_of(force: str, scene: Scene) -> tuple[Term, ...]:
+    """The terms behind the name of a force."""
+    if force == POTENTIAL:
+        return tuple(term for term in scene.terms if term.is_potential)
+    return {ALL: scene.terms, SLOW: scene.system.slow, FAST: scene.system.fast}[force]

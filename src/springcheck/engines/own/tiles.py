@@ -1,0 +1,259 @@
+"""How a kernel is called: on all particles, or on some after others, in one thread or in several.
+
+Particles that nothing joins are carried through all steps a few at a time, so that they stay in the
+first-level cache.  A long chain is cut into tiles that stay in the second-level cache for some steps: each
+starts from a copy with so many neighbours on both sides that what is wrong at its ends, where they lack
+theirs, does not reach the particles that are kept (overlapped tiling: Krishnamoorthy et al., PLDI 2007).
+Neither changes any number, so tiles may be worked on by several threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.own import layout
+
+WIDTH = 4096
+"""Particles of a tile: 6 rows of 32 KiB stay in the second-level cache."""
+
+NARROW, MANY_STEPS = 1024, 32
+"""Particles of a tile that nothing joins where it is carried through so many steps or more: 5 rows of 8 KiB
+stay in the first-level cache."""
+
+MARGIN = 64
+"""Particles that a tile of a chain gets on each side: it goes alone until what is wrong comes as far."""
+
+PARALLEL = 2_000_000
+"""Particle-steps of one call from which threads pay: 1 to 2 ms, where starting them takes 0.1 ms."""
+
+LANES = 8
+"""Numbers in a cache line of 64 bytes, and in the widest vector."""
+
+STAGGER = 9 * LANES
+"""Numbers left free between two rows: the processor takes a load for dependent on a recent store to the
+same place in another page of 4 KiB."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tile:
+    """How particles may be cut: whether neighbours are joined, and over how many a step reaches."""
+
+    joined: bool
+    reach: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """A kernel and what it works on.  `head` stands before the masses, and `work` counts spring-steps."""
+
+    kernel: Callable[..., Any]
+    head: tuple[Any, ...]
+    state: tuple[Any, Any]
+    n: int
+    work: float
+    m: Floats | None = None
+    """Masses (n,); None for the kernels of a single particle."""
+    stages: int = 0
+    """Stages of a tableau, 0 for a splitting."""
+    tile: Tile | None = None
+    """None where all particles must go together."""
+
+    def room(self, n: int) -> tuple[Any, ...]:
+        """What the kernel needs beside the state of n particles."""
+        t = np.zeros(n + 1)
+        s = self.stages
+        if s:
+            return np.zeros((s, n)), np.zeros((s, n)), np.zeros(n), np.zeros(n), t
+        return np.zeros(n), np.zeros(n), t, np.ones(2, bool)
+
+    def arguments(self, head: tuple[Any, ...], m: Floats, q: Floats, p: Floats, skip: int) -> tuple[Any, ...]:
+        """All of the kernel's arguments but `every` and the rows to fill."""
+        return *head, m, *self.room(len(m)), q, p, skip
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def compiled(job: Job) -> Job:
+    """The job with its kernel compiled.  Raises ImportError without numba."""
+    from springcheck.engines.own.compiled import compiled as compile_for
+
+    none = np.empty((0, job.n))
+    if job.m is None:
+        arguments = (1, *job.head, *job.state, none, none)
+    else:
+        arguments = (1, *job.arguments(job.head, job.m, *job.state, 0), none, none)
+    return replace(job, kernel=compile_for(job.kernel, arguments))
+
+
+class Whole:
+    """All particles in one call, interpreted or compiled."""
+
+    def __init__(self, job: Job, *, compiled: bool) -> None:
+        keep = _identity if compiled else as_lists
+        self._kernel = job.kernel
+        self._state: Any = None
+        if job.m is None:
+            self._arguments, self._state = keep(job.head), job.state
+        else:
+            self._arguments = keep(job.arguments(job.head, job.m, *job.state, 0))
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        """Fill q and p (f, n)."""
+        if self._state is None:
+            self._kernel(every, *self._arguments, q, p)
+        else:
+            self._state = self._kernel(every, *self._arguments, *self._state, q, p)
+
+
+class Tiled:
+    """A row of particles cut into tiles."""
+
+    def __init__(self, job: Job, threads: int) -> None:
+        assert job.m is not None
+        assert job.tile is not None
+        self._job, self._threads = job, threads
+        rows = [*_numbers(job.head), job.m, *job.state]
+        apart = iter(staggered([row for row in rows if len(row) >= job.n - 1]))
+        self._tile = job.tile
+        found = {id(row): next(apart) for row in rows if len(row) >= job.n - 1}
+        self._head = _exchanged(job.head, found)
+        self._m = found[id(job.m)]
+        self._q, self._p = (found[id(x)] for x in job.state)
+        self._cuts: dict[int, list[tuple[int, int, int, tuple[Any, ...]]]] = {}
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        """Fill q and p (f, n)."""
+        steps = every * len(q)
+        if not self._tile.joined:
+            self._each(self._alone, NARROW if steps >= MANY_STEPS else WIDTH, 0, every, q, p, steps)
+            return
+        most = max(1, MARGIN // self._tile.reach)
+        if self._job.n < 2 * WIDTH or steps < 4:
+            self._each(self._alone, self._job.n, 0, every, q, p, 0)
+            return
+        if every <= most:
+            rows = most // every
+            for first in range(0, len(q), rows):
+                self._together(every, q[first : first + rows], p[first : first + rows])
+            return
+        spare = np.empty((2, 1, self._job.n))
+        for row in range(len(q)):
+            left = every
+            while left > most:
+                self._together(most, *spare)
+                left -= most
+            self._together(left, q[row : row + 1], p[row : row + 1])
+
+    def _together(self, every: int, q: Floats, p: Floats) -> None:
+        self._each(self._with_margin, WIDTH, MARGIN + self._tile.reach, every, q, p, every * len(q))
+        self._q[:], self._p[:] = q[-1], p[-1]
+
+    def _each(
+        self,
+        go: Callable[..., None],
+        width: int,
+        margin: int,
+        every: int,
+        q: Floats,
+        p: Floats,
+        steps: int,
+    ) -> None:
+        tiles = self._cut(width, margin)
+        if self._threads > 1 and len(tiles) > 1 and steps * self._job.n >= PARALLEL:
+            with ThreadPoolExecutor(min(self._threads, len(tiles))) as pool:
+                for future in [pool.submit(go, tile, every, q, p) for tile in tiles]:
+                    future.result()
+        else:
+            for tile in tiles:
+                go(tile, every, q, p)
+
+    def _alone(self, tile: Any, every: int, q: Floats, p: Floats) -> None:
+        lo, _, hi, arguments = tile
+        self._job.kernel(every, *arguments, q[:, lo:hi], p[:, lo:hi])
+
+    def _with_margin(self, tile: Any, every: int, q: Floats, p: Floats) -> None:
+        lo, before, hi, (head, m) = tile
+        mine = slice(lo - before, lo - before + len(m))
+        local_q, local_p = staggered((self._q[mine], self._p[mine]))
+        arguments = self._job.arguments(head, m, local_q, local_p, before)
+        self._job.kernel(every, *arguments, q[:, lo:hi], p[:, lo:hi])
+
+    def _cut(self, width: int, margin: int) -> list[tuple[int, int, int, tuple[Any, ...]]]:
+        """Tiles: the particles lo to hi that are kept, how many stand before them, and the arguments."""
+        if width not in self._cuts:
+            n = self._job.n
+            count = -(-n // width)
+            edge = -(-n // (count * LANES)) * LANES if count > 1 else n
+            found = []
+            for lo in range(0, n, edge):
+                hi = min(lo + edge, n)
+                begin, end = max(0, lo - margin), min(n, hi + margin)
+                head, m = cut(self._head, begin, end), self._m[begin:end]
+                inner: tuple[Any, ...] = (head, m)
+                if not margin:
+                    inner = self._job.arguments(head, m, self._q[lo:hi], self._p[lo:hi], 0)
+                found.append((lo, lo - begin, hi, inner))
+            self._cuts[width] = found
+        return self._cuts[width]
+
+
+def cut(head: tuple[Any, ...], lo: int, hi: int) -> tuple[Any, ...]:
+    """The part of a kernel's constants that belongs to the particles lo to hi."""
+    if len(head) == 3:
+        a, b, slot = head
+        return a, b, layout.cut(slot, lo, hi)
+    code, slot, x, y, damped, decays, one, two, (divisors, *rest) = head
+    slots = layout.cut(one, lo, hi), layout.cut(two, lo, hi)
+    return code, slot, x, y, damped, np.ascontiguousarray(decays[:, lo:hi]), *slots, (divisors[lo:hi], *rest)
+
+
+def staggered(rows: Any) -> list[Floats]:
+    """Copies of rows that begin on a cache line each, and no two of them at the same place within a page.
+
+    A vector that lies across two cache lines takes up to three times as long.
+    """
+    longest = -(-max(len(row) for row in rows) // LANES) * LANES
+    # a multiple of a page, and then one step on
+    room = -(-longest // 512) * 512 + STAGGER
+    memory = np.empty(len(rows) * room + LANES)
+    begin = -(memory.ctypes.data // memory.itemsize) % LANES
+    out = []
+    for row in rows:
+        out.append(memory[begin : begin + len(row)])
+        out[-1][:] = row
+        begin += room
+    return out
+
+
+def as_lists(value: Any) -> Any:
+    """Arrays within tuples as lists."""
+    if isinstance(value, tuple):
+        return tuple(as_lists(x) for x in value)
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _identity(value: Any) -> Any:
+    return value
+
+
+def _numbers(value: Any) -> list[Floats]:
+    """The one-dimensional arrays of floats within tuples."""
+    if isinstance(value, tuple):
+        return [row for part in value for row in _numbers(part)]
+    return [value] if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype == np.float64 else []
+
+
+def _exchanged(value: Any, by: dict[int, Floats]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_exchanged(part, by) for part in value)
+    return by.get(id(value), value)
