@@ -1,0 +1,128 @@
+"""SciPy's `solve_ivp` methods, at the scene's tolerance, relative and for each component alike.
+
+The solvers are stepped as `solve_ivp` steps them, and read by their dense output.  SciPy is always here,
+because others need it; its methods are run by name, so that the set that runs by default stays what it was.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Label, Method, Simulation, Stopped, named
+from springcheck.physics.scene import Scene
+from springcheck.schemes import Scheme
+
+SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
+
+SMALLEST_TOLERANCE = 100 * np.finfo(np.float64).eps
+"""What SciPy raises smaller relative tolerances to."""
+
+
+def version() -> dict[str, str]:
+    """Version of SciPy."""
+    import scipy
+
+    return {"scipy": scipy.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A solver at the scene's start."""
+    return _Solver(scene, SOLVERS[method.name], step)
+
+
+class _Solver:
+    """An `OdeSolver` in motion."""
+
+    def __init__(self, scene: Scene, name: str, step: float) -> None:
+        from scipy import integrate
+
+        self.force_calls = 0
+        self._n, self._h, self._done = scene.n, step, 0
+        n, m, system = scene.n, scene.m, scene.system
+
+        def slope(t: float, y: Floats) -> Floats:
+            self.force_calls += 1
+            return np.concatenate([y[n:] / m, system.force(y[:n], y[n:])])
+
+        def jacobian(t: float, y: Floats) -> Floats:
+            out = np.zeros((2 * n, 2 * n))
+            out[:n, n:] = np.diag(1 / m)
+            out[n:, :n] = -system.hessian(y[:n])
+            out[n:, n:] = -np.diag(system.friction_rates.astype(np.float64))
+            return out
+
+        sizes = np.concatenate(system.amplitudes)
+        options: dict[str, Any] = {
+            "rtol": max(scene.tolerance, SMALLEST_TOLERANCE),
+            "atol": scene.tolerance * np.where(sizes > 0, sizes, 1.0),
+        }
+        if name in ("Radau", "BDF", "LSODA"):
+            options["jac"] = jacobian
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            self._solver = getattr(integrate, name)(
+                slope, 0.0, np.concatenate([scene.q, scene.p]), scene.steps * step, **options
+            )
+        self._dense: Any = None
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        solver, n = self._solver, self._n
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            for row in range(len(q)):
+                t = (self._done + every) * self._h
+                while abs(solver.t) < abs(t) and solver.status == "running":
+                    message = solver.step()
+                    self._dense = None
+                    if solver.status == "failed":
+                        raise Stopped(row, " ".join(str(message).split()))
+                if solver.t == t:
+                    y = solver.y
+                else:
+                    self._dense = self._dense or solver.dense_output()
+                    y = self._dense(t)
+                q[row], p[row] = y[:n], y[n:]
+                self._done += every
+
+
+def _scheme(name: str, title: str, source: str) -> Scheme:
+    return Scheme(name=f"scipy-{name}", title=title, order=0, limit=np.inf, symplectic=False, source=source)
+
+
+SCHEMES = (
+    _scheme("rk45", "Dormand-Prince 5(4), adaptive", "Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19"),
+    _scheme("dop853", "DOP853, order 8, adaptive", "Hairer, Norsett & Wanner, Solving ODEs I, II.5"),
+    _scheme("radau", "Radau IIA, order 5, adaptive", "Hairer & Wanner, Solving ODEs II, IV.8"),
+    _scheme(
+        "bdf", "quasi-constant step BDF, orders 1-5", "Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1"
+    ),
+    _scheme("lsoda", "LSODA, Adams and BDF by turns", "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136"),
+)
+
+ENGINE = Engine(
+    name="scipy",
+    title="SciPy",
+    distribution="scipy",
+    methods=named(
+        *(
+            Method(
+                name=name,
+                scheme=f"scipy-{name}",
+                about=f"scipy.integrate.{solver}, as solve_ivp steps it",
+                adaptive=True,
+                default=False,
+                terms=frozenset({ANY_POTENTIAL, "damping"}),
+                kinds=frozenset({"particles", "circuit", "rotor"}),
+            )
+            for name, solver in SOLVERS.items()
+        )
+    ),
+    schemes=SCHEMES,
+    start=start,
+    version=version,
+    step_seconds=1e-4,
+)

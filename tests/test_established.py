@@ -1,0 +1,126 @@
+"""Engines that others have established: each attachment is the scheme that it is declared with, to rounding.
+
+MuJoCo's joint spring is the blog's loop and pymunk's force the blog's spiral, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from springcheck import checks, engines, simulate
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import load_scene
+from springcheck.trajectory import Trajectory
+
+Need = Callable[[str], None]
+
+NAMES = ("mujoco", "pymunk", "rebound", "dart")
+LABELS = [f"{name}:{method}" for name in NAMES for method in engines.engine(name).methods]
+
+
+def run(scene: Scene, label: str) -> Trajectory:
+    return simulate.run(scene, label)
+
+
+def failed(scene: Scene, made: Trajectory) -> list[str]:
+    return [verdict.check for verdict in checks.judge(scene, made) if verdict.passed is False]
+
+
+SCENES = ("spring", "spring-uneven", "chain", "anharmonic", "overdamped")
+
+
+@pytest.mark.parametrize("label", LABELS)
+@pytest.mark.parametrize("name", SCENES)
+def test_each_attachment_passes_every_verdict_of_its_scheme(label: str, name: str, need: Need) -> None:
+    need(label)
+    scene = load_scene(name)
+    if engines.refusal(scene, engines.parse(label)):
+        pytest.skip("does not serve this scene")
+    try:
+        made = run(scene, label)
+    except MethodError as error:
+        assert "a joint has one spring" in str(error)  # noqa: PT017
+        return
+    assert failed(scene, made) == []
+    judged = {v.check for v in checks.judge(scene, made) if v.passed}
+    assert {"start", "step-defect"} <= judged
+
+
+@pytest.mark.parametrize(
+    ("label", "own", "scene"),
+    [
+        ("mujoco:joint-spring", "own:semi-implicit-euler", "spring"),
+        ("pymunk:force", "own:euler", "spring"),
+    ],
+)
+def test_bit_for_bit_the_loops_of_the_blog(label: str, own: str, scene: str, need: Need) -> None:
+    need(label)
+    ours, theirs = run(load_scene(scene), own), run(load_scene(scene), label)
+    assert np.array_equal(ours.q, theirs.q)
+    assert np.array_equal(ours.p, theirs.p)
+
+
+AMPLITUDES = [
+    ("mujoco:joint-spring", 1.020), ("pymunk:force", 2.705), ("pymunk:damped-spring", 0.984),
+    ("dart:force", 1.020), ("dart:joint-spring", 0.370),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("label", "amplitude"), AMPLITUDES)
+def test_the_blogs_spring_after_200_steps(label: str, amplitude: float, need: Need) -> None:
+    """Amplitude of m = k = 1 from its last state; the scheme decides it, and so the attachment does."""
+    need(label)
+    made = run(load_scene("spring"), label)
+    assert np.hypot(made.q[-1, 0], made.p[-1, 0]) == pytest.approx(amplitude, abs=6e-4)
+
+
+def test_a_held_force_gains_area_by_its_number_of_substeps(need: Need) -> None:
+    need("mujoco:motor")
+    scene = load_scene("spring-uneven")
+    k, m = scene.terms[0].k[0], scene.m[0]  # type: ignore[attr-defined]
+    a = scene.step**2 * k / m
+    for label, n in (("mujoco:motor-frame-skip-5", 5.0), ("mujoco:motor-rk4", np.inf)):
+        made = run(scene, label)
+        z = np.stack([made.q[:, 0], made.p[:, 0]])
+        step = z[:, 1:] @ np.linalg.pinv(z[:, :-1])
+        gain = (1 - 1 / n) / 2
+        assert np.linalg.det(step) == pytest.approx(1 + a * gain, abs=1e-12)
+
+
+@pytest.mark.parametrize("label", ["mujoco:joint-spring", "rebound:leapfrog", "dart:force", "pymunk:force"])
+@pytest.mark.parametrize("declared", ["velocity-verlet", "implicit-euler"])
+def test_an_attachment_that_is_taken_for_another_scheme_fails(label: str, declared: str, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    assert "step-defect" in failed(scene, replace(run(scene, label), scheme=declared))
+
+
+@pytest.mark.parametrize("label", LABELS)
+def test_frames_apart_hold_the_same_states(label: str, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    if engines.refusal(scene, engines.parse(label)):
+        pytest.skip("does not serve this scene")
+    fine, coarse = run(scene, label), run(replace(scene, every=10), label)
+    assert np.array_equal(fine.q[::10], coarse.q)
+    assert np.array_equal(fine.p[::10], coarse.p)
+
+
+@pytest.mark.parametrize("name", ["rk45", "dop853"])
+def test_scipys_solvers_hold_what_the_tolerance_allows(name: str) -> None:
+    scene = load_scene("spring-uneven")
+    made = run(scene, f"scipy:{name}")
+    assert failed(scene, made) == []
+    wrong = replace(made, q=made.q * (1 + 1e-6), energy=None)
+    assert "tolerance" in failed(scene, wrong)
+
+
+def test_what_needs_an_extra_is_run_by_name_alone() -> None:
+    default = {label.engine for label in engines.match(("*",))}
+    assert not default & {*NAMES, "scipy"}
+    assert {str(label) for label in engines.match(("mujoco:*",))} == {x for x in LABELS if "mujoco" in x}
