@@ -5,8 +5,15 @@ They measure how good a scheme is.  A study's own control may fail it; a large e
 
 from __future__ import annotations
 
-from springcheck.studies import extremes, faults, precision, run, stability
+from springcheck.studies import ensemble, extremes, faults, precision, run, stability
 from springcheck.studies.study import Study
 
-STUDIES: tuple[Study, ...] = (run.STUDY, faults.STUDY, precision.STUDY, stability.STUDY, extremes.STUDY)
+STUDIES: tuple[Study, ...] = (
+    run.STUDY,
+    ensemble.STUDY,
+    faults.STUDY,
+    precision.STUDY,
+    stability.STUDY,
+    extremes.STUDY,
+)
 """Every study, in the order in which `--help` names them."""

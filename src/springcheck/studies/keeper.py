@@ -111,25 +111,35 @@ class Keeper:
 
     def results(self, pieces: Sequence[Piece]) -> list[Any]:
         """The results of these pieces, in their order: taken up where finished, else measured and kept."""
-        self.names += [piece.name for piece in pieces]
-        found = {i: self.finished(piece.form, piece.key) for i, piece in enumerate(pieces)}
-        found = {i: result for i, result in found.items() if result is not None}
-        self.taken_up += len(found)
-        # the longest first: whoever comes last is then not waited for long
-        left = [i for i in range(len(pieces)) if i not in found]
-        if self.team.workers > 1:
-            left.sort(key=lambda i: -pieces[i].cost)
-        with closing(self.team.carried_out([pieces[i].measure for i in left])) as measured:
-            self._tell(len(found), pieces, left[:1])
-            for j, result in measured:
-                found[left[j]] = result
-                self.keep(pieces[left[j]].form, pieces[left[j]].key, result)
-                self._tell(len(found), pieces, left[j + 1 : j + 2])
-        return [found[i] for i in range(len(pieces))]
+        found = {piece.name: result for piece, result in self.stream(pieces)}
+        return [found[piece.name] for piece in pieces]
 
-    def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[int]) -> None:
+    def stream(self, pieces: Sequence[Piece]) -> Iterator[tuple[Piece, Any]]:
+        """The same as they come, and none of them held: those that are finished first."""
+        self.names += [piece.name for piece in pieces]
+        left = []
+        for piece in pieces:
+            if piece.name in self._finished:
+                self.taken_up += 1
+                yield piece, self.finished(piece.form, piece.key)
+            else:
+                left.append(piece)
+        if self.team.workers > 1:
+            # the longest first: whoever comes last is then not waited for long
+            left.sort(key=lambda piece: -piece.cost)
+        done = len(pieces) - len(left)
+        self._tell(done, pieces, left[:1])
+        with closing(self.team.carried_out([piece.measure for piece in left])) as measured:
+            for j, result in measured:
+                self.keep(left[j].form, left[j].key, result)
+                done += 1
+                # the last so many of those that were left are still to come
+                self._tell(done, pieces, left[len(left) - (len(pieces) - done) :][:1])
+                yield left[j], result
+
+    def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[Piece]) -> None:
         if self.progress:
-            self.progress(done, len(pieces), *(pieces[i].what for i in following))
+            self.progress(done, len(pieces), *(piece.what for piece in following))
 
     def runs(self) -> tuple[str, ...]:
         """Labels of the trajectories that are finished."""
@@ -220,6 +230,11 @@ def restored(path: str | Path, name: str, build: Callable[[Kept], T]) -> T:
         return build(kept)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
+
+
+def tables(path: Path) -> dict[str, Table]:
+    """The tables of a store by name."""
+    return store.read_tables(path)
 
 
 def stored_scene(path: Path) -> Scene:

@@ -34,6 +34,16 @@ def load_scene(name_or_path: str | Path) -> Scene:
         SceneError: no such scene, or a mistake in the file: says which field, what stands there and
             what is accepted.
     """
+    path, text = _read(name_or_path)
+    return parse(text, name=path.stem, where=str(path))
+
+
+def text_of(name_or_path: str | Path) -> str:
+    """The text of a scene file.  SceneError where there is none."""
+    return _read(name_or_path)[1]
+
+
+def _read(name_or_path: str | Path) -> tuple[Path, str]:
     path = Path(name_or_path)
     if path.suffix != ".toml" and path.parent == Path() and not path.is_file():
         path = folder() / f"{name_or_path}.toml"
@@ -47,7 +57,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text, as a scene in TOML is"
         raise SceneError(f"{path}: cannot be read: {reason}") from error
-    return parse(text, name=path.stem, where=str(path))
+    return path, text
 
 
 def parse(text: str, *, name: str, where: str | None = None) -> Scene:
@@ -57,6 +67,11 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{where}: not valid TOML: {error}") from error
+    return from_tables(data, name=name, where=where)
+
+
+def from_tables(data: Any, *, name: str, where: str) -> Scene:
+    """The scene that the tables of a scene file describe.  Raises SceneError."""
     for field, value in _numbers(data):
         if not math.isfinite(value):
             raise SceneError(f"{where}: {field} = {value}; a finite number is needed")

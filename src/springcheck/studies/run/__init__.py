@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 
+from springcheck.studies import team
 from springcheck.studies.study import Study, scene_option, store_options
 
 
@@ -13,6 +14,16 @@ def _options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
     )
+    parser.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="FIELD=LOW:HIGH:COUNT[:log]",
+        help="one scene over many parameters instead, as `springcheck ensemble` does",
+    )
+    parser.add_argument("--samples", type=int, metavar="N", help="with --vary FIELD=LOW:HIGH: N at random")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the samples (default 0)")
+    team.options(parser)
     parser.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
     parser.add_argument(
         "--thorough", action="store_true", help="add the experiments: order, reversal, rounding"

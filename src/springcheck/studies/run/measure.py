@@ -21,6 +21,7 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.study import Progress
 from springcheck.trajectory import Comparison, Trajectory, Verdict
@@ -36,12 +37,20 @@ LONG_PIECE = PIECE // 4
 seconds in all.  A slip between two pieces shows in the closed form of every piece after it, however short."""
 
 
-def perform(options: Namespace, progress: Progress | None) -> Report | Repeats:
+def perform(options: Namespace, progress: Progress | None) -> Report | Repeats | Ensemble:
     """What `springcheck run` does."""
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
             "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
         )
+    if not options.vary and (options.samples is not None or options.seed or options.workers > 1):
+        raise SpringcheckError("--samples, --seed and --workers go with --vary")
+    if options.vary and (options.source is not None or options.thorough or options.verdicts):
+        raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
+    if options.vary:
+        from springcheck.studies.ensemble import measure as ensemble
+
+        return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
     scene = scenefile.load_scene(options.scene)

@@ -9,14 +9,18 @@ import numpy as np
 from rich.text import Text
 
 from springcheck import checks, schemes
+from springcheck.studies.ensemble import text as ensemble
+from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text import Lines, Row, Table, plain, seconds, table
 from springcheck.trajectory import Comparison, Verdict
 
 
-def lines(found: Report | Repeats | Stored, options: Namespace | None = None) -> Lines:
+def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
     """What `springcheck run` says, what `run --from` says, and what `inspect` says of a stored run."""
+    if isinstance(found, Ensemble):
+        return ensemble.lines(found, options)
     verdicts = getattr(options, "verdicts", False)
     if isinstance(found, Repeats):
         return [_repeat(one) for one in found.repeats]

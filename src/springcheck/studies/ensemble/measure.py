@@ -1,0 +1,226 @@
+"""Ensembles: the same scene over many parameters by many methods, as few runs as the engines allow.
+
+Cells of one time grid stand side by side in one run of a method of fixed step, without acting on each other;
+an adaptive solver, which would take one step for all, runs them one by one.  Only numbers of each cell are
+kept, so neither the file nor memory holds trajectories, however many cells there are.
+"""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import engines
+from springcheck.arrays import Floats, Reals
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError
+from springcheck.physics import exact, scenefile
+from springcheck.physics.scene import Scene
+from springcheck.studies import keeper
+from springcheck.studies import team as teams
+from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.ensemble.result import CELLS, Columns, Ensemble, Tally
+from springcheck.studies.ensemble.vary import Plan, Varied, plan, together
+from springcheck.studies.extremes.running import raw
+from springcheck.studies.keeper import Piece
+from springcheck.studies.study import Progress
+from springcheck.studies.team import ALONE, Team
+
+NUMBERS = 1 << 17
+"""Numbers per array of a run: memory does not grow with the number of cells."""
+
+OUTCOMES = ("complete", "diverged", "stopped")
+
+
+def perform(options: Namespace, progress: Progress | None) -> Ensemble:
+    """What `springcheck ensemble` and `springcheck run --vary` do."""
+    scene = scenefile.load_scene(options.scene)
+    text = scenefile.text_of(options.scene)
+    cells = plan(options.vary, options.samples, options.seed, text=text)
+    return record(
+        scene,
+        cells,
+        Path(options.output or f"{scene.name}-ensemble.h5"),
+        options.method,
+        force=options.force,
+        progress=progress,
+        team=teams.of(options),
+    )
+
+
+def record(
+    scene: Scene,
+    cells: Plan,
+    path: str | Path,
+    methods: Sequence[str] = (),
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+    team: Team = ALONE,
+) -> Ensemble:
+    """Run every cell by every method and keep its numbers; chunks that are finished are taken up.
+
+    Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
+    """
+    path = Path(path)
+    labels, left = choose(scene, methods)
+    fields = tuple(axis.field for axis in cells.axes)
+    Varied(scene, cells).substitutions(cells.values(0))
+    command = keeper.command("ensemble", labels, scene.digest, repr(cells))
+    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
+        tallies = {str(label): Tally(method=str(label), smallest={}, largest={}) for label in labels}
+        pieces = [
+            Piece(
+                key=f"{label}/{chunk:06d}",
+                what=f"{label}, cells from {chunk * len(cells.values(0)[fields[0]])}",
+                measure=partial(measure, scene, cells, chunk, label),
+                form=CELLS,
+            )
+            for label in labels
+            for chunk in cells.chunks
+        ]
+        for piece, found in kept.stream(pieces):
+            name = piece.key.rpartition("/")[0]
+            tallies[name] = tallies[name].plus(found)
+        ensemble = Ensemble(
+            scene=scene,
+            fields=fields,
+            grid=cells.samples is None,
+            tallies=tuple(tallies.values()),
+            left_out=tuple(left),
+            taken_up=kept.taken_up,
+            path=path,
+        )
+        kept.commit("ensemble", ensemble.document(), scene)
+    return ensemble
+
+
+def stored(path: str | Path) -> Ensemble:
+    """The ensemble that `record` has kept.  StoreError where the file holds none."""
+    return keeper.restored(path, "ensemble", _restored)
+
+
+def _restored(kept: keeper.Kept) -> Ensemble:
+    known = kept.document
+    return Ensemble(
+        scene=kept.scene,
+        fields=tuple(known["fields"]),
+        grid=known["grid"],
+        tallies=tuple(Tally(**one) for one in known["methods"]),
+        left_out=tuple(LeftOut(**one) for one in known["left_out"]),
+        path=kept.path,
+    )
+
+
+def columns(path: Path, method: str) -> Columns:
+    """All cells of a method of a stored ensemble, in their order."""
+    beginning = f"{CELLS.beginning}{method}/"
+    found = sorted((name, table) for name, table in keeper.tables(path).items() if name.startswith(beginning))
+    chunks = [CELLS.found(table) for _, table in found]
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+
+
+def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
+    """The numbers of the cells of one chunk by one method."""
+    values = cells.values(chunk)
+    varied = Varied(scene, cells)
+    changes = varied.substitutions(values)
+    varied.check(values, changes)
+    count = len(next(iter(values.values())))
+    grid = np.column_stack([x for place, x in changes.items() if len(place) == 1] or [np.zeros(count)])
+    _, group = np.unique(grid, axis=0, return_inverse=True)
+    found: dict[str, Any] = {
+        "outcome": np.zeros(count, np.int8),
+        **{name: np.full(count, np.nan) for name in ("max_error", "energy_drift", "q0", "p0")},
+        "steps": np.zeros(count, np.int64),
+    }
+    for number in range(int(group.max()) + 1):
+        mine = np.flatnonzero(group.ravel() == number)
+        first = together(scene, changes, mine[:1])
+        size = 1 if engines.method(label).adaptive else max(1, NUMBERS // (first.frames * first.n))
+        for start in range(0, len(mine), size):
+            _run(scene, changes, mine[start : start + size], label, found)
+    return {**values, **found}
+
+
+def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: dict[str, Any]) -> None:
+    """Run these cells side by side; where the engine gives up over some, halves find which."""
+    many = together(scene, changes, chosen)
+    try:
+        q, p, said = raw(many, label)
+    except MethodError:
+        if len(chosen) == 1:
+            found["outcome"][chosen] = OUTCOMES.index("stopped")
+            return
+        q, p, said = many.q[None], many.p[None], "it takes no copies of this scene side by side"
+    if said and len(chosen) > 1:
+        half = len(chosen) // 2
+        _run(scene, changes, chosen[:half], label, found)
+        _run(scene, changes, chosen[half:], label, found)
+        return
+    copies = len(chosen)
+    states = q.reshape(len(q), copies, -1), p.reshape(len(p), copies, -1)
+    finite = np.all(np.isfinite(states[0]) & np.isfinite(states[1]), axis=2)
+    frames = np.where(finite.all(axis=0), len(q), np.argmin(finite, axis=0))
+    found["steps"][chosen] = (frames - 1) * many.every
+    found["outcome"][chosen] = np.where(frames == many.frames, 0, 2 if said else 1)
+    for name, x in zip(("q0", "p0"), states, strict=True):
+        found[name][chosen] = x[frames - 1, np.arange(copies), 0]
+    with np.errstate(all="ignore"):
+        drift = _drifts(many, q, p, copies)
+        error = _errors(scene, changes, chosen, many, q, p)
+    held = np.arange(len(q))[:, None] < frames
+    found["energy_drift"][chosen] = np.take_along_axis(
+        drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0
+    )[0]
+    found["max_error"][chosen] = np.max(np.where(held, error, 0), axis=0)
+
+
+def _of_copies(values: Reals, copies: int) -> Reals:
+    """Sums over what belongs to each copy, (f, copies s) -> (f, copies)."""
+    return np.asarray(np.sum(values.reshape(len(values), copies, -1), axis=2))
+
+
+def _drifts(many: Scene, q: Floats, p: Floats, copies: int) -> Floats:
+    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies)."""
+    energy = _of_copies(0.5 * (p * p) / many.m, copies)
+    for term in many.terms:
+        if term.is_potential:
+            energy = energy + _of_copies(term.potential(term.elongation(q), *term.parameters), copies)
+    start = np.abs(energy[0])
+    return np.asarray((energy - energy[0]) / np.where(start > 0, start, 1.0), np.float64)
+
+
+def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
+    """Distance of each copy from its exact solution in the energy norm (f, copies); NaN where not known."""
+    copies, frames = len(chosen), len(q)
+    steps = np.arange(frames) * many.every
+    system = many.system
+    if not (system.is_separate and system.is_linear) or system.free_groups:
+        error = np.full((frames, copies), np.nan)
+        for j in range(copies):
+            one = together(scene, changes, chosen[j : j + 1])
+            if exact.has_true_motion(one):
+                true_q, true_p = exact.true_motion(one, steps, one.step)
+                here = slice(j * one.n, (j + 1) * one.n)
+                error[:, j] = one.system.norm(q[:, here] - true_q, p[:, here] - true_p)
+        return error
+    true_q, true_p = exact.true_motion(many, steps, many.step)
+    dq, dp = q - true_q, p - true_p
+    m = many.m.astype(np.longdouble)
+    size, unit = (
+        _of_copies(0.5 * (dp * dp) / m, copies),
+        _of_copies((0.5 * (many.p * many.p) / m)[None], copies),
+    )
+    for term in many.terms:
+        du = term.stretch(dq)
+        size = size + 0.5 * _of_copies(term.rigidity * du * du, copies)
+        if term.is_potential:
+            start = term.potential(term.elongation(many.q.astype(np.longdouble)[None]), *term.parameters)
+            unit = unit + np.abs(_of_copies(start, copies))
+    return np.asarray(np.where(size == 0, 0, np.sqrt(size) / np.sqrt(unit)), np.float64)

@@ -1,0 +1,113 @@
+"""What an ensemble has found: columns of numbers, one row a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from springcheck.physics.scene import Scene
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.keeper import Table, plain
+from springcheck.studies.tables import Form
+
+QUANTITIES = ("max_error", "energy_drift", "steps")
+"""Numbers of each cell that are summed up and drawn: largest distance from the exact solution relative to
+the initial energy norm (NaN where it is not known), (H - H0)/|H0| where it is largest, and steps with finite
+numbers."""
+
+Columns = Mapping[str, np.ndarray]
+
+
+class Chunk(Form[Columns]):
+    """Columns as they are: the fields that were varied, and what was found."""
+
+    def _split(self, found: Columns) -> tuple[dict[str, Any], dict[str, Any]]:
+        return dict(found), {}
+
+    def found(self, table: Table) -> Columns:
+        """The columns of such a table."""
+        return {name: np.asarray(column) for name, column in table.columns.items()}
+
+
+CELLS = Chunk(
+    kind=dict,
+    beginning="ensemble/",
+    named="",
+    about="a row a cell: the fields that were varied; outcome 0: complete, 1: diverged, 2: stopped; "
+    "q0, p0: the state at the end of the first particle",
+)
+"""A table for each method and chunk of cells, ``ensemble/<label>/<chunk>``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tally:
+    """The cells of one method, summed up."""
+
+    method: str
+    cells: int = 0
+    complete: int = 0
+    smallest: Mapping[str, float]
+    largest: Mapping[str, float]
+    """Of each of the `QUANTITIES` over the cells that are complete."""
+
+    def plus(self, found: Columns) -> Tally:
+        """With the cells of a chunk."""
+        good = found["outcome"] == 0
+        low, high = dict(self.smallest), dict(self.largest)
+        for name in QUANTITIES:
+            values = found[name][good & np.isfinite(found[name])]
+            if len(values):
+                low[name] = float(min(low.get(name, np.inf), np.min(values)))
+                high[name] = float(max(high.get(name, -np.inf), np.max(values)))
+        return Tally(
+            method=self.method,
+            cells=self.cells + len(good),
+            complete=self.complete + int(np.count_nonzero(good)),
+            smallest=low,
+            largest=high,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ensemble:
+    """One scene over many parameters."""
+
+    scene: Scene
+    fields: tuple[str, ...]
+    """What was varied."""
+    grid: bool
+    tallies: tuple[Tally, ...]
+    left_out: tuple[LeftOut, ...]
+    taken_up: int = 0
+    """Chunks that an interrupted call had finished."""
+    path: Path | None = None
+
+    @property
+    def status(self) -> Literal[0, 2]:
+        """Exit status: 2 where no cell is complete."""
+        return 0 if any(tally.complete for tally in self.tallies) else 2
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON; the cells are in the tables."""
+        found: dict[str, Any] = plain(
+            {
+                "scene": self.scene.name,
+                "fields": self.fields,
+                "grid": self.grid,
+                "methods": self.tallies,
+                "left_out": self.left_out,
+            }
+        )
+        return found
+
+
+def summed(method: str, chunks: Sequence[Columns]) -> Tally:
+    """The tally of all chunks of a method."""
+    tally = Tally(method=method, smallest={}, largest={})
+    for chunk in chunks:
+        tally = tally.plus(chunk)
+    return tally

@@ -1,0 +1,35 @@
+"""The report of an ensemble as text."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from springcheck.studies.ensemble.result import Ensemble, Tally
+from springcheck.studies.text import left_out, taken_up
+from springcheck.text import Lines, plain, table
+
+
+def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
+    """One line a method."""
+    cells = max((tally.cells for tally in found.tallies), default=0)
+    how = "a grid" if found.grid else "random samples"
+    rows = [
+        (x.method, str(x.cells), str(x.complete), *_span(x, "max_error"), *_span(x, "energy_drift"))
+        for x in found.tallies
+    ]
+    titles = ("method", "cells", "complete", "error from", "to", "energy from", "to")
+    out: Lines = [
+        plain(f"{found.scene.title}: {cells} cells, {how} over {', '.join(found.fields)}", "bold"),
+        *taken_up(found.taken_up, "chunks of cells"),
+        plain(),
+        table(titles, rows),
+        plain("error: largest distance from the exact solution; energy: (H - H0)/|H0| where largest", "dim"),
+        *left_out(found.left_out),
+    ]
+    return [*out, plain(f"Stored in {found.path}")] if found.path else out
+
+
+def _span(tally: Tally, name: str) -> tuple[str, str]:
+    if name not in tally.smallest:
+        return "-", "-"
+    return f"{tally.smallest[name]:.1e}", f"{tally.largest[name]:.1e}"

@@ -1,0 +1,271 @@
+"""What is varied: fields of a scene file, over a grid or drawn at random, and the scene of each cell.
+
+A field is varied in the file itself and the file is read again, so that every field of every term can be
+varied; what that changes in the scene is then put together for all cells at once.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+
+CHUNK = 10_000
+"""Cells that are kept together, and drawn from one state of the random numbers."""
+
+CHECKED = 8
+"""Cells of a chunk that are read from the file as a whole, to see that they are what was put together."""
+
+MOST_CELLS = 10**8
+
+FORM = "FIELD=LOW:HIGH:COUNT[:log], FIELD=A,B,C, or with --samples FIELD=LOW:HIGH[:log]"
+
+Place = tuple[Any, ...]
+"""Where in a scene a number stands: ("m", particle), ("terms", term, field, row), or the name of a field."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """One field that is varied."""
+
+    field: str
+    values: tuple[float, ...] = ()
+    """Of a grid."""
+    low: float = math.nan
+    high: float = math.nan
+    log: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """All cells: the products of the axes of a grid, the last varying fastest, or random samples."""
+
+    axes: tuple[Axis, ...]
+    samples: int | None
+    seed: int
+    text: str = ""
+    """The scene file in whose fields the axes are named; left out: what the scene writes itself."""
+
+    @property
+    def cells(self) -> int:
+        """How many there are."""
+        return self.samples if self.samples is not None else math.prod(len(x.values) for x in self.axes)
+
+    @property
+    def chunks(self) -> range:
+        """Their pieces."""
+        return range(-(-self.cells // CHUNK))
+
+    def values(self, chunk: int) -> dict[str, Floats]:
+        """The values of each field in the cells of a chunk (c,)."""
+        cells = np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
+        if self.samples is None:
+            index = np.unravel_index(cells, [len(axis.values) for axis in self.axes])
+            return {x.field: np.array(x.values)[j] for x, j in zip(self.axes, index, strict=True)}
+        found = {}
+        for j, axis in enumerate(self.axes):
+            part = np.random.default_rng([self.seed, j, chunk]).random(CHUNK)[: len(cells)]
+            if axis.log:
+                found[axis.field] = axis.low * (axis.high / axis.low) ** part
+            else:
+                found[axis.field] = axis.low + (axis.high - axis.low) * part
+        return found
+
+
+def plan(given: Sequence[str], samples: int | None = None, seed: int = 0, *, text: str = "") -> Plan:
+    """The plan of `--vary` options.  SpringcheckError where one makes no sense."""
+    if not given:
+        raise SpringcheckError(f"an ensemble needs --vary {FORM}")
+    axes = tuple(_axis(text, random=samples is not None) for text in given)
+    names = [axis.field for axis in axes]
+    if len(set(names)) < len(names):
+        raise SpringcheckError(f"--vary: {max(names, key=names.count)} is given twice")
+    found = Plan(axes=axes, samples=samples, seed=seed, text=text)
+    if not 0 < found.cells <= MOST_CELLS:
+        raise SpringcheckError(f"{found.cells} cells: 1 to {MOST_CELLS} can be run")
+    return found
+
+
+def _axis(text: str, *, random: bool) -> Axis:
+    field, equals, rest = text.partition("=")
+    parts = rest.split(":")
+    log = parts[-1] == "log"
+    try:
+        if not (field and equals):
+            raise ValueError
+        if random:
+            low, high = map(float, parts[: len(parts) - log])
+            _finite(low, high)
+            if log and not (low > 0 and high > 0):
+                raise ValueError
+            return Axis(field=field, low=low, high=high, log=log)
+        if len(parts) == 1:
+            values = tuple(float(x) for x in rest.split(","))
+        else:
+            first, last, count = parts[: len(parts) - log]
+            spaced = np.geomspace if log else np.linspace
+            with np.errstate(all="raise"):
+                values = tuple(spaced(float(first), float(last), int(count)).tolist())
+        _finite(*values)
+        if not values:
+            raise ValueError
+    except (ValueError, FloatingPointError):
+        raise SpringcheckError(f"--vary {text}: {FORM} is needed") from None
+    return Axis(field=field, values=values)
+
+
+def _finite(*values: float) -> None:
+    if not all(map(math.isfinite, values)):
+        raise ValueError
+
+
+class Varied:
+    """A scene of which fields are varied."""
+
+    def __init__(self, scene: Scene, plan: Plan) -> None:
+        self.scene = scene
+        self._data = tomllib.loads(plan.text or scene.to_toml())
+        for axis in plan.axes:
+            self._at(axis.field)
+
+    def substitutions(self, values: Mapping[str, Floats]) -> dict[Place, Floats]:
+        """The numbers of the scene that change, with their values in every cell (c,).
+
+        SpringcheckError where a value makes no scene, or two fields change the same number.
+        """
+        found: dict[Place, Floats] = {}
+        for field, column in values.items():
+            rows: dict[Place, list[float]] = {}
+            different, where = np.unique(column, return_inverse=True)
+            effects = [self._effect(field, float(value)) for value in different]
+            for place in {place for effect in effects for place in effect}:
+                rows[place] = [effect.get(place, _number(self.scene, place)) for effect in effects]
+            for place, numbers in rows.items():
+                if place in found:
+                    raise SpringcheckError(f"--vary {field}: {place[0]} is changed by another --vary, too")
+                found[place] = np.array(numbers)[where]
+        return found
+
+    def _at(self, field: str) -> tuple[Any, Any]:
+        """The table and the key of a field."""
+        found: Any = self._data
+        *parts, last = re.findall(r"[^.\[\]]+", field)
+        try:
+            for part in parts:
+                found = found[int(part)] if isinstance(found, list) else found[part]
+            key = int(last) if isinstance(found, list) else last
+            held = found.get(key) if isinstance(found, dict) else found[key]
+            if isinstance(held, dict | list | str) or not isinstance(found, dict | list):
+                raise KeyError
+        except (KeyError, IndexError, ValueError, TypeError):
+            raise SpringcheckError(
+                f"--vary {field}: scene {self.scene.name} has no such number; "
+                "fields are named as in its file, such as spring.0.stiffness or time.step"
+            ) from None
+        return found, key
+
+    def _effect(self, field: str, value: float) -> dict[Place, float]:
+        return dict(_differences(self.scene, self.whole({field: value}), field))
+
+    def whole(self, values: Mapping[str, float]) -> Scene:
+        """The scene with these values in its file.  SpringcheckError where they make no sense."""
+        before = []
+        try:
+            for field, value in values.items():
+                table, key = self._at(field)
+                held = table.get(key) if isinstance(table, dict) else table[key]
+                before.append((table, key, held))
+                is_count = isinstance(held, int) and not isinstance(held, bool) and value == int(value)
+                table[key] = int(value) if is_count else value
+            where = "--vary " + ", ".join(f"{field}={value:g}" for field, value in values.items())
+            return scenefile.from_tables(self._data, name=self.scene.name, where=where)
+        finally:
+            for table, key, held in reversed(before):
+                if held is None:
+                    del table[key]
+                else:
+                    table[key] = held
+
+    def check(self, values: Mapping[str, Floats], changes: Mapping[Place, Floats]) -> None:
+        """SpringcheckError where fields act on one another: the cells would not be what the file says.
+
+        Looked at are the first and the last cell and some between, each read from the file as a whole.
+        """
+        count = len(next(iter(values.values())))
+        for j in sorted({*np.linspace(0, count - 1, CHECKED).astype(int).tolist()}):
+            wanted = self.whole({field: float(column[j]) for field, column in values.items()})
+            made = together(self.scene, changes, np.array([j]))
+            if list(_differences(wanted, made, "")):
+                names = " and ".join(values)
+                raise SpringcheckError(f"--vary: {names} act on one another, which no ensemble can")
+
+
+def _differences(one: Scene, other: Scene, field: str) -> Iterator[tuple[Place, float]]:
+    alike = one.n == other.n and [(t.key, len(t)) for t in one.terms] == [
+        (t.key, len(t)) for t in other.terms
+    ]
+    if not alike or any(
+        not np.array_equal(a, b)
+        for mine, its in zip(one.terms, other.terms, strict=True)
+        for a, b in zip(mine.particles, its.particles, strict=True)
+    ):
+        raise SpringcheckError(f"--vary {field}: it changes what acts on what, which no ensemble can")
+    for name in ("m", "q", "p"):
+        for i in np.flatnonzero(getattr(one, name) != getattr(other, name)):
+            yield (name, int(i)), float(getattr(other, name)[i])
+    for t, (mine, its) in enumerate(zip(one.terms, other.terms, strict=True)):
+        for entry in fields(mine):  # type: ignore[arg-type]
+            a, b = getattr(mine, entry.name), getattr(its, entry.name)
+            if isinstance(a, np.ndarray):
+                for row in np.flatnonzero(a != b):
+                    yield ("terms", t, entry.name, int(row)), float(b[row])
+    for name in ("step", "steps", "every", "tolerance"):
+        if getattr(one, name) != getattr(other, name):
+            yield (name,), getattr(other, name)
+
+
+def _number(scene: Scene, place: Place) -> float:
+    if place[0] == "terms":
+        return float(getattr(scene.terms[place[1]], place[2])[place[3]])
+    found = getattr(scene, place[0])
+    return float(found[place[1]]) if len(place) > 1 else found
+
+
+def together(scene: Scene, changes: Mapping[Place, Floats], chosen: np.ndarray) -> Scene:
+    """The scenes of these cells side by side as one, which do not act on each other.
+
+    The cells must be of one time grid.
+    """
+    copies = len(chosen)
+    many = scene.system.tiled(copies)
+    arrays = {name: np.array(getattr(many, name)).reshape(copies, -1) for name in ("m", "q", "p")}
+    columns: dict[tuple[int, str], np.ndarray] = {}
+    grid: dict[str, Any] = {}
+    for place, values in changes.items():
+        if place[0] == "terms":
+            _, t, name, row = place
+            whole = columns.setdefault((t, name), np.array(getattr(many.terms[t], name)).reshape(copies, -1))
+            whole[:, row] = values[chosen]
+        elif len(place) == 2:
+            arrays[place[0]][:, place[1]] = values[chosen]
+        else:
+            grid[place[0]] = type(getattr(scene, place[0]))(values[chosen[0]])
+    terms = tuple(
+        _replaced(term, {name: x.ravel() for (j, name), x in columns.items() if j == t})
+        for t, term in enumerate(many.terms)
+    )
+    return scene.derived(terms=terms, **{name: x.ravel() for name, x in arrays.items()}, **grid)
+
+
+def _replaced(term: Any, values: Mapping[str, np.ndarray]) -> Any:
+    return replace(term, **values) if values else term

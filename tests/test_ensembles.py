@@ -1,0 +1,161 @@
+"""An ensemble's cells are the runs that one would make one by one: what is varied stands in the file, and the
+numbers of a cell are those of `run` on that file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import cli, simulate, store
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.studies.ensemble import measure, vary
+from springcheck.studies.run import measure as main_job
+from springcheck.studies.team import Processes
+
+BOTH, SOLVED = ["own:*", "ase:velocity-verlet"], ["own:euler", "sundials:bdf"]
+
+
+def text_of(name: str) -> str:
+    return (scenefile.folder() / f"{name}.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "methods"),
+    [
+        (
+            "spring-uneven",
+            ["spring.0.stiffness=0.5:8:4:log", "time.step=0.05,0.1"],
+            ["own:*", "ase:velocity-verlet"],
+        ),
+        (
+            "spring-uneven",
+            ["particle.0.mass=1:5:3", "particle.0.momentum=-1:1:3"],
+            ["own:euler", "sundials:bdf"],
+        ),
+        ("chain", ["particle.0.mass=1:5:3"], ["own:semi-implicit-euler"]),
+        ("anharmonic", ["particle.0.position=0.1:0.9:3"], ["own:semi-implicit-euler"]),
+        ("rlc-circuit", ["capacitor.0.capacitance=1e-9:1e-8:3:log"], ["own:euler"]),
+    ],
+    ids=lambda x: str(x) if isinstance(x, str) else "",
+)
+def test_a_cell_has_the_numbers_of_a_run_of_its_own(
+    name: str, given: list[str], methods: list[str], tmp_path: Path
+) -> None:
+    scene = scenefile.load_scene(name)
+    cells = vary.plan(given, text=text_of(name))
+    found = measure.record(scene, cells, tmp_path / "e.h5", methods)
+    varied = vary.Varied(scene, cells)
+    assert store.check(tmp_path / "e.h5") == []
+    assert found.tallies
+    for tally in found.tallies:
+        columns = measure.columns(tmp_path / "e.h5", tally.method)
+        assert tally.cells == cells.cells == len(columns["steps"])
+        for j in range(cells.cells):
+            one = varied.whole({axis.field: float(columns[axis.field][j]) for axis in cells.axes})
+            run = simulate.run(one, tally.method)
+            tell = main_job._Tally(one)
+            tell.add(run)
+            assert columns["steps"][j] == run.outcome.step
+            assert measure.OUTCOMES[columns["outcome"][j]] == run.outcome.status
+            assert columns["q0"][j] == pytest.approx(
+                run.q[-1, 0], rel=1e-13, abs=1e-14 * np.max(np.abs(run.q))
+            )
+            # beside their rounding: sums over many cells are taken in another order
+            assert columns["max_error"][j] == pytest.approx(tell.error, rel=1e-6, abs=1e-13)
+            assert columns["energy_drift"][j] == pytest.approx(tell.drift, rel=1e-6, abs=1e-13)
+
+
+def test_own_cells_are_equal_bit_for_bit_to_runs_of_their_own(tmp_path: Path) -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    cells = vary.plan(["spring.0.stiffness=0.5:8:7:log"])
+    measure.record(scene, cells, tmp_path / "e.h5", ["own:*"])
+    varied = vary.Varied(scene, cells)
+    for method in ("own:euler", "own:semi-implicit-euler", "own:implicit-euler"):
+        columns = measure.columns(tmp_path / "e.h5", method)
+        for k, q in zip(columns["spring.0.stiffness"], columns["q0"], strict=True):
+            assert simulate.run(varied.whole({"spring.0.stiffness": float(k)}), method).q[-1, 0] == q
+
+
+def test_a_cell_that_explodes_leaves_the_others_alone(tmp_path: Path) -> None:
+    text = text_of("spring-uneven").replace("steps = 200", "steps = 2000")
+    scene = scenefile.parse(text, name="long")
+    cells = vary.plan(["spring.0.stiffness=0.01,1e6,1"])
+    measure.record(scene, cells, tmp_path / "e.h5", ["own:semi-implicit-euler"])
+    columns = measure.columns(tmp_path / "e.h5", "own:semi-implicit-euler")
+    assert columns["outcome"].tolist() == [0, 1, 0]
+    assert columns["steps"][1] < 2000
+    assert np.all(columns["max_error"][[0, 2]] < 1)
+
+
+def test_samples_come_from_their_seed_and_are_spread_as_asked(tmp_path: Path) -> None:
+    given = ["spring.0.stiffness=1:100:log", "particle.0.mass=1:3"]
+    one, again, other = (vary.plan(given, 30_000, seed) for seed in (5, 5, 6))
+    assert len(one.chunks) == 3
+    for chunk in one.chunks:
+        for field, values in one.values(chunk).items():
+            assert np.array_equal(values, again.values(chunk)[field])
+            assert not np.array_equal(values, other.values(chunk)[field])
+    k = np.concatenate([one.values(chunk)["spring.0.stiffness"] for chunk in one.chunks])
+    # the logarithm is even: its mean is known to a standard error of log(100)/sqrt(12 * 30000)
+    assert abs(np.mean(np.log(k)) - np.log(100) / 2) < 4 * np.log(100) / np.sqrt(12 * 30_000)
+    assert len(np.unique(k)) == 30_000
+    scene = scenefile.load_scene("spring-uneven")
+    few = vary.plan(given, 50, 5)
+    measure.record(scene, few, tmp_path / "one.h5", ["own:euler"])
+    measure.record(scene, few, tmp_path / "two.h5", ["own:euler"], team=Processes(2))
+    first, second = (measure.columns(tmp_path / f"{x}.h5", "own:euler") for x in ("one", "two"))
+    assert all(np.array_equal(first[name], second[name], equal_nan=True) for name in first)
+    assert np.array_equal(first["spring.0.stiffness"], k[:50])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([], "needs --vary"),
+        (["spring.0.stiffness"], "is needed"),
+        (["spring.0.stiffness=1:2"], "is needed"),
+        (["spring.0.stiffness=1:2:3:lag"], "is needed"),
+        (["spring.0.stiffness=-1:2:3:log"], "is needed"),
+        (["spring.0.stiffness=nan,1"], "is needed"),
+        (["spring.0.stiffness=1,2", "spring.0.stiffness=1,2"], "given twice"),
+        (["spring.0.stifness=1,2"], "stifness"),
+        (["spring.7.stiffness=1,2"], "has no such number"),
+        (["title=1,2"], "has no such number"),
+        (["particle.0.mass=-1,1"], "mass"),
+        (["spring.0.stiffness=1:2:0"], "is needed"),
+        (["spring.0.stiffness=1:2:100000", "particle.0.mass=1:2:100000"], "can be run"),
+    ],
+)
+def test_what_cannot_be_varied_is_said_in_one_line(given: list[str], words: str, tmp_path: Path) -> None:
+    def record() -> None:
+        scene = scenefile.load_scene("spring-uneven")
+        measure.record(scene, vary.plan(given), tmp_path / "e.h5", ["own:euler"])
+
+    with pytest.raises(SpringcheckError, match=words) as refused:
+        record()
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "e.h5").exists()
+
+
+def test_the_command_line_runs_inspects_and_draws_an_ensemble(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    vary_two = ["--vary", "spring.0.stiffness=0.5:8:6:log", "--vary", "time.step=0.01:0.2:5"]
+    arguments = ["run", "spring-uneven", *vary_two, "--method", "own:*", "--workers", "2"]
+    assert cli.main(arguments) == 0
+    assert "30 cells, a grid over spring.0.stiffness, time.step" in capsys.readouterr().out
+    path = "spring-uneven-ensemble.h5"
+    assert cli.main(["inspect", path, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["studies"]["ensemble"]["methods"][0]["cells"] == 30
+    assert cli.main(["plot", path, "-o", "f"]) == 0
+    assert {one.name for one in Path("f").iterdir()} == {
+        f"ensemble-{name}.{end}" for name in ("max_error", "energy_drift") for end in ("png", "svg")
+    }
+    assert cli.main(["run", "spring-uneven", "--workers", "2"]) == 2
+    assert "go with --vary" in capsys.readouterr().err
