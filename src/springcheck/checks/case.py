@@ -73,7 +73,7 @@ class Case:
         if self.scheme.implicit and not self.straight:
             stiff = self._slope
         elif self.scheme.implicit:
-            stiff = (scene.system.hessian if self.joined else scene.system.hessian_diagonal)(scene.q)
+            stiff = scene.system.curvatures(scene.q)
         return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
 
     def _slope(self, q: Reals) -> tuple[Extended, bool]:

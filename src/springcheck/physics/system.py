@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 MOST_JOINED = 256
 """Joined particles up to which normal modes are computed: their cost in extended precision grows with the
 cube, 5 s here.  The modes of a uniform chain are known at any length."""
+
+
+MOST_DENSE = 1024
+"""Joined particles up to which second derivatives are kept as n x n numbers."""
 
 
 class System:
@@ -223,6 +227,31 @@ class System:
         for term in self.terms:
             term.scatter(np.broadcast_to(term.curvature(wide), (len(term),)), out)
         return out
+
+    def sparse_hessian(self, q: Reals) -> Any:
+        """The `hessian` by its elements that are not 0, a scipy.sparse.csc_array in double precision."""
+        from scipy.sparse import csc_array
+
+        rows, columns, values = [], [], []
+        for term in self.terms:
+            k = np.broadcast_to(np.asarray(term.curvature(q), np.float64), (len(term),))
+            for i, one in enumerate(term.particles):
+                for j, other in enumerate(term.particles):
+                    rows.append(one)
+                    columns.append(other)
+                    values.append(k if i == j else -k)
+        where = np.concatenate(rows), np.concatenate(columns)
+        return csc_array((np.concatenate(values), where), shape=(self.n, self.n))
+
+    def curvatures(self, q: Reals) -> Any:
+        """Second derivatives in the cheapest form that holds them: (n,) of single particles, else (n, n).
+
+        That of more than `MOST_DENSE` particles is sparse where no term pushes two particles apart.
+        """
+        if self.is_separate:
+            return self.hessian_diagonal(q)
+        holds = all(np.all(term.curvature(np.asarray(q)) >= 0) for term in self.terms)
+        return self.sparse_hessian(q) if self.n > MOST_DENSE and holds else self.hessian(q)
 
     def gershgorin(self, q: Reals) -> Reals:
         """Bound on the sum of |elements| in each row of the Hessian at q (..., n) -> (..., n) [M/T2]."""

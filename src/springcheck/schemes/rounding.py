@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from springcheck.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
-from springcheck.schemes.stepping import acting, weighted_sum
+from springcheck.schemes.stepping import acting, sparse_solver, weighted_sum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,7 +24,7 @@ class Met:
     """
 
     magnitude: Force
-    stiffness: Reals | None = None
+    stiffness: Any = None
     joined: bool = False
     q: Reals | None = None
 
@@ -36,7 +37,7 @@ def magnitude_step(
     h: float,
     m: Reals,
     magnitude: Force,
-    stiffness: Reals | None = None,
+    stiffness: Any = None,
     rate: Reals | None = None,
     parts: tuple[Force, Force] | None = None,
     met: Sequence[Met] = (),
@@ -104,7 +105,13 @@ def _implicit_stage(here: Met, q: Reals, p: Reals, x: Reals, m: Reals, slowed: R
         raise ValueError("an implicit stage needs the stiffness of the scene")
     none = np.zeros_like(p)
     factor = x * x / (m * slowed)
-    solve = _Joined(here.stiffness, factor) if here.joined else _Separate(here.stiffness, factor)
+    solve: _Separate | _Joined | _Sparse
+    if not here.joined:
+        solve = _Separate(here.stiffness, factor)
+    elif isinstance(here.stiffness, np.ndarray):
+        solve = _Joined(here.stiffness, factor)
+    else:
+        solve = _Sparse(here.stiffness, factor)
     right = q + x * p / (m * slowed)
     if here.q is None:
         right = right + factor * here.magnitude(np.zeros_like(q), none)
@@ -161,6 +168,32 @@ class _Joined:
 
     def turned(self, x: Reals, m: Reals) -> Reals:
         return np.asarray(m * _product(self._inverse, x / m))
+
+
+class _Sparse:
+    """The same for a sparse K whose elements off the diagonal are none of them > 0.
+
+    A is then an M-matrix, and its inverse has no element < 0 (Berman & Plemmons, Nonnegative Matrices in the
+    Mathematical Sciences, chapter 6), so that |A^-1| x is A^-1 x; `kicked` is an upper bound.
+    """
+
+    def __init__(self, stiffness: Any, factor: Reals) -> None:
+        self._factor = factor
+        self._size = abs(stiffness)
+        self._solve = sparse_solver(stiffness, factor)
+
+    def inverse(self, x: Reals) -> Reals:
+        # 0 up to rounding may come out below 0
+        return np.maximum(self._solve(x), 0)
+
+    def kicked(self, x: Reals) -> Reals:
+        inner = np.asarray(self.inverse(x), np.float64)
+        product = (self._size @ inner.reshape(-1, inner.shape[-1]).T).T.reshape(x.shape)
+        # factor K A^-1 is 1 - A^-1 as well: the one bound is good for small steps, the other for large ones
+        return np.asarray(np.minimum(self._factor * product, x + inner))
+
+    def turned(self, x: Reals, m: Reals) -> Reals:
+        return np.asarray(m * self.inverse(x / m))
 
 
 def _product(matrix: Reals, x: Reals) -> Reals:

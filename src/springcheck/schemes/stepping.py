@@ -99,6 +99,22 @@ def acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:
     return parts[kind == "fast"]
 
 
+def sparse_solver(stiffness: Any, factor: Reals) -> Callable[[Reals], Reals]:
+    """x (..., n) -> (1 + factor K)**-1 x in double precision, for K a sparse array (n, n)."""
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import splu
+
+    n = stiffness.shape[0]
+    scaled = diags_array(np.broadcast_to(np.asarray(factor, np.float64), (n,))) @ stiffness
+    factors = splu((diags_array(np.ones(n)) + scaled).tocsc())
+
+    def solve(x: Reals) -> Reals:
+        right = np.asarray(x, np.float64).reshape(-1, n)
+        return np.asarray(factors.solve(np.ascontiguousarray(right.T)).T.reshape(x.shape))
+
+    return solve
+
+
 @lru_cache(maxsize=2)
 def _inverse(matrix: bytes, n: int) -> Floats:
     """The inverse of a matrix (n, n), found once for all steps of a run."""
@@ -140,6 +156,9 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
     if not joined:
         return np.asarray(residual / (1 + np.asarray(stiffness, residual.dtype) * factor))
     # it only steers: what counts is the residual
+    if not isinstance(stiffness, np.ndarray):
+        solve = sparse_solver(stiffness, factor)
+        return np.asarray(solve(residual))
     matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[:, None], np.float64)
     right = residual.astype(np.float64)
     if matrix.ndim == 2:
