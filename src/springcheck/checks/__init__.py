@@ -35,6 +35,7 @@ __all__ = [
     "ALL",
     "CHECKS",
     "CONTRACTED",
+    "TELLING",
     "THOROUGH",
     "Bench",
     "Case",
@@ -52,6 +53,7 @@ __all__ = [
     "judge_thoroughly",
     "line",
     "momentum",
+    "not_judged",
     "shadow_energy",
     "start",
     "step_defect",
@@ -94,6 +96,16 @@ THOROUGH: tuple[Experiment, ...] = (
 )
 
 ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
+
+
+TELLING = frozenset(one.name for one in ALL if one.family in ("motion", "map", "law") and one is not momentum)
+"""Checks that tell the scheme that a method claims from another one."""
+
+
+def not_judged(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
+    """Methods of which there are verdicts, but none by a check that tells one scheme from another."""
+    told = {v.method for v in verdicts if v.passed is not None and v.check in TELLING}
+    return tuple(dict.fromkeys(v.method for v in verdicts if v.method not in told))
 
 
 def judge_thoroughly(

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
+from springcheck import checks
 from springcheck.compare import Same
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
@@ -51,11 +52,15 @@ class Report:
 
     @property
     def status(self) -> Literal[0, 1, 2]:
-        """Exit status: 0 all passed, 1 some verdict failed, 2 nothing was measured."""
-        judged = [verdict.passed for verdict in self.verdicts if verdict.passed is not None]
-        if not judged:
-            return 2
-        return 0 if all(judged) else 1
+        """Exit status: 0 all passed, 1 some verdict failed, 2 nothing measured, or a method not judged."""
+        if any(verdict.passed is False for verdict in self.verdicts):
+            return 1
+        return 2 if self.not_judged or not self.verdicts else 0
+
+    @property
+    def not_judged(self) -> tuple[str, ...]:
+        """Methods of whose scheme nothing that applied could tell: passing would prove nothing."""
+        return checks.not_judged(self.verdicts)
 
     def document(self) -> dict[str, Any]:
         """The report as plain data for JSON."""
@@ -67,6 +72,7 @@ class Report:
                 "judged_frames": self.judged_frames,
                 "left_out": self.left_out,
                 "verdicts": self.verdicts,
+                "not_judged": self.not_judged,
                 "comparison": self.comparison,
                 "same_motion": self.same,
             }

@@ -29,7 +29,7 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
     out: Lines = []
     if found.verdicts:
         out += [plain(), plain("Largest value of each check, as a fraction of its bound:")]
-        out += [*matrices(found.verdicts), *failures(found.verdicts)]
+        out += [*matrices(found.verdicts), *failures(found.verdicts), *unjudged(found.verdicts)]
         if verdicts:
             out.append(verdicts_table(found.verdicts))
     if found.comparison is not None:
@@ -50,6 +50,7 @@ def _report(report: Report) -> Lines:
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
     out += matrices(report.verdicts)
     out += failures(report.verdicts)
+    out += unjudged(report.verdicts)
     out += left_out(report.left_out)
     if report.judged_frames < report.scene.frames:
         share = f"{report.judged_frames} of {report.scene.frames} frames"
@@ -164,6 +165,19 @@ def failures(verdicts: Iterable[Verdict]) -> Lines:
     return out
 
 
+def unjudged(verdicts: Sequence[Verdict]) -> Lines:
+    """Every method of whose scheme no check could tell, and why the checks could not."""
+    out: Lines = []
+    for method in checks.not_judged(verdicts):
+        why = dict.fromkeys(
+            v.why for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING
+        )
+        out.append(
+            plain(f"not judged: {method}: nothing that applied could tell ({'; '.join(why)})", "bold yellow")
+        )
+    return out
+
+
 def verdict_line(v: Verdict) -> str:
     """Value, bound, ratio and why."""
     if v.passed is None:
@@ -203,7 +217,7 @@ def _summary(report: Report) -> Text:
     return plain(
         f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}\n"
         f"Stored in {report.path}",
-        "bold red" if failed else "bold green",
+        "bold red" if failed else "bold yellow" if report.not_judged else "bold green",
     )
 
 
