@@ -111,13 +111,15 @@ class Case:
         q: Extended,
         p: Extended,
         *,
+        near: Extended | None = None,
         forces: Callable[[Iterable[Term]], Force] | None = None,
         met: list[Reals] | None = None,
         slope: Slope | None = None,
     ) -> tuple[Extended, Extended]:
         """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
 
-        `slope` stands for the scene's own where the states are not positions.
+        `slope` stands for the scene's own where the states are not positions.  `near` is where an engine
+        came to: of several solutions of an implicit step, the one there is the scheme's.
         """
         scene = self.judged
         forces = forces or scene.system.force_of
@@ -132,6 +134,7 @@ class Case:
                 force=forces(scene.terms),
                 parts=(forces(scene.system.slow), forces(scene.system.fast)),
                 met=met,
+                near=near,
                 **law,
             )
         return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)

@@ -101,7 +101,8 @@ def _told(case: Case) -> NDArray[np.bool_]:
             near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
                 case.roundings * ahead.of_p <= BENT * reach_p
             )
-            told &= np.all(near, axis=1)
+            # with several solutions to a step, an engine may have found another one
+            told &= np.all(near, axis=1) & (ahead.turns < 1)
     return np.asarray(told)
 
 

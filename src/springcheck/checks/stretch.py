@@ -44,6 +44,8 @@ class Stretch:
     reach_q: Extended
     reach_p: Extended
     """The largest |q| and |p| on the way (f, n)."""
+    turns: Extended
+    """The largest h**2 |K|/m at a force on the way (f,): below 1 an implicit step has one solution."""
     last_q: Extended
     last_p: Extended
     """The allowance of the last step alone (f, n)."""
@@ -52,11 +54,12 @@ class Stretch:
 def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     """So many steps from states (f, n), with what their roundings may become."""
     if steps == 1:
-        end, bound = _one(case, q, p)
+        end, bound = _one(case, q, p, near=case.trajectory.q[1:].astype(np.longdouble))
         reach = np.maximum(np.abs(q), np.abs(end[0])), np.maximum(np.abs(p), np.abs(end[1]))
         q, p, of_q, of_p = *end, *bound
         return Stretch(
-            q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach[0], reach_p=reach[1], last_q=of_q, last_p=of_p
+            q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach[0], reach_p=reach[1], last_q=of_q, last_p=of_p,
+            turns=np.zeros(len(q), dtype=np.longdouble),
         )  # fmt: skip
     size = 2 if case.judged.system.is_separate else 2 * q.shape[1]
     each = steps * size * 2 * q.shape[1]
@@ -68,10 +71,10 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
 States = tuple[Extended, Extended]
 
 
-def _one(case: Case, q: Extended, p: Extended) -> tuple[States, States]:
+def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> tuple[States, States]:
     """One step, and the allowance of that step."""
     places: list[Reals] | None = [] if case.placed else None
-    end = case.step(q, p, met=places)
+    end = case.step(q, p, met=places, near=near)
     with np.errstate(all="ignore"):
         return end, rounding.of_step(case, q, p, places)
 
@@ -81,12 +84,16 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     maps: list[Extended] = []
     bounds: list[Extended] = []
     reach_q, reach_p = np.abs(q), np.abs(p)
+    turns = np.zeros(len(q), dtype=np.longdouble)
+    bends = case.scheme.implicit and not case.straight
     with np.errstate(all="ignore"):
         one = tangent(case, q[:1], p[:1]) if case.straight else None
         for _ in range(steps):
             if one is None:
                 maps.append(tangent(case, q, p))
             end, bound = _one(case, q, p)
+            if bends:
+                turns = np.maximum(turns, _turn(case, end[0]))
             bounds.append(_pack(*bound, separate))
             q, p = end
             reach_q, reach_p = np.maximum(reach_q, np.abs(q)), np.maximum(reach_p, np.abs(p))
@@ -103,8 +110,14 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     of_q, of_p = _unpack(carried, separate)
     last_q, last_p = _unpack(bounds[-1], separate)
     return Stretch(
-        q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach_q, reach_p=reach_p, last_q=last_q, last_p=last_p
+        q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach_q, reach_p=reach_p, last_q=last_q, last_p=last_p,
+        turns=turns,
     )  # fmt: skip
+
+
+def _turn(case: Case, q: Extended) -> Extended:
+    rows = case.judged.system.gershgorin(q) / case.judged.m
+    return np.asarray(np.longdouble(case.trajectory.step) ** 2 * np.max(rows, axis=-1))
 
 
 def _apply(matrix: Extended, x: Extended) -> Extended:

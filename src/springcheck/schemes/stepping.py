@@ -35,6 +35,7 @@ def step(
     rate: Reals | None = None,
     parts: tuple[Force, Force] | None = None,
     met: list[Reals] | None = None,
+    near: Reals | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
@@ -43,7 +44,8 @@ def step(
     enough, because it only steers an iteration whose residual has the full width.  `rate` is
     `System.friction_rates`, left out where nothing is damped; `parts` are the forces of the slow and the fast
     springs, for the schemes that part them.  `met` takes the position (..., n) of each evaluation of the
-    force, in their order.
+    force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
+    solutions of an implicit stage the one there is found.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
@@ -76,7 +78,11 @@ def step(
         if own:
             if stiffness is None:
                 raise ValueError(f"{scheme.name} needs the stiffness of the scene")
-            qs, ps = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate)
+            # the stage stands at its share of the step
+            share = weighted_sum([(number(c, width), np.ones((), width)) for c in row], np.zeros((), width))
+            guess = qs if near is None else np.where(np.isfinite(near), q + share * (near - q), qs)
+            stage = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate, guess=guess)
+            qs, ps = stage
         if met is not None:
             met.append(qs)
         forces.append(force(qs, ps))
@@ -122,7 +128,15 @@ def _inverse(matrix: bytes, n: int) -> Floats:
 
 
 def _implicit_stage(
-    q: Reals, p: Reals, x: Any, m: Reals, force: Force, stiffness: Reals | Slope, rate: Reals | None
+    q: Reals,
+    p: Reals,
+    x: Any,
+    m: Reals,
+    force: Force,
+    stiffness: Reals | Slope,
+    rate: Reals | None,
+    *,
+    guess: Reals,
 ) -> tuple[Reals, Reals]:
     """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
 
@@ -133,7 +147,6 @@ def _implicit_stage(
     factor = x * x / (m * slowed)
     eps = np.finfo(q.dtype).eps
     scale = np.abs(q) + np.abs(x * p / m)
-    guess: Reals = q
     last: Reals = np.full_like(q, np.inf)
     for _ in range(50):
         residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m

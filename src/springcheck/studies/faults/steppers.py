@@ -44,9 +44,10 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
         linear = scene.system.is_linear
         stiff = constant if linear else lambda q: (scene.system.hessian(q), True)
     parts = scene.system.parts
+    rate = scene.system.friction_rates if scene.system.is_damped else None
 
     def tableau(i: int, q: Floats, p: Floats) -> State:
-        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts)
+        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate)
         return np.asarray(a, np.float64), np.asarray(b, np.float64)
 
     return tableau

@@ -1,0 +1,584 @@
+"""Random scenes, legal engines and faulty ones: false alarms and misses of the judge, counted.
+
+    python validation/judge_campaign.py [FIRST COUNT]
+
+Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
+ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; seven
+legal orders of operation (as written, in extended precision and rounded once a step, velocities instead
+of momenta, terms in another order, row by row, fused products, the one-step matrix); and faults of more
+than a hundred kinds: every parameter of every term and of the grid, coefficients of the schemes, every
+other scheme, and what happens to states on their way.
+
+A set is all verdicts on one trajectory.  A false alarm is a failed verdict on a legal engine.  A fault
+counts where its effect on a recorded frame exceeds 20 allowances, or what the scheme rounds along a step
+if that is more: the frame is that far from the scheme's own steps, in extended precision, from the frame
+before.  It is missed where no verdict fails and the step defect does not say that it cannot tell.
+Allowances are the judge's own; the noise of the legal engines, printed beside, says how far they are from
+what rounding really does.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from arguments import arguments
+from springcheck import checks, schemes
+from springcheck.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
+from springcheck.studies.faults import clean, steppers
+from springcheck.trajectory import Trajectory
+
+FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow)
+STEPS = 2500
+"""Steps of a run at most."""
+COUNTED = 20.0
+"""Allowances from which a fault counts."""
+
+State: TypeAlias = tuple[Floats, Floats]
+Step: TypeAlias = Callable[[int, Floats, Floats], State]
+
+
+def spread(rng: np.random.Generator, decades: float, n: int = 1) -> Floats:
+    """Numbers over twice so many decades (n,)."""
+    return np.asarray(10 ** rng.uniform(-decades, decades, n))
+
+
+def random_scene(rng: np.random.Generator, scheme: schemes.Scheme) -> Scene:
+    """One to four particles under one to three kinds of terms, started at random."""
+    n = int(rng.integers(1, 5))
+    size, rate = float(spread(rng, 2)[0]), float(spread(rng, 2)[0])
+    m = spread(rng, 1.5, n)
+    k = float(np.median(m)) * rate**2
+    each = np.arange(n)
+    kinds = ["wall", "wall", "chain", "quartic", "double", "cosine", "morse", "inverted", "free"]
+    chosen = {str(x) for x in rng.choice(kinds, int(rng.integers(1, 3)))}
+    if scheme.mixes:
+        chosen |= {"wall", "fast"}
+    at = size * rng.normal(size=n) * (rng.random() < 0.5)
+    terms: list[Term] = []
+    if "wall" in chosen:
+        rows = np.sort(rng.integers(0, n, int(rng.integers(1, 2 * n + 1))))
+        terms.append(WallSpring(i=rows, k=k * spread(rng, 0.7, len(rows)), at=at[rows]))
+    if "fast" in chosen:
+        terms.append(WallSpring(i=each, k=30 * k * spread(rng, 0.3, n), at=at, fast=True))
+    if "inverted" in chosen:
+        terms.append(WallSpring(i=each[:1], k=-0.3 * k * spread(rng, 0.3), at=at[:1]))
+    if {"chain", "morse"} & chosen and n > 1:
+        a, rest = each[:-1], size * rng.uniform(0, 2, n - 1)
+        if "chain" in chosen:
+            terms.append(Spring(a=a, b=a + 1, k=k * spread(rng, 1, n - 1), rest=rest))
+        else:
+            steep = rng.uniform(0.3, 1.5, n - 1) / size
+            terms.append(Morse(a=a, b=a + 1, depth=k / steep**2, steepness=steep, rest=rest))
+    if {"quartic", "double"} & chosen:
+        terms.append(Quartic(i=each, b=k / size**2 * spread(rng, 0.5, n), at=at))
+    if "double" in chosen:
+        terms.append(WallSpring(i=each, k=-k * spread(rng, 0.3, n), at=at))
+    if "cosine" in chosen:
+        wave = rng.uniform(0.5, 2, n) / size
+        terms.append(Cosine(i=each, depth=k / wave**2, wave=wave, at=at))
+    damped = scheme.name not in ("langevin-middle", "langevin-middle-early") and rng.random() < 0.2
+    if damped:
+        terms.append(Damping(i=each, c=m * rate * spread(rng, 1, n) * 0.1))
+    if not terms:
+        terms.append(WallSpring(i=each, k=0 * m, at=0 * at))
+    stretched = np.concatenate([[0.0], np.cumsum(size * rng.uniform(0.5, 1.5, n - 1))])
+    q = stretched + size * rng.normal(size=n) * 10 ** rng.uniform(-3, 0.3)
+    p = m * rate * size * rng.normal(size=n) * 10 ** rng.uniform(-3, 0.3)
+    made = clean.scene(m, tuple(terms), q, p, step=1.0, steps=2)
+    w = float(np.sqrt(np.max(made.system.gershgorin(q) / m)) + np.max(made.system.friction_rates)) or rate
+    hw = float(rng.choice([rng.uniform(0.02, 1.2), 10 ** rng.uniform(-3, -0.5)]))
+    if scheme.implicit and made.system.is_linear and rng.random() < 0.5:
+        hw = float(10 ** rng.uniform(0, 4))
+    every = int(rng.choice([1, 1, 1, 2, 7, 10, 50, int(10 ** rng.uniform(0, 3.3))]))
+    frames = int(max(2, min(120, STEPS // every)))
+    sign = -1 if rng.random() < 0.15 and not damped else 1
+    return replace(made, step=sign * hw / w, every=every, steps=every * frames, quantities=("q", "p"))
+
+
+# legal engines
+
+
+def written(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """The textbook engine."""
+    return steppers.textbook(scene, scheme)
+
+
+def wide(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """In extended precision, as x87 registers are, and rounded once a step."""
+    right = extended(scene, scheme)
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        a, b = right(q, p)
+        return a.astype(np.float64), b.astype(np.float64)
+
+    return step
+
+
+def velocities(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """v and a instead of p and F: the same scheme for unit masses."""
+    system, m = scene.system, scene.m
+    one = np.ones_like(m)
+
+    def pull(q: Any, v: Any) -> Any:
+        return system.force(q, v * m) / m
+
+    parts = tuple((lambda q, v, part=part: part(q, v * m) / m) for part in system.parts)
+    slope = (lambda q: (system.hessian(q) / m[:, None], True)) if scheme.implicit else None
+
+    rate = system.friction_rates if system.is_damped else None
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        a, v = schemes.step(
+            scheme,
+            q,
+            p / m,
+            h=scene.step,
+            m=one,
+            force=pull,
+            stiffness=slope,
+            rate=rate,
+            parts=(parts[0], parts[1]),
+        )
+        return np.asarray(a, np.float64), np.asarray(v * m, np.float64)
+
+    return step
+
+
+def reversed_terms(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """The terms added up in the other order."""
+    return steppers.textbook(scene, scheme, force=scene.system.force_of(scene.terms[::-1]))
+
+
+def row_by_row(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """Every row of every term a term of its own."""
+    rows: list[Term] = []
+    for term in scene.terms:
+        for j in range(len(term)):
+            only = {name: getattr(term, name)[j : j + 1] for name in term.ends}
+            only |= {c.field: getattr(term, c.field)[j : j + 1] for c in term.columns}
+            rows.append(replace(term, **only))  # type: ignore[type-var]
+    return steppers.textbook(scene, scheme, force=scene.system.force_of(rows))
+
+
+def fused(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """Every kick and drift with one rounding, as a fused multiply-add has."""
+    if not scheme.stages or {kind for kind, _ in scheme.stages} - {"kick", "drift"}:
+        return written(scene, scheme, rng)
+    h, m = np.longdouble(scene.step), scene.m
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        for kind, c in scheme.stages:
+            ch = np.longdouble(float(schemes.number(c, np.float64)) * float(h))
+            if kind == "kick":
+                p = (p + ch * scene.system.force(q, p)).astype(np.float64)
+            else:
+                q = (q + ch * (p / m)).astype(np.float64)
+        return q, p
+
+    return step
+
+
+def matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """The one-step matrix less 1 and what the origin becomes, for linear scenes."""
+    if not scene.system.is_linear or scheme.implicit:
+        return written(scene, scheme, rng)
+    n = scene.n
+    right = extended(scene, scheme)
+    none = np.zeros(n, dtype=np.longdouble)
+    o = np.concatenate(right(none, none))
+    columns = [np.concatenate(right(*np.split(row, 2))) - o for row in np.eye(2 * n).astype(np.longdouble)]
+    less = (np.stack(columns, axis=1) - np.eye(2 * n)).astype(np.float64)
+    constant = o.astype(np.float64)
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        z = np.concatenate([q, p])
+        z = z + (less @ z + constant)
+        return z[:n], z[n:]
+
+    return step
+
+
+LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] = {
+    "as written": written,
+    "extended": wide,
+    "velocities": velocities,
+    "reversed": reversed_terms,
+    "row by row": row_by_row,
+    "fused": fused,
+    "matrix": matrix,
+}
+
+
+def extended(scene: Scene, scheme: schemes.Scheme) -> Callable[[Any, Any], tuple[Any, Any]]:
+    """The scheme's own step in extended precision."""
+    system = scene.system
+    stiff = (lambda q: (system.hessian(q), True)) if scheme.implicit else None
+    rate = system.friction_rates if system.is_damped else None
+
+    def step(q: Any, p: Any) -> tuple[Any, Any]:
+        return schemes.step(
+            scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=scene.step, m=scene.m,
+            force=system.force, stiffness=stiff, parts=system.parts, rate=rate,
+        )  # fmt: skip
+
+    return step
+
+
+# faults: each makes the run of an engine that is wrong in one way, by the size eps
+
+Fault: TypeAlias = Callable[[Scene, schemes.Scheme, float, np.random.Generator], Trajectory | None]
+
+
+def run(scene: Scene, scheme: schemes.Scheme, step: Step, start: State | None = None) -> Trajectory:
+    """A recorded run."""
+    return steppers.record(scene, scheme, step, start=start)
+
+
+def parameter(key: str, name: str, whole: bool) -> Fault:
+    """A parameter of a term is off, in one row or in all."""
+
+    def made(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Trajectory | None:
+        found = [j for j, term in enumerate(scene.terms) if term.key == key]
+        if not found:
+            return None
+        j = int(rng.choice(found))
+        values = getattr(scene.terms[j], name).copy()
+        row = slice(None) if whole else int(rng.integers(len(values)))
+        length = np.max(np.abs(scene.q)) if name in ("at", "rest") else 0
+        values[row] += eps * (np.abs(values[row]) + length)
+        terms = list(scene.terms)
+        terms[j] = replace(terms[j], **{name: values})  # type: ignore[type-var]
+        return run(scene, scheme, steppers.textbook(replace(scene, terms=tuple(terms)), scheme))
+
+    return made
+
+
+def stepping(change: Callable[..., Step | None]) -> Fault:
+    """The engine takes another step."""
+
+    def made(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Trajectory | None:
+        step = change(scene, scheme, eps, rng)
+        return None if step is None else run(scene, scheme, step)
+
+    return made
+
+
+def after(change: Callable[..., State]) -> Fault:
+    """Something happens to the state after every right step."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Step:
+        right = steppers.textbook(scene, scheme)
+        return lambda i, q, p: change(scene, eps, i, q, p, *right(i, q, p))
+
+    return stepping(broken)
+
+
+def pulling(change: Callable[..., Any]) -> Fault:
+    """Another force."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Step:
+        right = scene.system.force
+        return steppers.textbook(scene, scheme, force=lambda q, p: change(scene, eps, q, p, right(q, p)))
+
+    return stepping(broken)
+
+
+def reporting(change: Callable[..., State]) -> Fault:
+    """The motion is right, its record is not."""
+
+    def made(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Trajectory:
+        right = run(scene, scheme, steppers.textbook(scene, scheme))
+        q, p = change(scene, eps, right.q.copy(), right.p.copy(), rng)
+        return replace(right, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
+
+    return made
+
+
+def other(name: str) -> Fault:
+    """Another scheme runs under the name that is claimed."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Step | None:
+        return None if scheme.name == name else steppers.textbook(scene, schemes.SCHEMES[name])
+
+    return stepping(broken)
+
+
+def coefficient(number: int) -> Fault:
+    """One coefficient of the scheme is off."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Step | None:
+        def wrong(x: Any) -> str:
+            return str(schemes.number(x, np.longdouble) * (1 + np.longdouble(eps)))
+
+        if scheme.stages:
+            if number >= len(scheme.stages):
+                return None
+            stages = list(scheme.stages)
+            stages[number] = (stages[number][0], wrong(stages[number][1]))
+            return steppers.textbook(scene, replace(scheme, stages=tuple(stages)))
+        weights = [j for j, x in enumerate(scheme.b) if x]
+        if number >= len(weights):
+            return None
+        b = list(scheme.b)
+        b[weights[number]] = b[weights[number]] * type(b[0])(1 + eps)
+        return steppers.textbook(scene, replace(scheme, b=tuple(b)))
+
+    return stepping(broken)
+
+
+def bit(number: int, momentum: bool) -> Fault:
+    """One bit of one number is wrong."""
+
+    def change(scene: Scene, eps: float, q: Floats, p: Floats, rng: np.random.Generator) -> State:
+        x = p if momentum else q
+        bits = x.view(np.uint64)
+        bits[int(rng.integers(1, len(x))), int(rng.integers(scene.n))] ^= np.uint64(1 << number)
+        return q, p
+
+    return reporting(change)
+
+
+def cut(x: Floats, digits: float) -> Floats:
+    """Rounded to a relative spacing."""
+    with np.errstate(divide="ignore"):
+        unit = np.where(x == 0, 1, 10 ** np.floor(np.log10(np.abs(np.where(x == 0, 1, x))))) * digits
+    return np.asarray(np.round(x / unit) * unit)
+
+
+def moved(x: Floats, rows: int) -> Floats:
+    """Rows but the first moved on."""
+    return np.concatenate([x[:1], np.roll(x[1:], rows, axis=0)])
+
+
+def changed(change: Callable[[Scene, float], Scene]) -> Fault:
+    """The engine moves another scene."""
+    return stepping(lambda s, scheme, eps, rng: steppers.textbook(change(s, eps), scheme))
+
+
+def stale(scene: Scene, scheme: schemes.Scheme, eps: float, rng: np.random.Generator) -> Step:
+    """Forces from a buffer one evaluation old."""
+    old = [scene.system.force(scene.q, scene.p)]
+
+    def force(q: Any, p: Any) -> Any:
+        before, old[0] = old[0], scene.system.force(q, p)
+        return before
+
+    return steppers.textbook(scene, scheme, force=force)
+
+
+def at_step(when: str, change: Callable[..., State]) -> Fault:
+    """Something happens once, early, late or every hundredth step."""
+
+    def here(scene: Scene, eps: float, i: int, q0: Floats, p0: Floats, q: Floats, p: Floats) -> State:
+        hit = {"early": i == 1, "late": i == scene.steps - 1, "often": i % 100 == 99}[when]
+        return change(eps, q0, p0, q, p) if hit else (q, p)
+
+    return after(here)
+
+
+COLUMNS = {
+    "wall-spring": ("k", "at"), "spring": ("k", "rest"), "quartic": ("b", "at"),
+    "cosine": ("depth", "wave", "at"), "morse": ("depth", "steepness", "rest"), "damping": ("c",),
+}  # fmt: skip
+
+FAULTS: dict[str, Fault] = {}
+for _key, _names in COLUMNS.items():
+    for _name in _names:
+        for _whole in (True, False):
+            FAULTS[f"{_key}.{_name}{'' if _whole else ' of one'}"] = parameter(_key, _name, _whole)
+FAULTS |= {f"{name} under another name": other(name) for name in FIXED}
+FAULTS |= {f"coefficient {j}": coefficient(j) for j in range(7)}
+for _bit in (8, 20, 40, 51, 55, 63):
+    FAULTS |= {f"bit {_bit} of q": bit(_bit, False), f"bit {_bit} of p": bit(_bit, True)}
+FAULTS |= {
+    "step": changed(lambda s, x: replace(s, step=s.step * (1 + x))),
+    "mass": changed(lambda s, x: replace(s, m=s.m * (1 + x))),
+    "mass of one": changed(lambda s, x: replace(s, m=s.m * np.where(np.arange(s.n) == 0, 1 + x, 1))),
+    "all forces": pulling(lambda s, x, q, p, f: f * (1 + x)),
+    "constant force": pulling(lambda s, x, q, p, f: f + x * np.max(np.abs(f))),
+    "cubic force": pulling(lambda s, x, q, p, f: f + x * f * q * q / np.max(s.q * s.q + 1e-300)),
+    "friction": pulling(lambda s, x, q, p, f: f - x * np.abs(1 / s.step) * p),
+    "heating": pulling(lambda s, x, q, p, f: f + x * np.abs(1 / s.step) * p),
+    "force cut off": pulling(lambda s, x, q, p, f: np.where(np.abs(f) > (1 - x) * np.max(np.abs(f)), 0, f)),
+    "force clamped": pulling(lambda s, x, q, p, f: np.clip(f, -abs(f).mean(), abs(f).mean())),
+    "force in single": pulling(lambda s, x, q, p, f: np.asarray(f, np.float32).astype(f.dtype)),
+    "force of digits": pulling(lambda s, x, q, p, f: cut(np.asarray(f, np.float64), x)),
+    "force in fixed point": pulling(lambda s, x, q, p, f: np.round(f / x) * x),
+    "force on the first alone": pulling(lambda s, x, q, p, f: f * (np.arange(s.n) == 0)),
+    "force off in the first": pulling(lambda s, x, q, p, f: f * (1 + x * (np.arange(s.n) == 0))),
+    "forces swapped": pulling(lambda s, x, q, p, f: f[..., ::-1]),
+    "sign of the force": pulling(lambda s, x, q, p, f: -f),
+    "force at a shifted place": pulling(lambda s, x, q, p, f: s.system.force(q * (1 + x), p)),
+    "stale force": stepping(stale),
+    "drift by p": changed(lambda s, x: replace(s, m=np.ones(s.n))),
+    "friction afterwards": after(lambda s, x, i, a, b, q, p: (q, p * (1 - x))),
+    "thermostat": after(lambda s, x, i, a, b, q, p: (q, p * (1 + x * np.sign(b @ b - p @ p)))),
+    "noise of q": after(lambda s, x, i, a, b, q, p: (q * (1 + x * np.cos(i * i)), p)),
+    "noise of p": after(lambda s, x, i, a, b, q, p: (q, p * (1 + x * np.cos(i * i)))),
+    "centre taken off": after(lambda s, x, i, a, b, q, p: (q, p - np.mean(p))),
+    "q in single": after(lambda s, x, i, a, b, q, p: (q.astype(np.float32).astype(float), p)),
+    "p in single": after(lambda s, x, i, a, b, q, p: (q, p.astype(np.float32).astype(float))),
+    "state of digits": after(lambda s, x, i, a, b, q, p: (cut(q, x), cut(p, x))),
+    "box": after(lambda s, x, i, a, b, q, p: (np.where(np.abs(q) > np.max(np.abs(s.q)), -q, q), p)),
+    "drift of q": after(lambda s, x, i, a, b, q, p: (q + x * np.max(np.abs(q)), p)),
+    "small is nothing": after(lambda s, x, i, a, b, q, p: (np.where(np.abs(q) < x, 0, q), p)),
+    "momentum of the step before": after(lambda s, x, i, a, b, q, p: (q, b)),
+    "place of the step before": after(lambda s, x, i, a, b, q, p: (a, p)),
+    "the first stands still": after(
+        lambda s, x, i, a, b, q, p: (np.r_[a[:1], q[1:]], np.r_[b[:1], p[1:]])
+    ),
+    "units of q": reporting(lambda s, x, q, p, rng: (q * (1 + x), p)),
+    "units of p": reporting(lambda s, x, q, p, rng: (q, p * (1 + x))),
+    "offset of q": reporting(lambda s, x, q, p, rng: (q + x * np.max(np.abs(q)), p)),
+    "sign of p": reporting(lambda s, x, q, p, rng: (q, -p)),
+    "sign of q": reporting(lambda s, x, q, p, rng: (-q, p)),
+    "particles swapped": reporting(lambda s, x, q, p, rng: (q[:, ::-1], p[:, ::-1])),
+    "frames late": reporting(lambda s, x, q, p, rng: (moved(q, 1), moved(p, 1))),
+    "momenta late": reporting(lambda s, x, q, p, rng: (q, moved(p, 1))),
+    "places late": reporting(lambda s, x, q, p, rng: (moved(q, 1), p)),
+    "frames backwards": reporting(lambda s, x, q, p, rng: (np.r_[q[:1], q[:0:-1]], np.r_[p[:1], p[:0:-1]])),
+    "a frame twice": reporting(lambda s, x, q, p, rng: (np.r_[q[:2], q[1:-1]], np.r_[p[:2], p[1:-1]])),
+    "stands still": reporting(lambda s, x, q, p, rng: (0 * q + q[0], 0 * p + p[0])),
+    "nothing": reporting(lambda s, x, q, p, rng: (np.r_[q[:1], 0 * q[1:]], np.r_[p[:1], 0 * p[1:]])),
+    "file in single": reporting(lambda s, x, q, p, rng: (q.astype(np.float32), p.astype(np.float32))),
+    "file of digits": reporting(lambda s, x, q, p, rng: (cut(q, x), cut(p, x))),
+    "velocities for momenta": reporting(lambda s, x, q, p, rng: (q, p / s.m)),
+    "half a kick early": reporting(
+        lambda s, x, q, p, rng: (q, np.r_[p[:1], (p - s.step / 2 * s.system.force(q, p))[1:]])
+    ),
+    "half a drift late": reporting(lambda s, x, q, p, rng: (np.r_[q[:1], (q + s.step / 2 * p / s.m)[1:]], p)),
+}  # fmt: skip
+for _when in ("early", "late", "often"):
+    FAULTS |= {
+        f"a step left out, {_when}": at_step(_when, lambda x, a, b, q, p: (a, b)),
+        f"a kick, {_when}": at_step(_when, lambda x, a, b, q, p: (q, p * (1 + x))),
+        f"a jump, {_when}": at_step(_when, lambda x, a, b, q, p: (q * (1 + x), p)),
+        f"restart from text, {_when}": at_step(_when, lambda x, a, b, q, p: (cut(q, x), cut(p, x))),
+        f"momentum reversed, {_when}": at_step(_when, lambda x, a, b, q, p: (q, -p)),
+    }
+
+
+@dataclass
+class Counts:
+    """What the campaign has found so far."""
+
+    sets: int = 0
+    verdicts: int = 0
+    alarms: list[str] = field(default_factory=list)
+    faults: int = 0
+    large: int = 0
+    seen: int = 0
+    seen_below: int = 0
+    untold: int = 0
+    missed: list[str] = field(default_factory=list)
+    numbers: list[str] = field(default_factory=list)
+    """Verdicts whose value or bound is no finite number."""
+    kinds: Counter[str] = field(default_factory=Counter)
+    noise: list[float] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        noise = np.array(self.noise or [0.0])
+        return (
+            f"{self.sets} sets, {self.verdicts} verdicts; legal engines: {len(self.alarms)} false alarms, "
+            f"noise {np.median(noise):.2g} of the bound in the middle and {np.max(noise):.2g} at most; "
+            f"{self.faults} faults of {len(self.kinds)} kinds, {self.large} above {COUNTED:g} allowances: "
+            f"{self.seen} seen, {self.untold} not told, {len(self.missed)} missed; {self.seen_below} smaller "
+            f"ones seen; {len(self.numbers)} verdicts without a number"
+        )
+
+
+def judged(counts: Counts, scene: Scene, made: Trajectory, what: str) -> list[Any]:
+    """The verdicts, counted."""
+    verdicts = checks.judge(scene, made)
+    counts.sets += 1
+    counts.verdicts += sum(v.passed is not None for v in verdicts)
+    counts.numbers += [
+        f"{what}: {v.check} {v.value} of {v.bound}"
+        for v in verdicts
+        if v.passed is not None and not np.isfinite([v.value, v.bound]).all()
+    ]
+    return verdicts
+
+
+def one(seed: int, counts: Counts) -> None:
+    """One scene: a legal engine, and two faults."""
+    rng = np.random.default_rng([12, seed])
+    scheme = schemes.SCHEMES[str(rng.choice(FIXED))]
+    scene = random_scene(rng, scheme)
+    order = str(rng.choice(list(LEGAL)))
+    with np.errstate(all="ignore"):
+        right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
+        what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
+        verdicts = judged(counts, scene, right, what)
+        failed = [v for v in verdicts if v.passed is False]
+        counts.alarms += [f"{what}: {v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}" for v in failed]
+        steps = [v for v in verdicts if v.check == "step-defect" and v.passed is not None]
+        counts.noise += [v.value / v.bound for v in steps]
+        for name in rng.choice(list(FAULTS), 2, replace=False):
+            eps = float(10 ** rng.uniform(-16, -0.3))
+            wrong = FAULTS[str(name)](scene, scheme, eps, rng)
+            if wrong is None or len(wrong.t) < 2:
+                continue
+            what = f"seed {seed}, {scheme.name}, {name} by {eps:.2g}, every {scene.every}"
+            _fault(counts, scene, wrong, what)
+            counts.kinds[str(name)] += 1
+
+
+def _fault(counts: Counts, scene: Scene, wrong: Trajectory, what: str) -> None:
+    counts.faults += 1
+    case = checks.Case(trajectory=wrong, scene=scene)
+    effect = 0.0
+    if case.ahead is not None:
+        right = extended(scene, case.scheme)
+        q, p = wrong.q[:-1].astype(np.longdouble), wrong.p[:-1].astype(np.longdouble)
+        for row in range(len(q)):
+            a, b = q[row], p[row]
+            for _ in range(scene.every):
+                a, b = right(a, b)
+            off = np.abs(a - wrong.q[row + 1]), np.abs(b - wrong.p[row + 1])
+            allowed = case.ahead.of_q[row], case.ahead.of_p[row]
+            ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, allowed, strict=True)]
+            effect = max(effect, float(np.nanmax(ratios)))
+            if effect > 1e3 * COUNTED:
+                break
+    verdicts = judged(counts, scene, wrong, what)
+    seen = any(v.passed is False for v in verdicts)
+    if effect <= max(COUNTED, case.roundings):
+        counts.seen_below += seen
+        return
+    counts.large += 1
+    defect = next(v for v in verdicts if v.check == "step-defect")
+    if seen:
+        counts.seen += 1
+    elif defect.passed is None or "may grow to all" in defect.why:
+        counts.untold += 1
+    else:
+        counts.missed.append(f"{what}: effect {effect:.3g}")
+
+
+def campaign(first: int, count: int, *, said: Callable[[str], None] | None = None) -> Counts:
+    """So many scenes, three verdict sets each."""
+    counts = Counts()
+    for seed in range(first, first + count):
+        one(seed, counts)
+        if said and (seed - first) % 500 == 499:
+            said(str(counts))
+    return counts
+
+
+if __name__ == "__main__":
+    asked = arguments(__doc__, first=0, count=2000)
+    found = campaign(asked.first, asked.count, said=lambda text: print(text, flush=True))
+    print(found)
+    for line in (*found.alarms, *found.missed, *found.numbers):
+        print(" ", line)
+    sys.exit(bool(found.alarms or found.missed or found.numbers))
