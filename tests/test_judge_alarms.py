@@ -49,7 +49,7 @@ def test_binary_numbers_leave_no_rounding_and_no_alarm(name: str, k: float, p: f
 def test_many_springs_on_one_particle_round_once_more_each(label: str, springs: int) -> None:
     pull = WallSpring(i=np.zeros(springs, int), k=np.full(springs, 2.9 / springs), at=np.full(springs, 0.1))
     scene = one(pull, step=0.1, steps=60)
-    assert alarms(checks.judge(scene, springcheck.run(scene, label))) == []
+    assert alarms(checks.judge(scene, springcheck.simulate(scene, label))) == []
 
 
 WELLS: dict[str, tuple[Term, ...]] = {
@@ -104,7 +104,7 @@ def test_an_adaptive_solver_may_lose_what_an_instability_takes(label: str) -> No
     )
     for scene in (pendulum, well):
         asked = replace(scene, tolerance=1e-10)
-        verdicts = checks.judge(asked, springcheck.run(asked, label))
+        verdicts = checks.judge(asked, springcheck.simulate(asked, label))
         assert alarms(verdicts) == []
         assert any(v.check == "tolerance" and v.passed for v in verdicts)
 
@@ -124,5 +124,5 @@ def test_implicit_euler_loses_what_underflows_in_its_matrix() -> None:
         scene = replace(
             chain, q=np.array([1.0, -2.0, 1.5]) * size, p=np.array([0.3, 0.2, 0.1]) * size, steps=40
         )
-        verdicts = checks.judge(scene, springcheck.run(scene, "own:implicit-euler"))
+        verdicts = checks.judge(scene, springcheck.simulate(scene, "own:implicit-euler"))
         assert alarms(verdicts) == []

@@ -159,8 +159,8 @@ def uneven(**changes: Any) -> Scene:
 
 def test_the_trajectory_is_held_against_the_grid_of_the_scene() -> None:
     scene = uneven()
-    assert failed(scene, springcheck.run(scene, "own:semi-implicit-euler")) == []
-    whole = springcheck.run(scene, "own:semi-implicit-euler")
+    assert failed(scene, springcheck.simulate(scene, "own:semi-implicit-euler")) == []
+    whole = springcheck.simulate(scene, "own:semi-implicit-euler")
     assert whole.energy is not None
     short = replace(
         whole,
@@ -171,9 +171,9 @@ def test_the_trajectory_is_held_against_the_grid_of_the_scene() -> None:
         outcome=replace(whole.outcome, step=100),
     )
     wrong = {
-        "half the step": springcheck.run(replace(scene, step=scene.step / 2), "own:semi-implicit-euler"),
-        "every second step": springcheck.run(replace(scene, every=2), "own:semi-implicit-euler"),
-        "more steps": springcheck.run(replace(scene, steps=300), "own:semi-implicit-euler"),
+        "half the step": springcheck.simulate(replace(scene, step=scene.step / 2), "own:semi-implicit-euler"),
+        "every second step": springcheck.simulate(replace(scene, every=2), "own:semi-implicit-euler"),
+        "more steps": springcheck.simulate(replace(scene, steps=300), "own:semi-implicit-euler"),
         "no energies": replace(whole, energy=None),
         "half of the steps, called complete": short,
         "half of the steps, stopped for no reason": replace(
@@ -190,7 +190,7 @@ def test_the_trajectory_is_held_against_the_grid_of_the_scene() -> None:
 
 def test_what_an_adaptive_method_says_of_itself_is_not_believed() -> None:
     scene = uneven(tolerance=1e-10)
-    run = springcheck.run(scene, "sundials:bdf")
+    run = springcheck.simulate(scene, "sundials:bdf")
     assert failed(scene, run) == []
     assert "grid" in failed(scene, replace(run, tolerance=1e-4))
     off = replace(run, q=run.q * (1 + 1e-2), force_calls=10**12)

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+import springcheck
 from springcheck import checks
 from springcheck.cli import main
 from springcheck.physics import scenefile
@@ -43,7 +44,7 @@ def test_a_method_of_which_nothing_could_tell_is_not_judged(
 
 def test_a_method_is_not_judged_by_facts_of_its_record_alone() -> None:
     scene = scenefile.load_scene("spring-uneven")
-    run = measure.simulate.run(replace(scene, steps=20), "own:semi-implicit-euler")
+    run = springcheck.simulate(replace(scene, steps=20), "own:semi-implicit-euler")
     verdicts = checks.judge(replace(scene, steps=20), run)
     assert checks.not_judged(verdicts) == ()
     facts = [v for v in verdicts if v.check in ("start", "times", "grid", "energies", "line", "momentum")]
