@@ -40,7 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupts.announce(f"interrupted; {what}")
     try:
         with _said(), _readable(options):
-            if getattr(options, "engine", None):
+            if any(getattr(options, name, None) for name in ("engine", "stepper", "program")) and (
+                command is not _identify
+            ):
                 from springcheck import doors
 
                 doors.bring(options)

@@ -91,7 +91,7 @@ def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:
         metavar="LABEL",
         help="engine:method[@platform[-precision]] or a glob such as 'own:*'; repeatable",
     )
-    engine_option(parser)
+    door_options(parser)
     parser.add_argument("--force", action="store_true", help="write an existing store anew")
     report_options(parser)
 
@@ -104,6 +104,26 @@ def engine_option(parser: ArgumentParser) -> None:
         default=[],
         metavar="FILE.py",
         help="an engine of your own, for this call; repeatable",
+    )
+
+
+def door_options(parser: ArgumentParser) -> None:
+    """A function or a program that runs beside the methods."""
+    engine_option(parser)
+    parser.add_argument(
+        "--stepper",
+        metavar="MODULE:FUNCTION",
+        help="your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION",
+    )
+    parser.add_argument(
+        "--command",
+        dest="program",
+        metavar="NAME=COMMAND",
+        help="a program in any language, as 'name=./engine {scene} {out}'",
+    )
+    parser.add_argument("--scheme", metavar="NAME", help="the scheme that your function or program has")
+    parser.add_argument(
+        "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
     )
 
 

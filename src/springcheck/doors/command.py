@@ -1,0 +1,171 @@
+"""A program in any language as an engine: the scene goes in as JSON, a table of states comes out.
+
+``name=./engine {scene} {out}``: the program is called once, without a shell, with the paths of the scene and
+of the file that it is to write.  Its time is that of the whole command, reading and writing among it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import tempfile
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import formats, schemes
+from springcheck.arrays import Floats
+from springcheck.doors.function import UNKNOWN
+from springcheck.engines import ANY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation
+from springcheck.errors import MethodError, StoreError
+from springcheck.physics.scene import Scene
+
+SECONDS = 600.0
+"""What a command may take unless it is told."""
+
+
+def engine(text: str, scheme: str = "", seconds: float = SECONDS) -> Engine:
+    """An engine of ``name=command``.  MethodError where the command cannot be called."""
+    name, equals, line = text.partition("=")
+    if not equals or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        raise MethodError(f"--command {text!r}: not of the form 'name=./engine {{scene}} {{out}}'")
+    try:
+        words = shlex.split(line)
+    except ValueError as error:
+        raise MethodError(f"--command {name}: {error}") from error
+    for place in ("{scene}", "{out}"):
+        if not any(place in word for word in words):
+            raise MethodError(f"--command {name}: no {place} among its arguments: {line.strip()!r}")
+    if shutil.which(words[0]) is None:
+        raise MethodError(f"--command {name}: there is no program {words[0]!r} here that can be run")
+    schemes.bring(UNKNOWN)
+    known = schemes.scheme(scheme).name if scheme else UNKNOWN.name
+
+    def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+        return _Command(name, words, scene, step, seconds)
+
+    return Engine(
+        name="command",
+        title=f"the command {name}",
+        methods={
+            name: Method(
+                name=name,
+                scheme=known,
+                about=f"{line.strip()}; its time is the whole command's",
+                terms=frozenset({ANY_POTENTIAL, "damping"}),
+            )
+        },
+        schemes=(UNKNOWN,),
+        start=start,
+        version=lambda: {"command": line.strip()},
+        arithmetic=lambda label: Arithmetic(),
+        convention=lambda method: "as the command writes them",
+        step_seconds=1e-3,
+    )
+
+
+def files(text: str) -> list[str]:
+    """The files that a command names, its program among them."""
+    words = shlex.split(text.partition("=")[2])
+    return [shutil.which(words[0]) or "", *words[1:]]
+
+
+def as_json(scene: Scene, step: float, every: int) -> dict[str, Any]:
+    """A scene as plain data.  One mass on one spring to a wall stands in four plain numbers beside it."""
+    terms = []
+    for term in scene.terms:
+        values = {field.name: getattr(term, field.name) for field in fields(term)}  # type: ignore[arg-type]
+        arrays = {key: value.tolist() for key, value in values.items() if isinstance(value, np.ndarray)}
+        terms.append({"key": term.key, **arrays})
+    out: dict[str, Any] = {
+        "name": scene.name, "step": step, "steps": scene.steps, "every": every, "units": scene.units,
+        "m": scene.m.tolist(), "q": scene.q.tolist(), "p": scene.p.tolist(), "terms": terms,
+    }  # fmt: skip
+    if scene.n == 1 and len(terms) == 1 and terms[0]["key"] == "wall-spring" and terms[0]["at"] == [0.0]:
+        out |= {
+            "mass": float(scene.m[0]), "stiffness": terms[0]["k"][0],
+            "position": float(scene.q[0]), "momentum": float(scene.p[0]),
+        }  # fmt: skip
+    return out
+
+
+class _Command:
+    """A command that is run once, as the first states are asked for."""
+
+    def __init__(self, name: str, words: list[str], scene: Scene, step: float, seconds: float) -> None:
+        self.force_calls = 0
+        self._name, self._words, self._scene, self._h, self._seconds = name, words, scene, step, seconds
+        self._every = self._row = 0
+        self._q, self._p = np.empty((0, 0)), np.empty((0, 0))
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        if not self._every:
+            self._every = every
+            self._q, self._p = self._run(every)
+        stride, rest = divmod(every, self._every)
+        if rest:
+            raise MethodError(f"command {self._name}: frames {self._scene.every} steps apart; 65536 at most")
+        rows = self._row + stride * np.arange(1, len(q) + 1)
+        if rows[-1] >= len(self._q):
+            raise MethodError(
+                f"command {self._name}: {len(self._q)} rows, too few: {rows[-1] + 1} are needed"
+            )
+        q[:], p[:] = self._q[rows], self._p[rows]
+        self._row = int(rows[-1])
+
+    def _run(self, every: int) -> tuple[Floats, Floats]:
+        with tempfile.TemporaryDirectory(prefix="springcheck-") as folder:
+            scene, out = Path(folder) / "scene.json", Path(folder) / "out"
+            scene.write_text(json.dumps(as_json(self._scene, self._h, every)))
+            words = [word.replace("{scene}", str(scene)).replace("{out}", str(out)) for word in self._words]
+            try:
+                done = subprocess.run(
+                    words, capture_output=True, timeout=self._seconds, check=False, stdin=subprocess.DEVNULL
+                )
+            except subprocess.TimeoutExpired as error:
+                raise MethodError(
+                    f"command {self._name} did not end within {self._seconds:g} s; --timeout gives it more"
+                ) from error
+            except OSError as error:
+                raise MethodError(f"command {self._name} cannot be run: {error.strerror}") from error
+            if done.returncode:
+                said = " ".join((done.stderr or done.stdout).decode(errors="replace").split())[-300:]
+                raise MethodError(
+                    f"command {self._name} ended with status {done.returncode}{f': {said}' if said else ''}"
+                )
+            if not out.is_file():
+                raise MethodError(f"command {self._name} wrote no file {{out}}")
+            return self._read(out, every)
+
+    def _read(self, out: Path, every: int) -> tuple[Floats, Floats]:
+        try:
+            states = formats.read(out)
+        except StoreError as error:
+            raise MethodError(
+                f"command {self._name}: its output{str(error).removeprefix(str(out))}"
+            ) from error
+        scene = self._scene
+        if states.q.shape[1] != scene.n:
+            raise MethodError(
+                f"command {self._name}: its output has {states.q.shape[1]} positions a row, not {scene.n}"
+            )
+        p = states.p if states.p is not None else np.asarray(states.v) * scene.m
+        t = np.arange(len(states.t)) * every * self._h
+        # a time may be a sum of steps, rounded at each
+        off = np.abs(states.t - t) > 1e-9 * (np.abs(t) + abs(self._h))
+        if np.any(off):
+            row = int(np.argmax(off))
+            raise MethodError(
+                f"command {self._name}: row {row + 1} is at t = {states.t[row]:.6g}, not {t[row]:.6g}; the "
+                f"first row is the start, the next {every} steps of {self._h:g} later"
+            )
+        if not (np.array_equal(states.q[0], scene.q) and np.array_equal(p[0], scene.p)):
+            close = np.allclose(states.q[0], scene.q, rtol=1e-9) and np.allclose(p[0], scene.p, rtol=1e-9)
+            why = "; write numbers with 17 digits" if close else ""
+            raise MethodError(f"command {self._name}: its first row is not the scene's start{why}")
+        return states.q, p

@@ -1,0 +1,165 @@
+"""A student's function ``step(q, p, h, force, mass) -> (q, p)`` as an engine of one method."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import engines, schemes
+from springcheck.arrays import Floats
+from springcheck.engines import ANY_POTENTIAL, Engine, Label, Method, Simulation, Stopped
+from springcheck.errors import IdentificationError, MethodError, told
+from springcheck.identify import identify_stepper, load_stepper
+from springcheck.physics.scene import Scene
+from springcheck.schemes import Scheme
+
+UNKNOWN = Scheme(
+    name="unknown",
+    title="no scheme that is known here",
+    order=0,
+    limit=np.inf,
+    symplectic=False,
+    source="none: only what needs no scheme is judged",
+)
+
+
+def load(spec: str) -> Callable[..., Any]:
+    """The function of ``module:function`` or ``file.py:function``."""
+    name, _, function = spec.rpartition(":")
+    if not name.endswith(".py"):
+        return load_stepper(spec)
+    module = engines.module_of(Path(name))
+    found = getattr(module, function, None)
+    if not callable(found):
+        known = [
+            key
+            for key, value in vars(module).items()
+            if inspect.isfunction(value) and not key.startswith("_")
+        ]
+        raise MethodError(f"{name} has no function {function!r}; it has {', '.join(known) or 'none'}")
+    return found  # type: ignore[no-any-return]
+
+
+def file_of(spec: str) -> str:
+    """The file of a function."""
+    return _file(load(spec)) or spec
+
+
+def engine(spec: str, scheme: str = "") -> Engine:
+    """An engine of the function; without a stated scheme the one that it is found to be, if it is one."""
+    function = load(spec)
+    name = re.sub(r"[^A-Za-z0-9_-]", "-", spec.rpartition(":")[2]) or "step"
+    where = _file(function)
+
+    def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+        return _Steps(function, scene, step, where)
+
+    known = schemes.scheme(scheme).name if scheme else _identified(function)
+    about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
+    return Engine(
+        name="stepper",
+        title=f"the function {spec}",
+        methods={
+            name: Method(name=name, scheme=known, about=about, terms=frozenset({ANY_POTENTIAL, "damping"}))
+        },
+        schemes=(UNKNOWN,),
+        start=start,
+        version=dict,
+        convention=lambda method: "as the function returns them",
+        step_seconds=2e-5,
+    )
+
+
+def _identified(function: Callable[..., Any]) -> str:
+    schemes.bring(UNKNOWN)
+    try:
+        found = identify_stepper(function)
+    except (MethodError, IdentificationError):
+        # a mistake in the function is shown as it is, when it runs
+        return UNKNOWN.name
+    known = found.fits and found.scheme in schemes.SCHEMES and schemes.SCHEMES[found.scheme].one_step
+    return found.scheme if known and found.scheme else UNKNOWN.name
+
+
+def _file(function: Callable[..., Any]) -> str:
+    try:
+        return str(inspect.getsourcefile(inspect.unwrap(function)) or "")
+    except TypeError:
+        return ""
+
+
+class _Steps:
+    """The function, step by step: with numbers for one particle, or with arrays where it wants them."""
+
+    def __init__(self, function: Callable[..., Any], scene: Scene, step: float, where: str) -> None:
+        self.force_calls = 0
+        self._function, self._h, self._where = function, step, where
+        self._q, self._p, self._m = scene.q.copy(), scene.p.copy(), scene.m
+        self._n, self._arrays = scene.n, scene.n > 1
+        self._total = scene.system.force
+
+    def _force(self, q: Any, p: Any = None) -> Any:
+        self.force_calls += 1
+        here = np.atleast_1d(np.asarray(q, np.float64))
+        there = np.zeros_like(here) if p is None else np.atleast_1d(np.asarray(p, np.float64))
+        found = self._total(here, there)
+        return float(found[0]) if np.ndim(q) == 0 else found
+
+    def _call(self, arrays: bool) -> tuple[Floats, Floats]:
+        if arrays:
+            given: tuple[Any, Any, Any] = (self._q.copy(), self._p.copy(), self._m.copy())
+        else:
+            given = (float(self._q[0]), float(self._p[0]), float(self._m[0]))
+        out = self._function(given[0], given[1], self._h, self._force, given[2])
+        if not isinstance(out, tuple | list | np.ndarray) or len(out) != 2:
+            what = f"{len(out)} values" if isinstance(out, tuple | list) else type(out).__name__
+            raise MethodError(f"{self._name}: returned {what}; a step returns (q, p)")
+        q, p = (np.atleast_1d(np.asarray(x, np.float64)) for x in out)
+        if q.shape != (self._n,) or p.shape != (self._n,):
+            raise MethodError(f"{self._name}: returned shapes {q.shape} and {p.shape}, not ({self._n},)")
+        return q, p
+
+    @property
+    def _name(self) -> str:
+        return str(getattr(self._function, "__name__", "the function"))
+
+    def _step(self) -> tuple[Floats, Floats]:
+        if self._arrays:
+            return self._call(True)
+        try:
+            return self._call(False)
+        except (TypeError, IndexError, AttributeError) as error:
+            first = error
+        try:
+            found = self._call(True)
+        except (ArithmeticError, TypeError, IndexError, AttributeError, ValueError) as second:
+            # whichever call got further into the function shows its mistake
+            raise (second if self._line(second) > self._line(first) else first) from None
+        self._arrays = True
+        return found
+
+    def _line(self, error: BaseException) -> int:
+        frames = traceback.extract_tb(error.__traceback__)
+        return max((f.lineno or 0 for f in frames if f.filename == self._where), default=0)
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        with np.errstate(all="ignore"):
+            for row in range(len(q)):
+                for _ in range(every):
+                    try:
+                        self._q, self._p = self._step()
+                    except OverflowError as error:
+                        raise Stopped(row, f"the motion explodes: {told(error, self._where)}") from error
+                    except (MethodError, MemoryError):
+                        raise
+                    except Exception as error:
+                        raise MethodError(f"{self._name} failed: {told(error, self._where)}") from error
+                q[row], p[row] = self._q, self._p
+                if not (np.all(np.isfinite(self._q)) and np.all(np.isfinite(self._p))):
+                    raise Stopped(row, "the motion explodes: nan or infinite numbers from the next frame on")

@@ -1,0 +1,97 @@
+"""What the columns of a table mean: times, positions, and momenta or velocities, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.errors import StoreError
+
+Columns: TypeAlias = Mapping[str, Floats]
+"""Columns (f,) or (f, n) by name."""
+
+Kind: TypeAlias = Literal["t", "q", "p", "v", "m"]
+
+NAMES: dict[Kind, str] = {
+    "t": r"t|time|times",
+    "q": r"q|x|y|z|pos|position|positions|r|coordinate|coordinates",
+    "p": r"p|px|py|pz|mom|momentum|momenta",
+    "v": r"v|vx|vy|vz|vel|velocity|velocities",
+    "m": r"m|mass|masses",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class States:
+    """Recorded states: t (f,), q and p or v (f, n), mass (n,) or None, and how finely they were written."""
+
+    t: Floats
+    q: Floats
+    p: Floats | None
+    v: Floats | None
+    mass: Floats | None
+    roundoff: float = 2.0**-53
+    """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
+
+
+def kind(name: str) -> Kind | None:
+    """What a column of this name holds: units in brackets, numbers and case do not count."""
+    plain = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
+    plain = re.sub(r"[\s_.]*\d*$", "", plain)
+    found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, plain)]
+    return found[0] if found else None
+
+
+def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
+    """Named columns as states.  StoreError says which are missing or do not fit together."""
+    parts: dict[Kind, list[Floats]] = {}
+    for name, values in columns.items():
+        what = kind(name)
+        if what is not None:
+            parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
+    for what, why in (("t", "times"), ("q", "positions")):
+        if what not in parts:
+            raise StoreError(f"{path}: no column of {why} among {_list(columns)}; name them, as t,q,v")
+    if "p" not in parts and "v" not in parts:
+        raise StoreError(f"{path}: no column of momenta or velocities among {_list(columns)}")
+    t = np.hstack(parts["t"])
+    if t.shape[1] != 1:
+        raise StoreError(f"{path}: {t.shape[1]} columns of times")
+    found = {what: np.hstack(parts[what]) for what in ("q", "p", "v") if what in parts}
+    n = found["q"].shape[1]
+    for what, values in found.items():
+        if values.shape != (len(t), n):
+            raise StoreError(f"{path}: {values.shape[1]} columns of {what} and {n} of q")
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
+    mass = parts.get("m")
+    return States(
+        t=t[:, 0],
+        q=found["q"],
+        p=found.get("p"),
+        v=found.get("v"),
+        mass=None if mass is None else np.hstack(mass)[0],
+        roundoff=roundoff,
+    )
+
+
+def _list(names: Columns) -> str:
+    return ", ".join(list(names)[:8]) + (" ..." if len(names) > 8 else "") if names else "none"
+
+
+def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:
+    """The columns of a table (f, c) under names; StoreError where the numbers of the two differ."""
+    if len(names) != values.shape[1]:
+        raise StoreError(f"{path}: {values.shape[1]} columns and {len(names)} names: {', '.join(names)}")
+    out: dict[str, Floats] = {}
+    for i, name in enumerate(names):
+        # columns may share a name, as the q of several particles do
+        out[name if name not in out else f"{name}_{i}"] = values[:, i]
+    return out

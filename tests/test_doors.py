@@ -1,0 +1,196 @@
+"""A function and a program in any language run beside the engines; every mistake in them is one line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from springcheck import engines
+from springcheck.cli import main
+
+EXAMPLES = Path(__file__).parent / "command-examples"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.chdir(tmp_path)
+    yield
+    engines._brought.clear()
+
+
+VERLET = """
+def leapfrog(q, p, h, force, mass):
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+"""
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:  # type: ignore[type-arg]
+    status = main(["run", "spring-uneven", "--method", "own:euler", "--json", *arguments])
+    out = capsys.readouterr()
+    assert status in (0, 1), out.err
+    return {"status": status} | json.loads(out.out)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["run", "spring", "--method", "own:euler", *arguments]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_a_students_function_is_found_to_be_its_scheme_and_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    found = run(capsys, "--stepper", "mine.py:leapfrog")
+    assert [one["scheme"] for one in found["runs"]] == ["explicit-euler", "velocity-verlet"]
+    assert found["status"] == 0
+    judged = {v["check"] for v in found["verdicts"] if v["method"] == "stepper:leapfrog" and v["passed"]}
+    assert {"step-defect", "closed-form"} <= judged
+
+
+def test_a_function_that_is_not_the_scheme_that_it_claims_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    assert run(capsys, "--stepper", "mine.py:leapfrog", "--scheme", "position-verlet")["status"] == 1
+
+
+def test_a_wrong_function_runs_among_the_engines_without_a_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET.replace("h * p / mass", "1.01 * h * p / mass"))
+    assert run(capsys, "--stepper", "mine.py:leapfrog")["runs"][1]["scheme"] == "unknown"
+    assert main(["plot", "spring-uneven.h5", "--quiet"]) == 0
+
+
+def test_arrays_serve_where_numbers_do_not(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (
+        "def f(q, p, h, force, mass):\n"
+        "    p[0] += h * force(q)[0]\n    q[0] += h * p[0] / mass[0]\n    return q, p\n"
+    )
+    (tmp_path / "mine.py").write_text(text)
+    assert run(capsys, "--stepper", "mine.py:f")["runs"][1]["scheme"] == "semi-implicit-euler"
+    # of several masses it moves the first alone
+    assert main(["run", "chain", "--stepper", "mine.py:f", "--quiet", "--method", "own:euler"]) == 1
+
+
+BAD_FUNCTIONS = [
+    (
+        "    return q.real_part, p",
+        "AttributeError: 'float' object has no attribute 'real_part' (mine.py, line 3)",
+    ),
+    ("    return q, p, h", "returned 3 values; a step returns (q, p)"),
+    ("    return None", "returned NoneType"),
+    ("    return q, undefined", "NameError: name 'undefined' is not defined (mine.py, line 3)"),
+    ("    raise ValueError('no\\nidea')", "ValueError: no idea (mine.py, line 3)"),
+    ("    return 'a', p", "ValueError"),
+    ("    return [1, 2, 3], p", "returned shapes (3,)"),
+]
+
+
+@pytest.mark.parametrize(("line", "said"), BAD_FUNCTIONS)
+def test_a_mistake_in_a_function_is_shown_with_its_line(
+    line: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(f"\ndef f(q, p, h, force, mass):\n{line}\n")
+    assert said in refused(capsys, "--stepper", "mine.py:f")
+
+
+def test_functions_that_cannot_be_found_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    assert "it has leapfrog" in refused(capsys, "--stepper", "mine.py:leapfroq")
+    assert "there is no such file" in refused(capsys, "--stepper", "other.py:f")
+    assert "no module" in refused(capsys, "--stepper", "nowhere_at_all:f")
+    (tmp_path / "broken.py").write_text("x = (\n")
+    assert "SyntaxError" in refused(capsys, "--stepper", "broken.py:f")
+
+
+def test_a_motion_that_explodes_is_said_to_explode(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text("def f(q, p, h, force, mass):\n    return q**9 + 10.0, p\n")
+    assert main(["run", "spring", "--stepper", "mine.py:f", "--method", "own:euler"]) in (0, 1)
+    assert "explodes" in " ".join(capsys.readouterr().out.split())
+
+
+def program(tmp_path: Path, body: str) -> str:
+    path = tmp_path / "engine"
+    path.write_text(f"#!/bin/sh\n{body}\n")
+    path.chmod(0o755)
+    return "mine=./engine {scene} {out}"
+
+
+ROWS = "0,0,1"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("echo no licence >&2; exit 3", "ended with status 3: no licence"),
+        ("true", "wrote no file {out}"),
+        (": > $2", "is empty"),
+        ("echo hello > $2", "holds no row of numbers"),
+        ("printf 't,q,p\\n0,0,1\\n1,x,2\\n' > $2", "line 3: 'x' is no number"),
+        ("printf 't,q,p\\n0,0,1\\n0.1,1\\n' > $2", "line 3: 2 numbers where there were 3"),
+        ("printf 't,q\\n0,0\\n' > $2", "no column of momenta or velocities"),
+        ("printf '0,0,1\\n' > $2", "have no names"),
+        ("printf 't,q,p\\n0,0,1\\n' > $2", "1 rows, too few"),
+        ("printf 't,q,p\\n0,0,1\\n0.2,0,1\\n' > $2", "row 2 is at t = 0.2, not 0.1"),
+        ("printf 't,q,p\\n0,5,1\\n0.1,0,1\\n' > $2", "its first row is not the scene's start"),
+        ("printf 't,q,p\\n0,0,1\\n0.1,nan,1\\n' > $2", "row 2 of q is not finite"),
+        ("printf 't,q,q2,p,p2\\n0,0,0,1,1\\n' > $2", "2 positions a row, not 1"),
+        ("printf 'PK\\003\\004xx' > $2", "NumPy cannot read it"),
+        ("exec sleep 20", "did not end within 1 s"),
+    ],
+)
+def test_whatever_a_program_does_wrong_is_one_line(
+    body: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in refused(capsys, "--command", program(tmp_path, body), "--timeout", "1")
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("nowhere", "not of the form"),
+        ("a=./nothing {scene} {out}", "there is no program './nothing'"),
+        ("a=cat {scene}", "no {out} among its arguments"),
+        ("a=cat '{scene} {out}", "No closing quotation"),
+    ],
+)
+def test_a_command_that_cannot_be_called_is_one_line(
+    command: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in refused(capsys, "--command", command)
+
+
+def test_a_program_in_c_is_judged_by_the_scheme_that_it_states(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    subprocess.run(
+        [compiler, "-O2", "-ffp-contract=off", "-o", "verlet", EXAMPLES / "verlet.c", "-lm"], check=True
+    )
+    command = ("--command", "c=./verlet {scene} {out}")
+    found = run(capsys, *command, "--scheme", "velocity-verlet")
+    assert found["status"] == 0
+    judged = {v["check"] for v in found["verdicts"] if v["method"] == "command:c" and v["passed"]}
+    assert {"start", "times", "step-defect", "closed-form", "frequency"} <= judged
+    assert run(capsys, *command, "--scheme", "rk4", "-o", "x.h5")["status"] == 1
+
+
+def test_a_program_in_awk_is_judged_too(capsys: pytest.CaptureFixture[str]) -> None:
+    if shutil.which("awk") is None:
+        pytest.skip("no awk")
+    command = f"awk=sh {EXAMPLES / 'euler.sh'} {{scene}} {{out}}"
+    assert run(capsys, "--command", command, "--scheme", "semi-implicit-euler")["status"] == 0
