@@ -140,7 +140,7 @@ def _without_a_run(file: Any) -> None:
         (_attribute("/", "scene", "title = 'another'"), "/"),
         (_attribute("/", "complete", False), "/"),
         (_without_a_run, f"/parameters/{OTHER}"),
-        (_attribute(Q, "units", "parsec"), f"/parameters/{LABEL}"),
+        (_attribute(Q, "units", "parsec"), Q),
     ],
 )
 def test_no_attribute_changes_unseen_when_the_seal_is_gone(

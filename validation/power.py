@@ -152,7 +152,9 @@ def torn(old: bytes, new: bytes | None, rng: random.Random) -> bytes:
     """A file of which only the old bytes were promised."""
     if new is None or new == old:
         return old
-    length = rng.choice([len(old), len(new), rng.randrange(len(new) + 1)])
+    # what was promised stays as long as nothing cuts it off
+    least, most = sorted((len(old), len(new)))
+    length = rng.choice([least, most, rng.randint(least, most)])
     made = bytearray(old[:length].ljust(length, b"\0"))
     share = rng.choice([0.0, 0.5, 1.0])
     for start in range(0, min(length, len(new)), BLOCK):

@@ -94,16 +94,18 @@ def _readable(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _doubts(file: str) -> list[dict[str, str]]:
-    """Say first of a store what of it cannot be trusted; the same for JSON."""
+    """What of a store cannot be trusted, for JSON; `_warn` says it first."""
     from springcheck import store
 
-    found = store.doubts(Path(file))
-    if found:
-        first = "; ".join(f"{one.place} {one.what}" for one in found[:3])
-        more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
-        said = plain(f"{file} is not what was written: {first}", 400)
-        print(f"springcheck: {said}{more}", file=sys.stderr)
-    return [{"place": one.place, "what": one.what} for one in found]
+    return [{"place": one.place, "what": one.what} for one in store.doubts(Path(file))]
+
+
+def _warn(file: str, doubts: Sequence[dict[str, str]]) -> None:
+    """Say in one line what of a store cannot be trusted, before anything of it is shown."""
+    if doubts:
+        first = "; ".join(f"{one['place']} {one['what']}" for one in doubts[:3])
+        more = f"; {len(doubts) - 3} more, which springcheck check names" if len(doubts) > 3 else ""
+        print(f"springcheck: {plain(f'{file} is not what was written: {first}', 400)}{more}", file=sys.stderr)
 
 
 def _interrupted(what: str) -> int:
@@ -227,6 +229,7 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     doubts = _doubts(source) if source else []
     with _progress(options, study.name) as progress:
         found = study.perform(options, progress)
+    _warn(str(source), doubts)
     if options.json:
         _document({**found.document(), **({"not_trusted": doubts} if source else {})})
     elif not options.quiet:
@@ -272,6 +275,7 @@ def _inspect(options: argparse.Namespace) -> int:
         raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
     doubts = _doubts(options.file)
     found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=options.rows)
+    _warn(options.file, doubts)
     if options.json:
         _document({"not_trusted": doubts, **inspect.document(found)})
     else:
@@ -300,6 +304,7 @@ def _identify(options: argparse.Namespace) -> int:
                 found[states.label] = files.identify_states(states, **stated)
             except SpringcheckError as error:
                 raise type(error)(f"{options.file}, {states.label}: {error}") from error
+    _warn(options.file, doubts)
     documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
     if options.json:
         document = documents[0] if len(documents) == 1 else {"identifications": documents}
@@ -317,6 +322,7 @@ def _plot(options: argparse.Namespace) -> int:
     path = Path(options.file)
     doubts = _doubts(options.file)
     written, notes = plot.draw(path, Path(options.output or folder.folder_of(path)))
+    _warn(options.file, doubts)
     if not options.quiet:
         for line in (*notes, *written):
             print(plain(line))
@@ -340,8 +346,7 @@ def _export(options: argparse.Namespace) -> int:
     from springcheck import store
 
     doubts = store.export(Path(options.file), options.label, Path(options.output))
-    if doubts:
-        _doubts(options.file)
+    _warn(options.file, [{"place": one.place, "what": one.what} for one in doubts])
     print(plain(f"{options.output}: {options.label}"))
     return int(bool(doubts))
 

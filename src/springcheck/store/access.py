@@ -180,6 +180,12 @@ def attributes(node: Any) -> dict[str, Any]:
     return found
 
 
+def attribute(node: Any, name: str) -> Any:
+    """One attribute of a node, or None."""
+    known = name.encode()
+    return _value(node, h5py.h5a.open(node.id, known), name) if h5py.h5a.exists(node.id, known) else None
+
+
 def _value(node: Any, known: Any, name: str) -> Any:
     shape, kind = known.shape, known.dtype
     if shape is None:

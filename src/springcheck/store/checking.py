@@ -195,6 +195,13 @@ def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Finding]:
             if access.attributes(dataset).get("sha256") != found[key]:
                 whole = False
                 yield Finding(place=at, what="does not match its sha256")
+    units = layout.UNITS[known.kind, known.units]
+    for name in (*known.kept, "time"):
+        at = f"/observables/{label}/" + (f"{name}/value" if name in known.kept else f"{known.kept[0]}/time")
+        node = access.find(file, at)
+        said = {} if node is None else access.attributes(node)
+        if said.get("unit") != units[name] or said.get("units") != units[name]:
+            yield Finding(place=at, what=f"its unit is not {units[name]}")
     if arrays and whole and digests.combined(found, columns) != known.sha256:
         yield Finding(place=place, what="its sha256 is not that of the numbers")
     if known.kind == "particles":

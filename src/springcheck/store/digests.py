@@ -8,10 +8,9 @@ a forger.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import h5py
 import numpy as np
 
 from springcheck.store import access
@@ -61,14 +60,11 @@ def of_table(group: Any) -> str:
 
 
 def of_run(file: Any, label: str) -> str:
-    """sha256 of all attributes of a trajectory, the digests of its arrays among them, and of its masses."""
-    total = hashlib.sha256()
-    for tree in ("parameters", "observables", "particles"):
-        group = access.group_at(file, f"{tree}/{label}")
-        for path, node in () if group is None else _below(group, set()):
-            total.update(f"{tree}{path}\n".encode() + _attributes(node))
-            if path == "/mass" and isinstance(node, h5py.Dataset):
-                total.update(access.column(access.dataset_at(group, "mass")).tobytes())
+    """sha256 of what is known of a trajectory, the digest of its numbers in it, and of its masses."""
+    total = hashlib.sha256(_attributes(access.group_at(file, f"parameters/{label}")))
+    mass = f"particles/{label}/mass"
+    if access.find(file, mass) is not None:
+        total.update(access.column(access.dataset_at(file, mass)).tobytes())
     return total.hexdigest()
 
 
@@ -88,18 +84,3 @@ def contents(file: Any, tables: Iterable[str]) -> dict[str, str]:
 def _attributes(node: Any, *left_out: str) -> bytes:
     kept = sorted((key, value) for key, value in access.attributes(node).items() if key not in left_out)
     return repr(kept).encode("utf-8", "surrogatepass")
-
-
-def _below(group: Any, seen: set[int], path: str = "") -> Iterator[tuple[str, Any]]:
-    """A group and all in it by path, each once, however it is linked."""
-    yield path, group
-    for name in sorted(access.members(group)):
-        node = group[name]
-        address = h5py.h5o.get_info(node.id).addr
-        if address in seen:
-            continue
-        seen.add(address)
-        if isinstance(node, h5py.Group):
-            yield from _below(node, seen, f"{path}/{name}")
-        elif isinstance(node, h5py.Dataset):
-            yield f"{path}/{name}", node

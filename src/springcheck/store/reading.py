@@ -89,7 +89,7 @@ def _run_of(path: Path) -> str:
     if found is not None:
         return found.run
     with contextlib.suppress(StoreError), opened(path) as file:
-        return str(access.attributes(file).get("run", ""))
+        return str(access.attribute(file, "run"))
     return ""
 
 
@@ -98,7 +98,7 @@ def opened(path: Path) -> Iterator[Any]:
     """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
     trust.trust(path, trust.OURS)
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-        marked = access.attributes(file).get("format")
+        marked = access.attribute(file, "format")
         if marked == layout.EXPORTED:
             raise StoreError(
                 f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
@@ -120,7 +120,7 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
     if found.collection is not None:
         with opened(found.collection) as file:
             listed += [
-                (known_of(file, label)[0].sequence, label, found.collection)
+                (_sequence(file, label), label, found.collection)
                 for label in access.children(file, "parameters")
             ]
     known = {label for _, label, _ in listed}
@@ -128,8 +128,15 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         kind, label = part.stem.split("-", 1)
         if kind == "run" and unquote(label) not in known:
             with opened(part) as file:
-                listed.append((known_of(file, unquote(label))[0].sequence, unquote(label), part))
+                listed.append((_sequence(file, unquote(label)), unquote(label), part))
     return {label: source for _, label, source in sorted(listed)}
+
+
+def _sequence(file: Any, label: str) -> int:
+    """The place of a trajectory among those of its run; 0 where it does not say."""
+    group = access.group_at(file, f"parameters/{label}")
+    found = None if group is None else access.attribute(group, "sequence")
+    return found if isinstance(found, int) else 0
 
 
 def known_of(file: Any, label: str) -> tuple[Record, dict[str, Any]]:
