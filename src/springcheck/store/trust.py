@@ -82,7 +82,8 @@ def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
         done = subprocess.run(
             [sys.executable, "-P", "-m", MODULE, kind, str(path), str(int(limit) + 1), str(MEMORY)],
             capture_output=True,
-            timeout=2 * limit,
+            # on a busy machine it waits longer than it works, and work is what is limited
+            timeout=6 * limit,
             check=False,
             stdin=subprocess.DEVNULL,
             env={**os.environ, **threads, "PYTHONPATH": paths},
