@@ -4,6 +4,7 @@ piece is kept as it is finished."""
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import cli, store
+from springcheck import cli, engines, store
 from springcheck.physics import scenefile
 from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.precision import measure as precision
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
 
@@ -73,3 +75,28 @@ def test_a_senseless_number_of_workers_is_refused(number: str, capsys: pytest.Ca
         cli.main(["extremes", "--workers", number])
     assert refused.value.code == 2
     assert "from 1 to 4096" in capsys.readouterr().err
+
+
+def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_path: Path) -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    labels = [engines.parse(name) for name in OWN]
+    began = os.times().children_user
+    many = precision.record(scene, labels, tmp_path / "two.h5", budget=6.0, team=Processes(2))
+    # CPU time of children: the workers have run, and have ended
+    assert os.times().children_user > began
+    alone = precision.record(scene, labels, tmp_path / "one.h5", budget=4.0)
+
+    def errors(study: Any) -> dict[Any, Any]:
+        return {(x.method, x.steps): x.accuracy for x in study.points if x.complete}
+
+    both = errors(many).keys() & errors(alone).keys()
+    assert len(both) >= 6
+    assert all(errors(many)[place] == errors(alone)[place] for place in both)
+    for method in OWN:
+        points = [point for point in many.of(method) if point.complete]
+        timed = [bool(point.run_repeats) for point in points]
+        # coarse to fine: those that are timed come first, no point stands twice
+        assert timed == sorted(timed, reverse=True)
+        assert len({point.steps for point in points}) == len(points)
+    assert any(point.run_repeats for point in many.points)
+    assert precision.stored(tmp_path / "two.h5").points == many.points

@@ -64,7 +64,12 @@ def measure(
     if not usable:
         reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
         raise MethodError(f"none of these methods is here: {reasons}")
-    work = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
+    work = [
+        replace(piece, cost=_cost(label))
+        for label, piece in zip(
+            usable, each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS), strict=True
+        )
+    ]
     if not methods:
         work.append(Piece(key="refusals", what="refusals", measure=refusals.cells, form=CELLS))
     kept = kept or Keeper()
@@ -75,6 +80,13 @@ def measure(
         left_out=tuple(left_out),
         taken_up=kept.taken_up,
     )
+
+
+def _cost(label: Label) -> float:
+    """About how many seconds the cells of a method take: its longest runs, or the contexts of a platform."""
+    steps = sum(spec.steps for spec in grid.lengths(label))
+    contexts = 0 if label.platform in ("", "Reference") else 100
+    return steps * engines.engine(label.engine).step_seconds + contexts * 0.25
 
 
 def _absence(label: Label) -> str | None:

@@ -13,21 +13,24 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from math import ceil, isfinite
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from math import isfinite
 from pathlib import Path
-from time import get_clock_info, perf_counter
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from springcheck import engines, simulate
-from springcheck.engines.contract import Label, Stopped
+from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
+from springcheck.studies import team as teams
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import Keeper
 from springcheck.studies.precision import fits
@@ -40,30 +43,18 @@ from springcheck.studies.precision.sweeps import (
     affordable,
     begin,
     blank,
-    repeats,
     take,
     to_time,
-    warm_ups,
 )
+from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.studies.study import Progress
+from springcheck.studies.team import ALONE, Team
 
 BUDGET = 75.0
 """Seconds that a study takes unless it is told otherwise."""
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 """Errors for which the cheapest way is looked up."""
-
-TICKS = 1000
-"""A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
-
-STARTS = 0.02
-"""Seconds that starting several short runs for one timing may take."""
-
-READS = 3
-"""Timings of a run with every step read; one where starting is slow."""
-
-READ_SECONDS = 0.1
-"""Longest run that is also timed with every step read: reading costs the same at each step."""
 
 CUT_OFF = "cut off"
 """Outcome of the first point that a study did not come to."""
@@ -90,20 +81,28 @@ def study(
     sweeps = [begin(scene, label, known) for label in labels]
     kept = kept or Keeper(progress=progress)
     able = _open(sweeps)
-    before = [_take_up(sweep, kept) for sweep in able]
+    ahead: Ahead = {}
+    before = [_take_up(sweep, kept, ahead) for sweep in able]
     taken_up = sum(len(sweep.points) for sweep in able)
+    spent = max(before, default=0.0)
+    if kept.team.workers > 1:
+        spent += _errors_first(scene, able, kept, ahead, budget, spent)
     # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
-    began = perf_counter() - max(before, default=0.0)
+    began = perf_counter() - spent
 
     def tell(what: str) -> None:
         if kept.progress:
             kept.progress(min(perf_counter() - began, budget), budget, what)
 
     while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
-        _level(ready, known, tell)
+        _level(ready, known, tell, ahead)
         for sweep in ready:
             form = points_of(scene)
             kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
+    for sweep in _open(sweeps):
+        while (point := ahead.get(_place(sweep))) is not None and sweep.scene is not None:
+            # its errors are known; its time was not to be had
+            take(sweep, point)
     for sweep in _open(sweeps):
         sweep.points.append(blank(sweep, CUT_OFF, f"the budget of {budget:g} s ends before it"))
     return _put_together(
@@ -118,14 +117,71 @@ def study(
     )
 
 
-def _take_up(sweep: Sweep, kept: Keeper) -> float:
+Ahead = dict[tuple[str, int | None, float | None], Point]
+"""Points whose errors were measured before their turn to be timed, by method, steps and tolerance."""
+
+
+def _place(sweep: Sweep) -> tuple[str, int | None, float | None]:
+    point = blank(sweep, "")
+    return point.method, point.steps, point.tolerance
+
+
+def _errors_first(
+    scene: Scene, sweeps: list[Sweep], kept: Keeper, ahead: Ahead, budget: float, before: float
+) -> float:
+    """The errors of these sweeps by the workers, within half of the budget -> seconds of each that they took.
+
+    Times are not theirs to measure.  They have ended when this returns: seconds are measured with nothing of
+    ours beside them.
+    """
+    left = [x for x in sweeps if x.scene is not None and ahead.get(_place(x)) is None]
+    share = budget / 2 * kept.team.workers / max(1, len(left))
+    spent = 0.0
+    parts = [partial(errors_ahead, scene, sweep.label, sweep.points, share) for sweep in left]
+    with closing(kept.team.carried_out(parts)) as measured:
+        for j, points in measured:
+            sweep = left[j]
+            ahead.update({(x.method, x.steps, x.tolerance): x for x in points})
+            spent += sum(point.spent for point in points) / kept.team.workers
+            kept.keep(
+                points_of(scene), str(sweep.label), [*sweep.points, *points], study_seconds=before + spent
+            )
+            if kept.progress:
+                kept.progress(min(before + spent, budget), budget, f"{sweep.label}, errors")
+    return spent
+
+
+def errors_ahead(scene: Scene, label: Label, done: Sequence[Point], seconds: float) -> list[Point]:
+    """The points of a method that follow on those that are done, with errors and without times."""
+    known = truth(scene)
+    sweep = begin(scene, label, known)
+    for point in done:
+        if sweep.scene is not None:
+            take(sweep, point)
+    found: list[Point] = []
+    began = last = perf_counter()
+    while sweep.scene is not None:
+        point = replace(_errors(sweep, known), spent=perf_counter() - last)
+        found.append(point)
+        take(sweep, point)
+        now = perf_counter()
+        # the next one has twice as many steps
+        if not point.complete or now - began + 2 * (now - last) > seconds:
+            break
+        last = now
+    return found
+
+
+def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
     """Go on where an earlier call ended -> the seconds that it had taken."""
     points = kept.finished(POINTS, str(sweep.label))
     if points is None:
         return 0.0
     for point in points:
+        if point.complete and not point.run_repeats:
+            ahead[point.method, point.steps, point.tolerance] = point
         # what the end of that call cut off is this one's to measure
-        if point.outcome != CUT_OFF:
+        elif point.outcome != CUT_OFF:
             take(sweep, point)
     return float(kept.attribute(POINTS, str(sweep.label), "study_seconds"))
 
@@ -138,6 +194,7 @@ def record(
     budget: float = BUDGET,
     force: bool = False,
     progress: Progress | None = None,
+    team: Team = ALONE,
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
@@ -146,7 +203,7 @@ def record(
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
     command = keeper.command("precision", labels, scene.digest)
-    with keeper.kept(path, command, force=force, progress=progress) as kept:
+    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
         found = study(scene, labels, budget=budget, kept=kept)
         for summary in found.methods:
             form = points_of(scene)
@@ -164,7 +221,15 @@ def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
     scene = scenefile.load_scene(options.scene)
     labels, left = choose(scene, options.method)
     path = Path(options.output or f"{scene.name}-precision.h5")
-    found = record(scene, labels, path, budget=budget, force=options.force, progress=progress)
+    found = record(
+        scene,
+        labels,
+        path,
+        budget=budget,
+        force=options.force,
+        progress=progress,
+        team=teams.of(options),
+    )
     return replace(found, left_out=tuple(left), path=path)
 
 
@@ -172,22 +237,22 @@ def _open(sweeps: list[Sweep]) -> list[Sweep]:
     return [sweep for sweep in sweeps if sweep.scene is not None]
 
 
-def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
+def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead: Ahead) -> None:
     """The next point of each of these sweeps: errors one by one, then timings in turn."""
     points: list[Point] = []
     spent: list[float] = []
     for sweep in sweeps:
         tell(f"{sweep.label}, errors")
         began = perf_counter()
-        points.append(_errors(sweep, known))
+        points.append(ahead.get(_place(sweep)) or _errors(sweep, known))
         spent.append(perf_counter() - began)
     tell(f"timing {len(sweeps)} methods in turn")
     clocks = [
-        _Clock(sweep=sweep, scene=to_time(known.scene, sweep))
+        Clock(sweep=sweep, scene=to_time(known.scene, sweep))
         for sweep, point in zip(sweeps, points, strict=True)
         if point.complete
     ]
-    _time(clocks)
+    take_turns(clocks)
     timed = {id(clock.sweep): clock for clock in clocks}
     for sweep, point, seconds in zip(sweeps, points, spent, strict=True):
         clock = timed.get(id(sweep))
@@ -215,86 +280,6 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
     if not (np.isfinite(found.largest) and np.isfinite(found.energy)):
         return blank(sweep, "diverged", "the error is beyond the range of numbers")
     return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
-
-
-def tick() -> float:
-    """The smallest difference that the clock shows [s]."""
-    seen = []
-    for _ in range(100):
-        began = perf_counter()
-        now = perf_counter()
-        while now == began:
-            now = perf_counter()
-        seen.append(now - began)
-    return max(min(seen), get_clock_info("perf_counter").resolution)
-
-
-@dataclass(kw_only=True, eq=False)
-class _Clock:
-    """The timings of one point while they are taken."""
-
-    sweep: Sweep
-    scene: Scene
-    copies: int = 1
-    count: int = 0
-    runs: list[simulate.Bare] = field(default_factory=list)
-    reads: list[float] = field(default_factory=list)
-    gave_up: str = ""
-    spent: float = 0.0
-
-    def warm_up(self, shortest: float) -> None:
-        """Find how many runs fit into one timing, and how many timings are worth taking."""
-        expected = self.sweep.cost * self.sweep.growth
-        if warm_ups(expected + self.sweep.start):
-            warm = self._bare()
-            expected = warm.timing.run if warm else 0.0
-        most = ceil(STARTS / max(self.sweep.start, 1e-9))
-        self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
-        self.count = repeats(expected + self.sweep.start)
-
-    def turn(self, number: int) -> None:
-        """One repeat."""
-        run = self._bare(copies=self.copies)
-        if run:
-            self.runs.append(run)
-        reads = READS if self.sweep.start < STARTS else 1
-        if number < reads and self.sweep.read * self.sweep.growth <= READ_SECONDS:
-            read = self._bare(copies=self.copies, read=True)
-            if read:
-                self.reads.append(read.timing.run)
-
-    def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
-        began = perf_counter()
-        try:
-            return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
-        except Stopped as stop:
-            self.gave_up = str(stop)
-            return None
-        finally:
-            self.spent += perf_counter() - began
-
-    def onto(self, point: Point) -> Point:
-        """The point with its timings."""
-        if self.gave_up:
-            return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
-        return replace(
-            point,
-            run_repeats=tuple(run.timing.run for run in self.runs),
-            start_repeats=tuple(run.timing.start for run in self.runs),
-            read_repeats=tuple(self.reads),
-            force_calls=self.runs[0].force_calls,
-        )
-
-
-def _time(clocks: list[_Clock]) -> None:
-    """Warm up, then repeat in turn: A B C A B C."""
-    shortest = TICKS * tick()
-    for clock in clocks:
-        clock.warm_up(shortest)
-    for number in range(max((clock.count for clock in clocks), default=0)):
-        for clock in clocks:
-            if number < clock.count and not clock.gave_up:
-                clock.turn(number)
 
 
 def stored(path: str | Path) -> PrecisionStudy:

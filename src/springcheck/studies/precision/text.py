@@ -32,6 +32,9 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
             out.append(
                 plain(f"  {method.method}: floor expected near {error:.0e}, {steps:.0e} steps{longer} a run")
             )
+    untimed = sum(point.complete and not point.run_repeats for point in study.points)
+    if untimed:
+        out.append(plain(f"  {untimed} points have errors alone: workers measure no times"))
     rest = [point for point in study.points if not point.complete]
     if rest:
         out += [plain(), plain("Not measured:")]

@@ -1,0 +1,105 @@
+"""Timings of points, taken in turn, so that a machine that slows down slows all methods alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import ceil
+from time import get_clock_info, perf_counter
+
+from springcheck import simulate
+from springcheck.engines.contract import Stopped
+from springcheck.physics.scene import Scene
+from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.sweeps import PLANNED, Sweep, repeats, warm_ups
+
+TICKS = 1000
+"""A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
+
+STARTS = 0.02
+"""Seconds that starting several short runs for one timing may take."""
+
+READS = 3
+"""Timings of a run with every step read; one where starting is slow."""
+
+READ_SECONDS = 0.1
+"""Longest run that is also timed with every step read: reading costs the same at each step."""
+
+
+def tick() -> float:
+    """The smallest difference that the clock shows [s]."""
+    seen = []
+    for _ in range(100):
+        began = perf_counter()
+        now = perf_counter()
+        while now == began:
+            now = perf_counter()
+        seen.append(now - began)
+    return max(min(seen), get_clock_info("perf_counter").resolution)
+
+
+@dataclass(kw_only=True, eq=False)
+class Clock:
+    """The timings of one point while they are taken."""
+
+    sweep: Sweep
+    scene: Scene
+    copies: int = 1
+    count: int = 0
+    runs: list[simulate.Bare] = field(default_factory=list)
+    reads: list[float] = field(default_factory=list)
+    gave_up: str = ""
+    spent: float = 0.0
+
+    def warm_up(self, shortest: float) -> None:
+        """Find how many runs fit into one timing, and how many timings are worth taking."""
+        expected = self.sweep.cost * self.sweep.growth
+        if warm_ups(expected + self.sweep.start):
+            warm = self._bare()
+            expected = warm.timing.run if warm else 0.0
+        most = ceil(STARTS / max(self.sweep.start, 1e-9))
+        self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
+        self.count = repeats(expected + self.sweep.start)
+
+    def turn(self, number: int) -> None:
+        """One repeat."""
+        run = self._bare(copies=self.copies)
+        if run:
+            self.runs.append(run)
+        reads = READS if self.sweep.start < STARTS else 1
+        if number < reads and self.sweep.read * self.sweep.growth <= READ_SECONDS:
+            read = self._bare(copies=self.copies, read=True)
+            if read:
+                self.reads.append(read.timing.run)
+
+    def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
+        began = perf_counter()
+        try:
+            return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+        except Stopped as stop:
+            self.gave_up = str(stop)
+            return None
+        finally:
+            self.spent += perf_counter() - began
+
+    def onto(self, point: Point) -> Point:
+        """The point with its timings."""
+        if self.gave_up:
+            return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
+        return replace(
+            point,
+            run_repeats=tuple(run.timing.run for run in self.runs),
+            start_repeats=tuple(run.timing.start for run in self.runs),
+            read_repeats=tuple(self.reads),
+            force_calls=self.runs[0].force_calls,
+        )
+
+
+def take_turns(clocks: list[Clock]) -> None:
+    """Warm up, then repeat in turn: A B C A B C."""
+    shortest = TICKS * tick()
+    for clock in clocks:
+        clock.warm_up(shortest)
+    for number in range(max((clock.count for clock in clocks), default=0)):
+        for clock in clocks:
+            if number < clock.count and not clock.gave_up:
+                clock.turn(number)
