@@ -113,11 +113,15 @@ def test_errors_of_the_size_of_a_coarse_force_but_in_positions_are_not_taken_for
     # the same size in drifts is no force's: explicit Euler moves positions by velocities alone
     m, k, h = 3.7, 2.9, 0.1
     noise = np.random.default_rng(3)
-    for where in ("force", "position"):
+    for where in ("force", "noise", "position"):
         q, p = [0.3], [0.7]
         for _ in range(200):
             off = 2.0**-32 * noise.uniform(-1, 0)
-            force, shift = -k * q[-1] + (off if where == "force" else 0), off * (where == "position")
+            force, shift = -k * q[-1], off * (where == "position")
+            if where == "force":
+                force = np.floor(force * 2.0**32) / 2.0**32
+            if where == "noise":
+                force += off
             q.append(q[-1] + h * p[-1] / m + h * shift)
             p.append(p[-1] + h * force)
         found = identify(h * np.arange(201), np.array(q), np.array(p), mass=m)

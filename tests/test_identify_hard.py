@@ -18,21 +18,6 @@ from springcheck.identify import Identification, identify
 
 M, K, H = 3.7, 2.9, 0.1
 STATED = {"mass": M, "stiffness": K}
-PASSING = {
-    "explicit friction",
-    "two_half_steps",
-    "single_precision_are_not_taken",
-    "a diagonal in space",
-    "a pair without a wall",
-}
-
-
-@pytest.fixture(autouse=True)
-def _pending(request: pytest.FixtureRequest) -> None:
-    if not any(name in request.node.name for name in PASSING):
-        request.applymarker(pytest.mark.xfail(run=False, reason="defects that are known and being mended"))
-
-
 State = tuple[float, float]
 Step = Callable[[int, float, float], State]
 
@@ -77,10 +62,10 @@ FALSE_FITS: dict[str, tuple[Step, str]] = {
     ),
     "noise in the force": (verlet(lambda i, q, p: -K * q + 1e-8 * noise[i]), "noise|irregular"),
     "a cubic force of 3e-7": (verlet(lambda i, q, p: -K * q * (1 + 3e-7 * q * q)), "cubic|anharmonic"),
-    "a force that is clipped": (verlet(lambda i, q, p: max(-K * q, -1.1)), "force|anharmonic"),
+    "a force that is clipped": (verlet(lambda i, q, p: max(-K * q, -1.0)), "force|anharmonic"),
     "one kick": (
         lambda i, q, p: verlet(lambda j, x, y: -K * x)(i, q, p + (1e-8 if i == 137 else 0)),
-        "frame 13[789]",
+        "frames? 13[789]",
     ),
 }
 
@@ -95,7 +80,7 @@ def test_a_force_with_a_systematic_error_is_no_arithmetic(name: str) -> None:
 
 def assert_said(found: Identification, words: str) -> None:
     """The first sentence says it."""
-    assert re.search(words, found.statement), (words, found.statement)
+    assert re.search(words, found.statement, re.IGNORECASE), (words, found.statement)
 
 
 @pytest.mark.parametrize("drift", [1e-12, 1e-9, 1e-6, 1e-3])
@@ -178,9 +163,15 @@ def test_on_damped_motion_the_scheme_is_right_or_listed_and_never_another(name: 
     blind = identify(t, q, p, mass=M)
     assert blind.scheme in (None, scheme), blind
     assert scheme in {x.scheme for x in blind.candidates}
+    # implicit Euler with a weaker friction is the same map on the same spring: the friction tells them apart
     stated = identify(t, q, p, **STATED)
-    assert (stated.scheme, stated.fits) == (scheme, True), stated
+    assert stated.scheme in (None, scheme)
+    assert stated.fits
     assert stated.stiffness == pytest.approx((K,), rel=1e-10)
+    c = 0.005 * M / H if name == "weak friction" else C
+    both = identify(t, q, p, **STATED, friction=c)
+    assert (both.scheme, both.fits) == (scheme, True), both
+    assert both.friction == pytest.approx((c / M,), rel=1e-9)
 
 
 def test_the_friction_law_that_the_numbers_assume_is_said() -> None:
@@ -202,9 +193,10 @@ def test_velocity_verlet_with_implicit_friction_is_not_velocity_verlet_of_anothe
 
     t, q, p = march(step)
     found = identify(t, q, p, mass=M)
-    for one in found.candidates:
-        if one.scheme == "velocity-verlet":
-            assert one.stiffness == pytest.approx((K,), rel=1e-9)
+    assert found.scheme in (None, "velocity-verlet")
+    implicit = next(x for x in found.candidates if "implicit" in x.law)
+    assert implicit.stiffness == pytest.approx((K,), rel=1e-9)
+    assert found.stiffness is None or np.isnan(found.stiffness[0])
     assert identify(t, q, p, **STATED).scheme in (None, "velocity-verlet")
 
 
@@ -422,4 +414,4 @@ def test_no_sentence_refutes_itself_or_comes_twice(spoil: str) -> None:
     if spoil == "dropped":
         assert_said(found, "frame 272")
     if spoil == "restart":
-        assert_said(found, "frame 20[01]")
+        assert_said(found, "frames? 20[01]")

@@ -81,19 +81,25 @@ def identify(
     v: Any = None,
     mass: Any = None,
     stiffness: float | None = None,
+    friction: float | None = None,
     step: float | None = None,
 ) -> Identification | dict[str, Identification]:
-    """Which scheme made a trajectory: of arrays t, q and p (or v), of a `Trajectory`, or of a file.
+    """Which scheme made a trajectory, and what is wrong: of arrays t, q and p (or v), of a `Trajectory`, of a
+    file, or of an integrator ``step(q, p, h, force, mass) -> (q, p)``.
 
     t (f,), q, p and v (f, n) or (f,); a file gives one identification for each of its trajectories, by label.
-    Raises IdentificationError where the states say nothing.
+    `mass`, `stiffness`, `friction` (c of F = -c v) and `step` are what is stated.  Raises IdentificationError
+    where the states say nothing.
     """
     from springcheck.identify import files
-    from springcheck.identify.report import identify as of_states
+    from springcheck.identify.report import identify_arrays as of_states
+    from springcheck.identify.stepper import identify_stepper
 
     if isinstance(found, str | Path):
-        stated = {"mass": mass, "stiffness": stiffness, "step": step}
+        stated = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
         return {one.label: files.identify_states(one, **stated) for one in files.read(Path(found))}
+    if callable(found):
+        return identify_stepper(found)
     t = found
     if isinstance(found, Trajectory):
         t, q, p = found.t, found.q, found.p
@@ -104,7 +110,7 @@ def identify(
     assert of_q is not None
     m = None if mass is None else np.broadcast_to(np.asarray(mass, np.float64), of_q.shape[1:])
     times = np.asarray(t, np.float64)
-    return of_states(times, of_q, of_p, v=of_v, mass=m, stiffness=stiffness, step=step)
+    return of_states(times, of_q, of_p, v=of_v, mass=m, stiffness=stiffness, friction=friction, step=step)
 
 
 def exact(scene: Scene | str | Path) -> Trajectory:

@@ -9,8 +9,8 @@ A scheme is named only where the states exclude the others.  Where they do not, 
 with what would tell them apart.
 """
 
-from springcheck.identify.report import identify
-from springcheck.identify.result import Candidate, Identification
+from springcheck.identify.report import identify_arrays as identify
+from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.stepper import identify_stepper, load_stepper
 
-__all__ = ["Candidate", "Identification", "identify", "identify_stepper", "load_stepper"]
+__all__ = ["Candidate", "Explanation", "Identification", "identify", "identify_stepper", "load_stepper"]

@@ -8,10 +8,14 @@ import numpy as np
 
 from springcheck.arrays import Extended, Floats
 from springcheck.identify import coarse
+from springcheck.identify.coarse import QUANTUM
+from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.match import Match, frame
+from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.schemes import SCHEMES, roundings
+from springcheck.identify.starts import frame
+
+__all__ = ["QUANTUM", "Defect", "defect", "misses", "predicted"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
@@ -31,18 +35,30 @@ class Defect:
     note: str = ""
 
 
-def predicted(match: Match, found: Map) -> Extended:
-    """The map between frames that a match predicts, extended precision, in the frame of `found`."""
+def predicted(match: Match, found: Map, slip: float = 0.0) -> Extended:
+    """The map between frames that a match predicts, extended precision, in the frame of `found`; for steps
+    longer by the share `slip`."""
     one = np.ones(1, dtype=np.longdouble)
     out = frame(
-        SCHEMES[match.scheme],
-        match.a * one,
-        match.friction * one,
-        match.log_mass * one,
+        FAMILIES[match.family],
+        match.a * one * (1 + slip) ** 2,
+        match.g * one * (1 if FAMILIES[match.family].held else 1 + slip),
+        match.log_mass * one - np.log1p(slip),
         np.array([float(match.stride)]),
         found.size,
     )
     return np.asarray(out[0])
+
+
+def misses(match: Match, found: Map) -> Extended:
+    """What each frame differs by from the step of the one before, (f - 1, 2), in the frame of `found`."""
+    b = predicted(match, found)
+    out = found.z[1:] - found.z[:-1] @ b.T
+    if found.slips is not None:
+        d = 1e-7
+        change = (predicted(match, found, d) - predicted(match, found, -d)) / (2 * d)
+        out = out - found.slips[:, None] * (found.z[:-1] @ change.T)
+    return np.asarray(out)
 
 
 def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -> Defect:
@@ -51,10 +67,11 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
     `visible` says that the scheme's own error stands far above the defect, and no other scheme has it;
     only then is more than plain rounding explained, and never to an exact flow.
     """
-    scheme = SCHEMES[match.scheme]
+    scheme = FAMILIES[match.family]
     b = predicted(match, found)
     z, centre = found.z, found.centre / found.size
-    missing = np.abs(z[1:] - z[:-1] @ b.T).astype(np.float64)
+    signed = misses(match, found).astype(np.float64)
+    missing = np.abs(signed)
     # sums of absolute values: what a rounding of either term is relative to
     size = np.abs(z[:-1]) @ np.abs(b).T + np.abs(z[1:]) + 2 * np.abs(centre)
     if match.stride > 1:
@@ -65,11 +82,16 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
         orbit = np.sqrt(np.max(np.sum(z**2, axis=1)))
         size = size + orbit * np.sqrt(abs(match.a)) * record.clock / 2.0**-52
     size = size.astype(np.float64)
+    if record.parts is not None:
+        summed = np.stack(
+            [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1
+        )
+        size = size + 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
     # a velocity that is a difference of positions over the step carries their rounding, eps q / h
     ratio = float(found.size[0] / found.size[1]) * match.stride
     position = np.abs(z[1:, 0] + centre[0]).astype(np.float64)
     difference = np.stack([np.zeros(len(size)), 2 * ratio * position], axis=1)
-    path = (4 if scheme.flow else roundings(scheme)) * match.stride
+    path = (4 if scheme.flow else scheme.path) * match.stride
     ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
     if ulp <= min(path, 4 + 2 * np.sqrt(match.stride)) or (ulp <= path and visible):
@@ -83,9 +105,9 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
     if record.fine:
         if scheme.flow or not visible:
             return Defect(ulp=ulp, precision="")
-        name, note = coarse.kinematic(record, j, found, match)
-        if not name:
-            name, note = coarse.sized(record, j, found, match, missing)
+        name, note = coarse.kinematic(record, j, found, match) or coarse.sized(
+            record, j, found, match, signed
+        )
         return Defect(ulp=ulp, precision=name, note=note)
     quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
     quanta = quanta / found.size.astype(np.float64)

@@ -10,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from springcheck.arrays import Extended, Floats, Reals
+from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.match import Match, power, unit_matrix
+from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.schemes import SCHEMES, magnitude_step, roundings
+from springcheck.identify.starts import power
+from springcheck.schemes import SCHEMES, magnitude_step
 
 QUANTUM = 2.0**-32
 """Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
@@ -38,28 +41,39 @@ STOERMER = {
 before, after, or both: identities without a force, which hold to rounding however coarse the force is."""
 
 
+KICKED = {"explicit-euler": 1.0, "position-verlet": 0.5}
+"""Schemes of one kick a step that positions do not see at once, and the old velocity's share of the drift."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forces:
     """Forces read from positions alone, their noise, and how far they are off in the root mean square."""
 
     values: Floats
+    error: Floats
     noise: float
     relative: float
 
 
-def sized(record: Record, j: int, found: Map, match: Match, missing: Floats) -> tuple[str, str]:
+def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str]:
     """Precision and note where what single frames miss, (f-1, 2), has the size and place of a force's error.
 
     A force off by e in every kick shifts a frame by at most the sum of its kicks' shifts, carried on by
     the steps that follow; drifts add only the rounding of the state.
     """
+    if match.scheme not in SCHEMES:
+        return "", ""
+    missing = np.abs(signed)
+    biased = cut_off(found, match)
+    if not irregular(signed, np.concatenate([biased, np.ones((len(biased), 1))], axis=1)):
+        return "", ""
     kicks, steps = reach(found, match)
     z = found.z.astype(np.float64)
     position = found.size[0].astype(np.float64) + abs(float(found.centre[0]))
     orbit = np.sqrt(np.sum(z[1:] ** 2, axis=1) + np.sum(z[:-1] ** 2, axis=1)) + abs(
         float(found.centre[0] / found.size[0])
     )
-    path = roundings(SCHEMES[match.scheme]) * match.stride
+    path = FAMILIES[match.family].path * match.stride
     # a position and a product are rounded; a stiffness too, but that is the same in every kick
     relative = 2 * 2.0**-24 * abs(match.a) * orbit
     quantum = np.zeros(len(orbit))
@@ -95,7 +109,7 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
         stiffness=np.diag(a), rate=rate if match.friction else None,
     )  # fmt: skip
     numbers = np.arange(match.stride, dtype=np.float64)
-    unit = np.broadcast_to(unit_matrix(SCHEMES[match.scheme], match.a * one, rate), (match.stride, 2, 2))
+    unit = np.broadcast_to(FAMILIES[match.family].unit(match.a * one, match.g * one), (match.stride, 2, 2))
     # q in units of its size, v of the interval's: v h grows by the stride and the ratio of the sizes
     up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
     carried: Extended = np.sum(np.abs(power(unit, numbers)), axis=0)
@@ -104,11 +118,16 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
     return kicks, steps
 
 
-def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str]:
+def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str] | None:
     """Precision and note where positions and velocities of every step fit together to rounding, so that
-    only the force can be coarse; its own numbers then show how."""
+    only the force can be coarse; its own numbers then show how, and are none where they show nothing.
+
+    None where forces cannot be read so finely that their quanta would show.
+    """
     forces = _forces(record, j, found, match)
-    if forces is None or forces.relative > COARSEST:
+    if forces is None:
+        return None
+    if forces.relative > COARSEST:
         return "", ""
     single = np.spacing(np.abs(forces.values).astype(np.float32)).astype(np.float64)
     fixed = np.full(len(forces.values), QUANTUM)
@@ -127,35 +146,102 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
         clear = forces.noise < 0.05 * float(np.median(quantum))
         if clear and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
             return name, f"states are double, and forces are {note}"
-    name = "mixed" if 2.0**-28 <= forces.relative <= 2.0**-21 else "coarse force"
-    return name, f"states are double, but forces are off by {forces.relative:.1e} of their size"
+    if not forces.noise < 0.05 * float(np.median(single)):
+        return None
+    # where no mass is known forces are not known but for a factor, and quanta cannot show
+    if record.mass is None and 2.0**-28 <= forces.relative <= 2.0**-21 and irregular(forces.error[:, None]):
+        return "mixed", f"states are double, but forces are off by {forces.relative:.1e} of their size"
+    return "", ""
+
+
+OUTLIER = 6.0
+"""Largest error of bounded rounding over the root mean square of its neighbours': 1.7 where uniform."""
+
+LAGS = range(2, 26)
+"""Frames at whose distance errors are correlated; neighbours share a force in some schemes."""
+
+
+def irregular(missing: Floats, bias: Floats | None = None) -> bool:
+    """Whether what frames miss (f, c) is white, as rounding is, once it is freed of a bias (f, b).
+
+    What goes with position, velocity, their powers, time, parity or a neighbour comes back after some
+    frames; the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
+    """
+    if len(missing) < 4 * LAGS.stop:
+        return True
+    limit = float(chdtri(len(LAGS), 1e-7))
+    for row in missing.T:
+        x = row - np.mean(row) if bias is None else row - bias @ np.linalg.lstsq(bias, row, rcond=None)[0]
+        total = float(x @ x)
+        if total == 0:
+            continue
+        # rounding is bounded: one error that towers above its neighbours is none
+        blocks = np.array_split(np.abs(x), 8)
+        if any(np.max(b) > OUTLIER * np.sqrt(np.mean(b**2)) for b in blocks if len(b) > 2 * OUTLIER):
+            return False
+        if len(x) * sum((float(x[k:] @ x[:-k]) / total) ** 2 for k in LAGS) > limit:
+            return False
+    return True
+
+
+def cut_off(found: Map, match: Match) -> Floats:
+    """What forces that are cut off towards zero, in each of a frame's steps, do to a frame: (f - 1, 2)."""
+    unit = FAMILIES[match.family].unit(
+        np.array([match.a], np.longdouble), np.array([match.g], np.longdouble)
+    )[0]
+    unit = unit.astype(np.float64)
+    up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
+    state = found.z[:-1].astype(np.float64) / up
+    out = np.zeros_like(state)
+    rest = float(found.centre[0] / found.size[0])
+    for _ in range(match.stride):
+        out = out @ unit.T
+        out[:, 1] -= np.sign(state[:, 0] + rest)
+        state = state @ unit.T
+    return np.asarray(out * up)
 
 
 def _forces(record: Record, j: int, found: Map, match: Match) -> Forces | None:
     """Forces on the positions of all frames but the first and the last, None where v does not belong to q."""
-    sides = STOERMER.get(match.scheme)
-    if sides is None or match.stride != 1 or match.friction != 0:
+    if match.stride != 1 or match.friction != 0 or match.scheme not in (*STOERMER, *KICKED):
         return None
     h = record.interval
     mass = 1.0 if record.mass is None else float(record.mass[j])
     q = found.z[:, 0] * found.size[0]
     v = found.z[:, 1] * found.size[1] / h
     centre = float(np.abs(found.centre[0]))
-    before, after = (q[1:-1] - q[:-2]) / h, (q[2:] - q[1:-1]) / h
-    middle = q[1:-1]
-    position = np.abs(middle).astype(np.float64) + centre
-    force = mass * (after - before) / h
-    # four roundings each of positions over the step and of the velocity, and the identity's own few
-    unit = 8 * 2.0**-52 * (np.abs(v[1:-1]).astype(np.float64) + 2 * position / abs(float(h)))
-    off = v[1:-1] - (sides[0] * before + sides[1] * after) / sum(sides)
-    if sides == (1, 1) and np.any(np.abs(off) > unit):
-        # half a kick of the exact force was added to a leapfrog's velocity where it was read
-        half = off + force * h / (2 * mass)
-        off = half - middle * (middle @ half) / (middle @ middle)
-    if np.any(np.abs(off) > unit):
-        return None
+    if match.scheme in KICKED:
+        # one kick a step, read from the velocity; the position moves by velocities alone
+        old = KICKED[match.scheme]
+        position = np.abs(q[:-1]).astype(np.float64) + centre
+        moved = q[1:] - q[:-1] - h * (old * v[:-1] + (1 - old) * v[1:])
+        if np.any(np.abs(moved) > 8 * 2.0**-52 * (position + np.abs(h * v[:-1]).astype(np.float64))):
+            return None
+        force = mass * (v[1:] - v[:-1]) / h
+        middle = q[:-1] + h * (1 - old) * v[:-1]
+        noise = 8 * 2.0**-52 * mass * float(np.max(np.abs(v))) / abs(float(h))
+    else:
+        sides = STOERMER[match.scheme]
+        before, after = (q[1:-1] - q[:-2]) / h, (q[2:] - q[1:-1]) / h
+        middle = q[1:-1]
+        position = np.abs(middle).astype(np.float64) + centre
+        force = mass * (after - before) / h
+        # four roundings each of positions over the step and of the velocity, and the identity's own few
+        unit = 8 * 2.0**-52 * (np.abs(v[1:-1]).astype(np.float64) + 2 * position / abs(float(h)))
+        off = v[1:-1] - (sides[0] * before + sides[1] * after) / sum(sides)
+        if sides == (1, 1) and np.any(np.abs(off) > unit):
+            # half a kick of the exact force was added to a leapfrog's velocity where it was read
+            half = off + force * h / (2 * mass)
+            off = half - middle * (middle @ half) / (middle @ middle)
+        if np.any(np.abs(off) > unit):
+            return None
+        noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
     stiffness = match.a * mass / float(h) ** 2
     pull = stiffness * middle
     relative = np.sqrt(np.mean((force + pull) ** 2) / np.mean(pull**2))
-    noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
-    return Forces(values=force.astype(np.float64), noise=noise, relative=float(relative))
+    return Forces(
+        values=force.astype(np.float64),
+        error=(force + pull).astype(np.float64),
+        noise=noise,
+        relative=float(relative),
+    )

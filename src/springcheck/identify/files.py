@@ -11,7 +11,7 @@ import numpy as np
 from springcheck import schemes, store
 from springcheck.arrays import Floats, Integers
 from springcheck.errors import MethodError, StoreError
-from springcheck.identify.report import identify
+from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
 
@@ -123,12 +123,19 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
 
 
 def identify_states(
-    states: States, *, mass: float | None = None, stiffness: float | None = None, step: float | None = None
+    states: States,
+    *,
+    mass: float | None = None,
+    stiffness: float | None = None,
+    friction: float | None = None,
+    step: float | None = None,
 ) -> Identification:
     """Identify what a file holds; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
-    found = identify(states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, step=step)
+    found = identify_arrays(
+        states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, friction=friction, step=step
+    )
     if states.adaptive and found.verdict == "none":
         why = f"made by {states.adaptive}: an adaptive solver has no fixed scheme to find"
-        return replace(found, verdict="adaptive", notes=(*states.notes, why))
+        return replace(found, verdict="adaptive", statement=why, explanations=(), notes=(*states.notes, why))
     return replace(found, notes=(*states.notes, *found.notes))

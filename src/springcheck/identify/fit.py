@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.arrays import Extended, Floats
 from springcheck.identify.orbit import orbit, repeats
@@ -36,6 +37,10 @@ class Map:
     """Whether the states span the plane beyond their noise."""
     whole: bool = False
     """Whether entries and covariance are those of the orbit of all states, not of pairs."""
+    drifts: bool = False
+    """Whether the constant part is no equilibrium: the position gets a constant in every step."""
+    slips: Extended | None = None
+    """Relative excess (f - 1,) of each step over the mean, where the steps show it."""
     once: bool | None = None
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show."""
@@ -71,51 +76,69 @@ def _sizes(z: Extended) -> Extended:
     return np.asarray(size * np.sqrt(np.mean(np.sum((z / size) ** 2, axis=1)) / 2))
 
 
-def fit(record: Record, j: int) -> Map:
-    """The map of oscillator j.  A constant part (an equilibrium away from 0) is taken in where it shows.
+def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map:
+    """The map of oscillator j, from the pairs that are `kept` (f - 1,), or from all.
 
-    Rounding is relative to a state's size, or to what the file resolves: pairs count by the inverse of it,
-    so that a motion over many powers of ten is not judged by its largest states alone.
+    A constant part is taken in where it shows: an equilibrium away from 0, whose velocity is 0, or else a
+    constant that is added to the position in every step (`drifts`).  Where the steps are the differences of
+    rounded times, the map's change with the step is fitted along with it (`slips`).
+
+    Rounding is relative to a state's distance from the equilibrium and to that of the equilibrium from 0,
+    or to what the file resolves: pairs count by the inverse of it, so that a motion over many powers of ten
+    is not judged by its largest states alone.
     """
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
     size = _sizes(z - np.mean(z, axis=0))
     size = np.minimum(size, _sizes(z)) if np.all(_sizes(z) < 2 * size) else size
     z = z / size
+    chosen = np.ones(len(z) - 1, dtype=bool) if kept is None else kept
+    pairs = int(np.count_nonzero(chosen))
     quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
     quanta = quanta / size.astype(np.float64)
-    pairs = len(z) - 1
-    noise = np.sqrt(np.sum((ROUNDING * z.astype(np.float64)) ** 2 + quanta**2 / 12, axis=1))[:-1]
-    length = np.sqrt(np.sum(z[:-1].astype(np.float64) ** 2, axis=1))
-    # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
-    moving = length > 0
-    lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0
-    noise = np.maximum(noise, lowest / 3 * length)
-    weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
-    about = z[:-1] - np.mean(z, axis=0) if np.any(np.abs(np.mean(z, axis=0)) > 1) else z[:-1]
-    weight = np.asarray(
-        weight * np.sqrt(2 * pairs / float(np.sum((weight[:, None] * about) ** 2))), dtype=np.float64
-    )
+    first = _preliminary(z, chosen)
+    weight = _pair_weights(z, quanta, first) * chosen
     w = weight[:, None].astype(np.longdouble)
     before, after = w * z[:-1], w * z[1:]
     x = _least_squares(before, after)
-    rss = np.sum((after - before @ x) ** 2, axis=0)
+    left = after - before @ x
     centre = np.zeros(2, dtype=np.longdouble)
-    floor = float(np.sum((4 * ROUNDING * before) ** 2))
-    if np.any(rss > floor) and pairs > FEWEST_PAIRS:
-        wide = np.concatenate([before, w], axis=1)
-        y = _least_squares(wide, after)
-        left = np.sum((after - wide @ y) ** 2, axis=0)
-        # one number more per row removes chi-squared of 1 by chance; 50 is seven standard errors
-        if np.any(rss - left > 50 * np.maximum(left / (pairs - 3), floor / pairs)):
-            back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
-            centre = back @ y[2]
-            for _ in range(3):
-                centre = centre + back @ (y[2] - centre + y[:2].T @ centre)
-            x, rss = y[:2], left
+    floor = float(np.sum((4 * ROUNDING * np.abs(before)) ** 2))
+    drifts = False
+
+    def better(old: Extended, new: Extended, unknowns: int) -> bool:
+        # one number more removes chi-squared of 1 by chance; 50 is seven standard errors
+        gain = np.sum(old**2, axis=0) - np.sum(new**2, axis=0)
+        noise = np.maximum(np.sum(new**2, axis=0) / max(pairs - 3, 1), floor / pairs)
+        return bool(np.any(gain > 50 * unknowns * noise))
+
+    if np.any(np.sum(left**2, axis=0) > floor) and pairs > FEWEST_PAIRS:
+        y = _least_squares(np.concatenate([before, w], axis=1), after)
+        free = after - np.concatenate([before, w], axis=1) @ y
+        if better(left, free, 1):
+            entries, at, resting = _about_rest(before, after, w, y)
+            drifts = better(resting, free, 1)
+            if drifts:
+                back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
+                at = back @ y[2]
+                for _ in range(3):
+                    at = at + back @ (y[2] - at + y[:2].T @ at)
+                entries, resting = y[:2], free
+            x, left, centre = entries, resting, at
     z = z - centre
+    slips = None
+    if record.slips is not None and pairs > 2 * FEWEST_PAIRS:
+        moved = w * z[:-1]
+        wide = np.concatenate([moved, record.slips[:, None] * 1e12 * moved], axis=1)
+        y = _least_squares(wide, w * z[1:])
+        free = w * z[1:] - wide @ y
+        # a clock is known, so that even errors within the rounding of a step show whether steps follow it
+        lost, rest = float(np.sum(left**2)), float(np.sum(free**2))
+        if lost - rest > 100 * max(rest / pairs, floor / pairs / 256):
+            x, left, slips = y[:2], free, record.slips
+    rss = np.sum(left**2, axis=0)
     spread = (w * z[:-1]).astype(np.float64)
     gram = spread.T @ spread
-    least = ROUNDING / 2 * float(np.sqrt(np.mean(np.sum(before**2, axis=1))))
+    least = ROUNDING / 2 * float(np.sqrt(np.sum(before**2) / pairs))
     variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), least**2)
     smallest = float(np.linalg.eigvalsh(gram / pairs)[0])
     conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
@@ -130,10 +153,66 @@ def fit(record: Record, j: int) -> Map:
         z=z,
         weight=weight,
         conditioned=conditioned,
+        drifts=drifts,
+        slips=slips,
     )
-    if record.fine or not conditioned:
+    if record.fine or not conditioned or drifts or kept is not None:
         return found
     return _seen_through_storage(found, quanta, inverse, text=record.text)
+
+
+def _preliminary(z: Extended, chosen: NDArray[np.bool_]) -> Floats:
+    """The equilibrium (2,) as pairs of equal weight show it, 0 where they show none."""
+    before, after = z[:-1][chosen].astype(np.float64), z[1:][chosen].astype(np.float64)
+    if len(before) <= FEWEST_PAIRS:
+        return np.zeros(2)
+    wide = np.concatenate([before, np.ones((len(before), 1))], axis=1)
+    y, x = (np.linalg.lstsq(columns, after, rcond=None)[0] for columns in (wide, before))
+    one, other = (float(np.sum((after - c @ b) ** 2)) for c, b in ((wide, y), (before, x)))
+    floor = float(np.sum((8 * ROUNDING * before) ** 2))
+    if other <= floor or other - one <= 50 * max(one, floor) / len(before):
+        return np.zeros(2)
+    return np.asarray(np.linalg.pinv(np.eye(2) - y[:2].T) @ y[2])
+
+
+def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
+    """Weights (f - 1,) of the pairs, whose weighted states have a mean square of 2."""
+    states = z.astype(np.float64)
+    length = np.sqrt(np.sum((states - rest) ** 2, axis=1)) + np.sqrt(np.sum(rest**2))
+    noise = np.sqrt((ROUNDING * length) ** 2 + np.sum(quanta**2, axis=1) / 12)[:-1]
+    length = length[:-1]
+    # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
+    moving = length > 0
+    lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0
+    noise = np.maximum(noise, lowest / 3 * length)
+    weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
+    about = states[:-1] - rest
+    return np.asarray(weight * np.sqrt(2 * len(about) / float(np.sum((weight[:, None] * about) ** 2))))
+
+
+def _about_rest(
+    before: Extended, after: Extended, w: Extended, y: Extended
+) -> tuple[Extended, Extended, Extended]:
+    """The map (transposed), equilibrium and residuals where the velocity of the equilibrium is 0: five
+    unknowns, found from y, the three of each row by itself."""
+    n = len(before)
+    x = y[:2]
+    gap = np.eye(2) - x.T
+    scale = float(np.sum(gap[:, 0] ** 2))
+    at = np.array([gap[:, 0] @ y[2] / scale if scale else 0.0, 0.0], dtype=np.longdouble)
+    for _ in range(3):
+        columns = np.zeros((2 * n, 5), dtype=np.longdouble)
+        moved = before - w * at
+        columns[:n, :2], columns[n:, 2:4] = moved, moved
+        columns[:n, 4:], columns[n:, 4:] = w * gap[0, 0], w * gap[1, 0]
+        # the old equilibrium's own part, which the last column corrects
+        right = np.concatenate([after[:, 0] - w[:, 0] * at[0], after[:, 1]])[:, None]
+        u = _least_squares(columns, right)[:, 0]
+        x = np.stack([u[:2], u[2:4]], axis=1)
+        gap = np.eye(2) - x.T
+        at = at + np.array([u[4], 0], dtype=np.longdouble)
+    left = after - w * at - (before - w * at) @ x
+    return x, at, np.asarray(left)
 
 
 def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: bool) -> Map:

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from springcheck.arrays import Extended, Floats
 from springcheck.errors import IdentificationError
 
+ROUNDING = 2.0**-53
+
 FEWEST = 5
 """Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
 
@@ -54,6 +56,8 @@ class Record:
     """Relative uncertainty of the interval, from the rounding of the recorded times."""
     clock: float
     """Rounding of the recorded times, in intervals."""
+    slips: Extended | None
+    """Relative excess (f - 1,) of each interval over the mean, None where times are coarse or even."""
     q: Extended
     v: Extended
     q_quantum: Floats
@@ -62,6 +66,9 @@ class Record:
     v_storage: Storage
     mass: Floats | None
     momenta: bool
+    parts: tuple[Floats, Floats] | None = None
+    """Sizes (f, n) of what positions and velocities are sums of, where they are normal modes: their
+    rounding is relative to these."""
 
     @property
     def fine(self) -> bool:
@@ -107,27 +114,41 @@ def storage(x: Floats) -> Storage:
     return Storage(name="single") if single else Storage()
 
 
-def _interval(t: Floats) -> tuple[np.longdouble, float, float]:
-    """The constant interval of times t (f,), its relative uncertainty, and the rounding of t in intervals."""
+def _interval(t: Floats) -> tuple[np.longdouble, float, float, Extended | None]:
+    """The interval of times t (f,), its relative uncertainty, the rounding of t in intervals, and the
+    relative excess of each interval where double precision shows it."""
     wide = t.astype(np.longdouble)
     interval = (wide[-1] - wide[0]) / (len(t) - 1)
     if interval == 0:
         raise IdentificationError("all times are equal: the interval between the states is unknown")
-    quantum = float(np.max(storage(t).quantum(t)))
     off = np.abs(np.diff(wide) - interval)
-    # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal: those are uneven
-    even = float(np.max(np.spacing(np.abs(t))))
-    if np.max(off) <= 4 * even:
-        quantum = min(quantum, even)
     worst = int(np.argmax(off))
+    even = float(np.max(np.spacing(np.abs(t))))
+    # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal, and those of a
+    # float32 clock are not text: the finest of the grids that the times lie on explains them
+    single = bool(np.all(t.astype(np.float32) == t))
+    grids = [even]
+    grids += [float(np.max(np.spacing(np.abs(t).astype(np.float32))))] if single else []
+    grids.append(float(np.max(storage(t).quantum(t))))
     # two rounded times make a difference, and a clock that adds its step up rounds once more each time
-    if off[worst] > 4 * quantum:
+    quantum = next((x for x in grids if off[worst] <= 4 * x), None)
+    if quantum is None:
         raise IdentificationError(
             f"the states are not at a constant interval: frames {worst} and {worst + 1} are "
             f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
             "give a part of the trajectory with one interval"
         )
-    return interval, quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53, quantum / abs(float(interval))
+    jitter = quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53
+    slips = None
+    if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
+        slips = np.asarray(np.diff(wide) / interval - 1)
+    elif quantum != even:
+        # a program's step is a short decimal, and a coarse clock leaves room for it
+        near = (float(f"{float(interval):.{digits}g}") for digits in range(1, 8))
+        interval = np.longdouble(
+            next((x for x in near if abs(x / float(interval) - 1) <= jitter), float(interval))
+        )
+    return interval, jitter, quantum / abs(float(interval)), slips
 
 
 def _states(x: ArrayLike, name: str, frames: int) -> Floats:
@@ -183,7 +204,7 @@ def read(
             raise IdentificationError(
                 f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
             )
-    interval, jitter, clock = _interval(times)
+    interval, jitter, clock, slips = _interval(times)
     masses = _masses(mass, positions.shape[1])
     if p is not None and v is not None and masses is None:
         weight = np.sum(given[1] ** 2, axis=0)
@@ -211,6 +232,7 @@ def read(
         interval=interval,
         jitter=jitter,
         clock=clock,
+        slips=None if slips is None or not finely else slips,
         q=positions[kept].astype(np.longdouble),
         v=moving[kept].astype(np.longdouble) / unit,
         q_quantum=q_storage.quantum(positions[kept]),

@@ -25,9 +25,23 @@ class Candidate:
     omega: tuple[float, ...]
     stiffness: tuple[float, ...] | None
     friction: tuple[float, ...]
+    law: str = ""
+    """Where friction acts and by which law, which the numbers assume; "" where there is none."""
 
     def __str__(self) -> str:
         return self.scheme if self.stride == 1 else f"{self.scheme}, {self.stride} steps a frame"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """What may be wrong: a sentence of cause, what to do, and how much it leaves unexplained.
+
+    `misfit` is a share of what is missing, or standard errors of a map; the smaller the better.
+    """
+
+    cause: str
+    remedy: str
+    misfit: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +55,8 @@ class Identification:
     """
 
     verdict: Verdict
+    statement: str
+    """One sentence: the scheme and the arithmetic, or what is wrong."""
     scheme: str | None
     aliases: tuple[str, ...]
     """Other names of the same map: on a spring nothing can tell them apart."""
@@ -74,13 +90,16 @@ class Identification:
     difference: tuple[float, ...]
     """Measured less predicted entries M11, M12, M21, M22 on (q, v T) between frames; first oscillator."""
     notes: tuple[str, ...]
+    explanations: tuple[Explanation, ...] = ()
+    """Where no scheme fits, or not what was stated: what may be wrong, the best first."""
 
     @property
     def choice(self) -> list[str]:
         """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
         strides: dict[str, list[int]] = {}
         for x in self.candidates:
-            strides.setdefault(x.scheme, []).append(x.stride)
+            known = strides.setdefault(x.scheme, [])
+            known += [x.stride] if x.stride not in known else []
         return [
             name if found == [1] else f"{name}, {_ranges(sorted(found))} steps a frame"
             for name, found in strides.items()

@@ -1,4 +1,4 @@
-"""The search: every known scheme and stride against the maps of all oscillators together."""
+"""The search: every family and stride against the maps of all oscillators together."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from functools import cache
 import numpy as np
 
 from springcheck.arrays import Floats
+from springcheck.identify.families import DAMPED, FAMILIES, HELD, UNDAMPED, Family
 from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.match import ONE_STEP, OWN_FRICTION, STRIDES, Match, Terms, match, unit_matrix
+from springcheck.identify.match import STRIDES, Match, match
 from springcheck.identify.record import Record
-from springcheck.schemes import SCHEMES, roundings
+from springcheck.identify.starts import Roots, Terms, roots, solved
+from springcheck.schemes import SCHEMES, rotation
 
 BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
@@ -33,11 +35,15 @@ PLAIN = 30.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """One scheme and stride for all oscillators together."""
+    """One family and stride for all oscillators together."""
 
-    scheme: str
+    family: str
     stride: int
     parts: tuple[Match, ...]
+
+    @property
+    def scheme(self) -> str:
+        return FAMILIES[self.family].scheme
 
     @property
     def accepted(self) -> bool:
@@ -48,12 +54,16 @@ class Joint:
         return sum(part.chi2 for part in self.parts)
 
     @property
+    def damped(self) -> bool:
+        return FAMILIES[self.family].damped and not FAMILIES[self.family].held
+
+    @property
     def plainness(self) -> tuple[int, int, int]:
         """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
         return (
             max(part.turns for part in self.parts),
             self.stride,
-            -1 if self.scheme == "exact" else list(SCHEMES).index(self.scheme),
+            -1 if self.scheme == "exact" else list(FAMILIES).index(self.family),
         )
 
     def __str__(self) -> str:
@@ -61,55 +71,87 @@ class Joint:
         return self.scheme + steps
 
 
+def _same(one: Family, other: Family, g: tuple[float, ...]) -> bool:
+    a = np.array([0.3, 1.1, 2.9], dtype=np.longdouble)
+    rates = np.array(g, dtype=np.longdouble)
+    return bool(np.max(np.abs(one.unit(a, rates) - other.unit(a, rates))) < 1e-15)
+
+
 @cache
 def aliases(name: str) -> tuple[str, ...]:
     """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
-    a = np.array([0.3, 1.1, 2.9], dtype=np.longdouble)
-    friction = np.array([0, 0.2, 0.5], dtype=np.longdouble)
-    own = unit_matrix(SCHEMES[name], a, friction)
+    own = FAMILIES[name], FAMILIES[f"{name}, damped"]
     return tuple(
-        scheme.name
-        for scheme in ONE_STEP
-        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, friction) - own)) < 1e-15
+        f.scheme
+        for f in UNDAMPED
+        if f.scheme != name
+        and _same(f, own[0], (0, 0, 0))
+        and _same(FAMILIES[f"{f.scheme}, damped"], own[1], (0, 0.2, 0.5))
     )
 
 
 @cache
 def frictionless(name: str) -> tuple[str, ...]:
     """Schemes with a friction of their own whose map is this one's where there is none."""
-    a, none = np.array([0.3, 1.1, 2.9], dtype=np.longdouble), np.zeros(3, dtype=np.longdouble)
-    own = unit_matrix(SCHEMES[name], a, none)
     return tuple(
-        scheme.name
-        for scheme in OWN_FRICTION
-        if scheme.name != name and np.max(np.abs(unit_matrix(scheme, a, none) - own)) < 1e-15
+        f.scheme
+        for f in UNDAMPED
+        if f.scheme != name
+        and any(kind == "friction" for kind, _ in SCHEMES[f.scheme].stages)
+        and _same(f, FAMILIES[name], (0, 0, 0))
     )
 
 
 @cache
-def distinct() -> tuple[str, ...]:
-    """One name of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
-    out: list[str] = []
-    for scheme in ONE_STEP:
-        if not set(aliases(scheme.name)) & set(out):
-            out.append(scheme.name)
+def distinct(*, damped: bool) -> tuple[Family, ...]:
+    """One family of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
+    out: list[Family] = []
+    for family in DAMPED if damped else UNDAMPED:
+        if not damped and any(kind == "friction" for kind, _ in family.stages):
+            continue
+        if not any(_same(family, other, (0.1, 0.2, 0.5)) for other in out):
+            out.append(family)
     return tuple(out)
 
 
-def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
-    """Every scheme and stride against every oscillator; what fails one is not tried on the next."""
-    without = {scheme.name for scheme in OWN_FRICTION}
-    names = [name for name in distinct() if terms[0].damped or name not in without]
+@cache
+def coincident(name: str) -> tuple[str, ...]:
+    """Damped families that have the map of this scheme without friction, on springs of another stiffness."""
+    a = np.array([0.3, 0.7, 1.1])
+    wanted = FAMILIES[name].unit(a.astype(np.longdouble), np.zeros(3, dtype=np.longdouble)).astype(np.float64)
+    g = -np.log(np.abs(np.linalg.det(wanted)))
+    if not np.all(g > 1e-9):
+        return ()
+    out = []
+    for family in distinct(damped=True):
+        values, off = solved(family, a + (g / 2) ** 2, g, wanted, free_scale=False, turns=40)
+        if np.all(off < 1e-12) and np.all(values[:, 1] > 1e-6):
+            out.append(family.name)
+    return tuple(out)
+
+
+def search(
+    maps: list[Map],
+    terms: list[Terms],
+    strides: range,
+    families: tuple[Family, ...] = (),
+    rooted: dict[tuple[int, range], Roots] | None = None,
+) -> list[Joint]:
+    """Every family and stride against every oscillator; what fails one is not tried on the next."""
+    rooted = {} if rooted is None else rooted
     keys: dict[tuple[str, int], list[Match]] = {}
     for i, (found, what) in enumerate(zip(maps, terms, strict=True)):
         best: dict[tuple[str, int], Match] = {}
-        for name in names:
-            wanted = sorted({key[1] for key in keys if key[0] == name}) if i else []
+        turning = bool(rotation(found.entries[None]).angle[0] > 0)
+        for family in families or distinct(damped=False):
+            wanted = sorted({key[1] for key in keys if key[0] == family.name}) if i else []
             if i and not wanted:
                 continue
             within = range(wanted[0], wanted[-1] + 1) if i else strides
-            for m in match(SCHEMES[name], found, what, within):
-                key = name, m.stride
+            if turning and (i, within) not in rooted:
+                rooted[i, within] = roots(found, within)
+            for m in match(family, found, what, within, rooted.get((i, within))):
+                key = family.name, m.stride
                 old = best.get(key)
                 if old is None or (not m.accepted, m.turns, m.chi2) < (not old.accepted, old.turns, old.chi2):
                     best[key] = m
@@ -121,7 +163,7 @@ def search(maps: list[Map], terms: list[Terms], strides: range) -> list[Joint]:
         passing = {key: ms for key, ms in merged.items() if all(m.accepted for m in ms)}
         keys = passing if passing and i + 1 < len(maps) else merged
     return [
-        Joint(scheme=k[0], stride=k[1], parts=tuple(ms)) for k, ms in keys.items() if len(ms) == len(maps)
+        Joint(family=k[0], stride=k[1], parts=tuple(ms)) for k, ms in keys.items() if len(ms) == len(maps)
     ]
 
 
@@ -137,11 +179,15 @@ class Room:
     bias: float = 0.0
     strides: tuple[range, ...] = (FEW,)
 
+    @property
+    def families(self) -> tuple[Family, ...]:
+        return (*distinct(damped=True), HELD) if self.damped else distinct(damped=False)
+
 
 def find(
     record: Record, maps: list[Map], base: list[Terms], stride: int | None
 ) -> tuple[list[Joint], bool, list[Terms]]:
-    """All schemes that the states do not exclude, the plainest first, and True; or all tried, and False.
+    """All families that the states do not exclude, the plainest first, and True; or all tried, and False.
 
     What is plainer comes first, and ends the search where it fits.
     """
@@ -149,19 +195,19 @@ def find(
     whole = all(found.whole for found in maps)
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
     tried: list[Joint] = []
+    rooted: dict[tuple[int, range], Roots] = {}
     for rooms in _plan(fine=record.fine, text=record.text, whole=whole, residual=residual):
         accepted: list[Joint] = []
         for room in rooms:
-            terms = [
-                replace(what, damped=room.damped, rounding=room.rounding, bias=room.bias) for what in base
-            ]
+            terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in base]
             for strides in (*first, *room.strides):
-                joints = search(maps, terms, strides)
+                joints = search(maps, terms, strides, room.families, rooted)
                 fitting = [x for x in joints if x.accepted]
                 if fitting:
                     further = strides is FEW and (MANY in room.strides or not room.bias)
                     accepted += fitting
-                    accepted += _further(maps, terms, fitting, coarse=not record.fine) if further else []
+                    if further:
+                        accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
                     break
                 tried += joints if not room.damped and strides is not MANY else []
         if accepted:
@@ -200,7 +246,9 @@ def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[
     ]
 
 
-def _further(maps: list[Map], terms: list[Terms], accepted: list[Joint], *, coarse: bool) -> list[Joint]:
+def _further(
+    maps: list[Map], terms: list[Terms], accepted: list[Joint], room: Room, *, coarse: bool
+) -> list[Joint]:
     """What the states do not exclude either, beside what was accepted of few steps to a frame.
 
     More of them may fit as well: the error of a step falls with their number, and where the exact flow
@@ -209,18 +257,17 @@ def _further(maps: list[Map], terms: list[Terms], accepted: list[Joint], *, coar
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
-    if open_ended or (coarse and not terms[0].damped):
-        out += [x for x in search(maps, terms, MANY) if x.accepted]
-    if not terms[0].damped and min(x.chi2 for x in accepted) > EXCLUDED:
-        friction = [replace(what, damped=True) for what in terms]
-        out += [x for x in search(maps, friction, FEW) if x.accepted]
+    if open_ended or (coarse and not room.damped):
+        out += [x for x in search(maps, terms, MANY, room.families) if x.accepted]
+    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
+        out += [x for x in search(maps, terms, FEW, distinct(damped=True)) if x.accepted]
     return out
 
 
 def _likely(accepted: list[Joint]) -> list[Joint]:
     """Those of which the best is not five standard errors better, each once, the plainest first."""
     best = min(x.chi2 for x in accepted)
-    each = {(x.scheme, x.stride): x for x in sorted(accepted, key=lambda x: -x.chi2)}
+    each = {(x.family, x.stride): x for x in sorted(accepted, key=lambda x: -x.chi2)}
     return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
 
 
@@ -233,17 +280,23 @@ def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> b
     if any((x.scheme, x.stride) != (chosen.scheme, chosen.stride) for x in accepted):
         return False
     wide = replace(terms, bias=1.0)
-    exact = match(SCHEMES["exact"], found, wide, range(1, 2))
-    return all(m.chi2 > PLAIN**2 for m in exact)
+    flow = FAMILIES["exact, damped" if chosen.damped else "exact"]
+    return all(m.chi2 > PLAIN**2 for m in match(flow, found, wide, range(1, 2)))
 
 
 def numbers(
-    record: Record, moving: list[int], chosen: Joint
+    record: Record, moving: list[int], chosen: Joint, law: str = ""
 ) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
-    """Frequency, stiffness and friction rate of each oscillator."""
+    """Frequency, stiffness and friction rate of each oscillator, the friction being of this law."""
     h = float(record.interval) / chosen.stride
+    family = FAMILIES[chosen.family]
+    law = law or (family.laws[0] if family.laws else "")
     omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
-    friction = tuple(m.friction / h for m in chosen.parts)
+    friction = tuple(
+        family.rate(law, m.friction) / h if family.stages else m.friction / h for m in chosen.parts
+    )
+    if any(kind in ("explicit", "implicit", "centred", "remembered") for kind, _ in family.stages):
+        friction = tuple(m.friction / h for m in chosen.parts)
     stiffness: tuple[float, ...] | None = None
     if record.mass is not None:
         stiffness = tuple(
@@ -263,11 +316,13 @@ def disagreements(
     not show whether h k and h/m were rounded to single precision, and the state with them.
     """
     _, stiffness, _ = numbers(record, moving, joint)
-    path = 4 if joint.scheme == "exact" else roundings(SCHEMES[joint.scheme])
+    path = FAMILIES[joint.family].path
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
         error += 8 * SINGLE if record.text else 0.0
+        # a step or a mass in single precision moves the stiffness that is worked out with the stated one
+        error += 0.0 if record.momenta else 3 * abs(part.log_mass)
         pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
         error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
         off = k / float(stated[j]) - 1 if stated[j] else math.inf

@@ -14,8 +14,9 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError, MethodError
-from springcheck.identify.report import identify
-from springcheck.identify.result import Identification
+from springcheck.identify.evidence import title
+from springcheck.identify.report import identify_arrays
+from springcheck.identify.result import Explanation, Identification
 from springcheck.schemes import SCHEMES
 
 Stepper: TypeAlias = Callable[..., Any]
@@ -24,6 +25,9 @@ SPRINGS = ((3.7, 2.9, 0.31), (0.6, 1.7, 0.11), (1.9, 0.8, 0.43))
 """m, k, h: uneven, so that a mass left out or a half step misplaced shows."""
 
 FRAMES = 81
+
+RUNAWAY = 1e5
+"""Growth of a state at which a run ends."""
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
@@ -90,10 +94,14 @@ def _run(
     step: Stepper, force: Callable[..., Any], m: float, h: float, start: tuple[float, float], frames: int
 ) -> tuple[Floats, Floats, Floats]:
     states = [start]
+    most = RUNAWAY * max(map(abs, start))
     for _ in range(frames - 1):
+        # what runs away leaves one direction alone, which shows no map
+        if len(states) > 6 and max(map(abs, states[-1])) > most:
+            break
         states.append(_one(step, *states[-1], h, force, m))
     q, p = np.array(states).T
-    return np.asarray(h * np.arange(frames), dtype=np.float64), q, p
+    return np.asarray(h * np.arange(len(q)), dtype=np.float64), q, p
 
 
 def _spring(k: float) -> Callable[..., Any]:
@@ -113,66 +121,80 @@ def identify_stepper(step: Stepper) -> Identification:
     for m, k, h in SPRINGS:
         t, q, p = _run(step, _spring(k), m, h, (1.3, 0.7 * m), FRAMES)
         try:
-            results.append(identify(t, q, p, mass=m, stiffness=k, step=h))
+            results.append(identify_arrays(t, q, p, mass=m, stiffness=k, step=h))
         except IdentificationError as error:
             raise MethodError(f"the stepper does not move a spring as a scheme would: {error}") from error
+        if not results[0].fits:
+            break
     found = results[0]
+    notes = list(dict.fromkeys(note for x in results for note in x.notes))
+    wrong: list[Explanation] = []
     schemes = {x.scheme for x in results}
-    fits = all(x.fits for x in results) and len(schemes) == 1
-    notes = list(dict.fromkeys(note for x in results for note in x.notes)) if fits else list(found.notes)
-    if len(schemes) > 1:
+    if found.fits and len(schemes) > 1:
         named = "; ".join(
-            f"{x.scheme} at m={m}, k={k}, h={h}" for x, (m, k, h) in zip(results, SPRINGS, strict=True)
+            f"{x.scheme} at m={m}, k={k}, h={h}" for x, (m, k, h) in zip(results, SPRINGS, strict=False)
         )
-        notes.append(f"the stepper looks like different schemes on different springs: {named}")
-    if not fits:
-        notes += _mass_use(step)
-    backward = _backwards(step, found) if found.scheme else ""
-    fits = fits and not backward
-    notes += [backward] if backward else []
+        wrong.append(
+            _wrong(
+                f"The stepper looks like different schemes on different springs: {named}",
+                "look for numbers that are written into it",
+            )
+        )
+    elif found.fits and any(not x.fits for x in results):
+        wrong += next(x for x in results if not x.fits).explanations
+    if any(x.law for x in found.candidates):
+        rates = ", ".join(f"{x.friction[0]:.4g} by {x.law}" for x in found.candidates[:3])
+        wrong.append(
+            _wrong(
+                f"{title(found.candidates[0].scheme)} with a friction that the force has not: c/m is {rates}",
+                "set the damping to 0, which many engines do not by default",
+            )
+        )
+    if found.scheme and not wrong:
+        wrong += _backwards(step, found)
     slope, deviation = _order(step)
     if math.isnan(slope):
         notes.append("its error on a quartic well does not fall as a power of the step: no order is seen")
-        fits = False
     else:
         notes.append(f"order {slope:.2f} +- {deviation:.2f} on a quartic well")
         order = SCHEMES[found.scheme].order if found.scheme in SCHEMES else 0
         if order and slope < order - max(5 * deviation, 0.25):
-            notes.append(
-                f"on a spring it is {found.scheme}, of order {order}, but not on forces that are not linear: "
-                "look for a force that is evaluated at the wrong place"
+            wrong.append(
+                _wrong(
+                    f"On a spring it is {found.scheme}, of order {order}, but not on forces that are not "
+                    "linear",
+                    "look for a force that is evaluated at the wrong place",
+                )
             )
-            fits = False
-    return replace(found, fits=fits, notes=tuple(notes), defect_ulp=max(x.defect_ulp for x in results))
-
-
-def _mass_use(step: Stepper) -> list[str]:
-    """Whether the mass is left out, or used twice, where that explains what no scheme does."""
-    m, k, h = SPRINGS[0]
-    t, q, p = _run(step, _spring(k), m, h, (1.3, 0.7 * m), FRAMES)
-    readings = (
-        (1.0, k, "dq/dt = p: the mass is left out"),
-        (1.0, k / m, "dq/dt = p and dp/dt = F/m: p is treated as a velocity"),
-        (m, k / m, "dq/dt = p/m and dp/dt = F/m: the force is divided by the mass although p is a momentum"),
+    fits = found.fits and not wrong
+    explanations = (*wrong, *found.explanations)
+    return replace(
+        found,
+        fits=fits,
+        statement=wrong[0].cause if wrong else found.statement,
+        explanations=explanations,
+        notes=tuple(dict.fromkeys(notes)),
+        defect_ulp=max(x.defect_ulp for x in results),
     )
-    for mass, stiffness, meaning in readings:
-        reading = identify(t, q, p, mass=mass, stiffness=stiffness, step=h)
-        if reading.fits:
-            return [f"it is {reading.scheme} with {meaning}"]
-    return []
 
 
-def _backwards(step: Stepper, found: Identification) -> str:
-    """What a negative step does wrong, or "" where it goes backwards by the same scheme."""
+def _wrong(cause: str, remedy: str) -> Explanation:
+    return Explanation(cause=cause, remedy=remedy, misfit=0.0)
+
+
+def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
+    """What a negative step does wrong, if it does not go backwards by the same scheme."""
     m, k, h = SPRINGS[0]
     t, q, p = _run(step, _spring(k), m, -h, (1.3, 0.7 * m), FRAMES)
-    back = identify(t, q, p, mass=m, stiffness=k, step=-h)
+    back = identify_arrays(t, q, p, mass=m, stiffness=k, step=-h)
     if back.scheme == found.scheme:
-        return ""
-    forward = identify(-t, q, p, mass=m, stiffness=k, step=h)
+        return []
+    forward = identify_arrays(-t, q, p, mass=m, stiffness=k, step=h)
     if forward.scheme == found.scheme:
-        return "a negative step goes forwards: the sign of the step is lost"
-    return f"a negative step is not {found.scheme} backwards but {back.scheme}"
+        cause = f"{title(str(found.scheme))}, but a negative step goes forwards: the sign of the step is lost"
+        return [_wrong(cause, "take the step with its sign")]
+    cause = f"A negative step is not {found.scheme} backwards but {back.scheme}"
+    return [_wrong(cause, "look for what depends on the direction of time")]
 
 
 def _order(step: Stepper) -> tuple[float, float]:
@@ -193,6 +215,8 @@ def _order(step: Stepper) -> tuple[float, float]:
         h = duration / count
         q, p = q0, p0
         for _ in range(count):
+            if not abs(q) + abs(p) < RUNAWAY:
+                break
             q, p = _one(step, q, p, h, lambda x, y=0.0: -b * x**3, m)
         size = math.hypot(q - true[0], (p - true[1]) / m)
         # below, rounding and the reference take over; above, the leading term does not lead yet

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +12,6 @@ from springcheck.text import Lines, hanging, plain
 
 IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",
-    "none": "none (adaptive or unknown)",
     "adaptive": "adaptive solver, no fixed scheme to find",
 }
 """What is said where no scheme is named."""
@@ -24,6 +24,7 @@ def identification(label: str, found: Identification) -> Lines:
     several = found.candidates if len(found.candidates) > 1 else ()
     rows = [
         ("same map on a spring", ", ".join(found.aliases)),
+        ("friction law", found.candidates[0].law if len(found.candidates) == 1 else ""),
         ("step", f"{found.step:.9g}{recorded}"),
         ("angular frequency", _numbers(found.omega) if not several else _range([x.omega for x in several])),
         (
@@ -37,7 +38,15 @@ def identification(label: str, found: Identification) -> Lines:
     ]
     misfit = ", but what is stated does not fit" if found.candidates and not found.fits else ""
     said = IDENTIFIED.get(found.verdict, found.scheme)
-    out: Lines = [plain(f"{label}: {said}{misfit}", style)]
+    if found.explanations:
+        # the diagnosis is the headline, and what to do stands below it
+        said, misfit = found.explanations[0].cause, ""
+    first = textwrap.wrap(f"{label}: {said}{misfit}", 80, subsequent_indent="  ", break_on_hyphens=False)
+    out: Lines = [plain(line, style) for line in first]
+    for one in found.explanations[:1]:
+        out += hanging("  what to do: ", one.remedy)
+    for one in found.explanations[1:3]:
+        out += hanging("  or: ", f"{one.cause}; {one.remedy}")
     if several:
         out += hanging("  one of: ", "; ".join(found.choice))
     for name, text in rows:

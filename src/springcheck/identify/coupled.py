@@ -1,0 +1,95 @@
+"""Coupled oscillators: their normal modes, read from the map of all coordinates together.
+
+Every scheme here is a function of the springs' matrix alone, so that the blocks of its one-step matrix share
+their eigenvectors, and along those each mode moves by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats
+from springcheck.identify.record import Record
+
+SPARE = 6
+"""Pairs of states beyond the unknowns of a row that a map of all coordinates needs."""
+
+ALIKE = 1e-5
+"""Relative difference of eigenvalues below which two modes may be turned into each other."""
+
+
+def _normal_equations(columns: Extended, right: Extended) -> Extended:
+    gram = columns.T @ columns
+    inverse = np.linalg.pinv(gram.astype(np.float64), rcond=1e-15, hermitian=True).astype(np.longdouble)
+    x = inverse @ (columns.T @ right)
+    for _ in range(4):
+        x = x + inverse @ (columns.T @ (right - columns @ x))
+    return np.asarray(x)
+
+
+def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, float] | None:
+    """The map (2m, 2m) between frames on (q, v T) of the chosen coordinates about their rest, sizes of the
+    states (2m,), and the root mean square of what it leaves over; None where frames are too few."""
+    z = np.concatenate([record.q[:, chosen], record.v[:, chosen] * record.interval], axis=1)
+    frames, n = z.shape
+    if frames - 1 < n + 1 + SPARE:
+        return None
+    size = np.sqrt(np.mean(z**2, axis=0)).astype(np.float64)
+    # one size for all positions, one for all velocities: modes mix coordinates
+    size = np.repeat([np.max(size[: n // 2]), np.max(size[n // 2 :])], n // 2)
+    if not np.all(size > 0):
+        return None
+    scaled = z / size
+    columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
+    x = _normal_equations(columns, scaled[1:])
+    left = (scaled[1:] - columns @ x).astype(np.float64)
+    return x[:-1].T, size, float(np.sqrt(np.mean(left**2)))
+
+
+def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
+    """Positions and velocities of the normal modes of the chosen coordinates as a record, and what the map of
+    all leaves over in units of the states' size; None where there are none to find."""
+    found = map_of_all(record, chosen)
+    if found is None:
+        return None
+    entries, _, left = found
+    n = len(chosen)
+    # the force's block: proportional to the springs' matrix for every scheme, to leading order in the step
+    block = entries[n:, :n]
+    values, vectors = np.linalg.eig(block.astype(np.float64))
+    if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > 1e6:
+        return None
+    basis = np.real(vectors).astype(np.longdouble)
+    spread = np.real(values)
+    gap = spread[None, :] - spread[:, None]
+    far = np.abs(gap) > ALIKE * np.max(np.abs(spread))
+    for _ in range(3):
+        # eigenvectors of double precision, corrected to first order with what they leave off the diagonal
+        inverse = np.linalg.inv(basis.astype(np.float64)).astype(np.longdouble)
+        inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
+        inside = inverse @ block @ basis
+        basis = basis @ (np.eye(n) + np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(n)))
+    inverse = np.linalg.inv(basis.astype(np.float64)).astype(np.longdouble)
+    inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
+    inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
+    q = record.q[:, chosen] @ inverse.T
+    v = record.v[:, chosen] @ inverse.T
+    spreading = np.abs(inverse).astype(np.float64)
+    return (
+        replace(
+            record,
+            q=q,
+            v=v,
+            q_quantum=record.q_quantum[:, chosen] @ spreading.T,
+            v_quantum=record.v_quantum[:, chosen] @ spreading.T,
+            parts=(
+                np.abs(record.q[:, chosen]).astype(np.float64) @ spreading.T,
+                np.abs(record.v[:, chosen]).astype(np.float64) @ spreading.T,
+            ),
+            mass=None,
+            momenta=False,
+        ),
+        left,
+    )

@@ -1,0 +1,67 @@
+"""What an explanation of a misfit may look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.identify.fit import ROUNDING, Map
+from springcheck.identify.match import Match
+from springcheck.identify.record import Record
+from springcheck.identify.search import search
+from springcheck.identify.starts import Terms
+from springcheck.schemes import SCHEMES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """What an explanation may look at: the worst oscillator's map, and what was stated of it."""
+
+    record: Record
+    j: int
+    found: Map
+    terms: Terms
+    stiffness: float | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pairs(self) -> int:
+        return len(self.found.z) - 1
+
+    @property
+    def misses(self) -> Floats:
+        """What the map leaves over in each pair (f - 1, 2), in units of the states' size."""
+        z = self.found.z
+        return (z[1:] - z[:-1] @ self.found.entries.T).astype(np.float64)
+
+    @property
+    def unit(self) -> Floats:
+        """Rounding of each state (f - 1,): a few units in the last place, and half a quantum of the file."""
+        z = np.abs(self.found.z.astype(np.float64))
+        quanta = np.stack([self.record.q_quantum[:, self.j], self.record.v_quantum[:, self.j]], axis=1)
+        quanta = quanta * [1, abs(float(self.record.interval))] / self.found.size.astype(np.float64)
+        size = (
+            z[1:].max(axis=1)
+            + z[:-1].max(axis=1)
+            + 2 * float(np.max(np.abs(self.found.centre / self.found.size)))
+        )
+        return np.asarray(8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1))
+
+
+def title(scheme: str) -> str:
+    """A scheme's name in a sentence, its first letter large."""
+    name = SCHEMES[scheme].title if scheme in SCHEMES else scheme
+    return name[0].upper() + name[1:]
+
+
+def matched(found: Map, terms: Terms) -> list[Match]:
+    """The schemes of few steps that fit a map, the plainest first."""
+    joints = [x for x in search([found], [terms], range(1, 5)) if x.accepted]
+    return [x.parts[0] for x in sorted(joints, key=lambda x: x.plainness)]
+
+
+def distance(found: Map, m: Match) -> float:
+    """Largest difference of an entry of the measured map from the predicted one."""
+    return float(np.max(np.abs(found.entries.reshape(4).astype(np.float64) - np.array(m.predicted))))

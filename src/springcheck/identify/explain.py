@@ -1,0 +1,380 @@
+"""What is wrong, where no known scheme explains the states: faults as explanations, the best first."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Extended, Floats
+from springcheck.identify.evidence import Evidence, distance, matched, title
+from springcheck.identify.fit import Map, fit
+from springcheck.identify.record import Record
+from springcheck.identify.result import Explanation
+from springcheck.identify.search import distinct, search
+from springcheck.identify.starts import Terms
+from springcheck.identify.wrong import misfit, wrong_map
+
+FEW_BAD = 0.06
+"""Largest share of pairs that may be bad where the others make one motion."""
+
+FALLS = 12.0
+"""Factor by which an explanation must bring the misfit down."""
+
+
+def explain(
+    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], stated: Floats | None
+) -> tuple[Explanation, ...]:
+    """Explanations of what no scheme fits, the best first."""
+    worst = max(range(len(maps)), key=lambda i: float(np.max(maps[i].residual)))
+    j = moving[worst]
+    evidence = Evidence(
+        record=record, j=j, found=maps[worst], terms=terms[worst],
+        stiffness=None if stated is None else float(stated[j]),
+    )  # fmt: skip
+    out: list[Explanation] = []
+    rough = float(np.median(np.max(np.abs(evidence.misses), axis=1) / evidence.unit))
+    loud = float(np.max(np.max(np.abs(evidence.misses), axis=1) / evidence.unit))
+    if evidence.found.drifts:
+        out += _drift(evidence)
+    if loud > 4 and not out:
+        for look in (_few_bad_frames, _alternation, _solver, _neighbours(moving, maps), _shape):
+            out += look(evidence)
+            if out:
+                break
+    if not out and rough <= 64:
+        out += wrong_map(evidence)
+    if not out:
+        out += wrong_map(evidence) if loud <= 4 else []
+    return (*out, *([] if out else [misfit(evidence)]))
+
+
+# bad frames ---------------------------------------------------------------------------------------------
+
+
+def _few_bad_frames(e: Evidence) -> list[Explanation]:
+    """A motion that a few pairs of frames interrupt."""
+    kept = np.ones(e.pairs, dtype=bool)
+    found = e.found
+    for _ in range(8):
+        z = (e.found.z * e.found.size + e.found.centre - found.centre) / found.size
+        off = np.max(np.abs((z[1:] - z[:-1] @ found.entries.T).astype(np.float64)), axis=1) / e.unit
+        limit = max(8 * float(np.median(off[kept])), 2.0)
+        now = off <= limit
+        if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
+            break
+        kept = now
+        found = fit(e.record, e.j, kept=kept)
+    bad = np.flatnonzero(~kept)
+    if not len(bad) or np.count_nonzero(kept) < 8:
+        return []
+    before = float(np.max(np.abs(e.misses)))
+    after = float(
+        np.sqrt(np.mean((found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)[kept] ** 2))
+    )
+    if before < FALLS * after:
+        return []
+    fitting = matched(found, e.terms)
+    whose = f" of {title(fitting[0].scheme)}" if fitting else ""
+    runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
+    spacing = set(np.diff([run[0] for run in runs]).tolist())
+    cause, remedy = _interruption(e, found, runs[0], whose)
+    if len(runs) > 2 and len(spacing) == 1:
+        cause = f"{cause}, and so every {spacing.pop()} steps"
+    elif len(runs) > 1:
+        at = ", ".join(str(run[0] + 1) for run in runs[1:5])
+        cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
+    return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
+
+
+def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
+    """What happened at a run of bad pairs, the rest of the motion being `found`'s."""
+    z, b = found.z, found.entries
+    first, last = int(run[0]), int(run[-1])
+
+    def near(x: Extended, y: Extended) -> bool:
+        # as near as the other pairs, or a thousandth of what is missing
+        missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
+        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit)), 1e-3 * missing)
+
+    if len(run) == 1:
+        from_, to = z[first], z[first + 1]
+        if near(to, from_):
+            return (
+                f"The motion{whose} stands still for a step: it is repeated at frame {first + 1}",
+                "write each frame once, or look for a step that is left out",
+            )
+        power = b @ b
+        for n in range(2, 9):
+            if near(to, power @ from_):
+                more = (
+                    f"frame {first + 1} is missing"
+                    if n == 2
+                    else f"{n - 1} frames are missing from frame {first + 1} on"
+                )
+                return (
+                    f"The motion is one{whose}, but {more}",
+                    "write every frame, or give a part without a gap",
+                )
+            power = b @ power
+        if first == 0:
+            return (
+                f"The motion is one{whose}, but frame 0 does not belong to it",
+                "look at how the start is set and recorded, or leave frame 0 out",
+            )
+        off = (to - b @ from_).astype(np.float64)
+        if first + 1 == len(z) - 1:
+            return (
+                f"The motion is one{whose}, but frame {first + 1}, the last, is wrong: {_amount(off, to)}",
+                ("look at how the last frame is written"),
+            )
+        back = np.linalg.solve(b.astype(np.float64), off)
+        if abs(back[0]) < 1e-2 * abs(back[1]):
+            kick = back[1] * float(found.size[1] / e.record.interval)
+            return (
+                f"The motion is one{whose}, but for one kick of {kick:+.3g} of the velocity between frames "
+                f"{first} and {first + 1}",
+                "look for what acts at that step alone",
+            )
+        digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
+        return (
+            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and "
+            f"{first + 1}, as after a restart from numbers of {max(1, round(digits))} digits",
+            "write restarts in full precision",
+        )
+    if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
+        off = (z[last] - b @ z[first]).astype(np.float64)
+        return (
+            f"The motion is one{whose}, but frame {last} is wrong: {_amount(off, z[last])}",
+            "look at how that frame is written",
+        )
+    if len(run) == 3 and near(z[first + 2], b @ z[first]):
+        return f"The motion is one{whose}, but frames {first + 1} and {first + 2} have changed places", (
+            "sort the frames by time"
+        )
+    return (
+        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}",
+        "look at what happens there, or give the part before it",
+    )
+
+
+def _amount(off: Floats, state: Extended) -> str:
+    share = np.abs(off) / max(float(np.max(np.abs(state))), 1e-300)
+    name = "velocity" if share[1] > share[0] else "position"
+    return f"its {name} is off by {float(np.max(share)):.2g} of the state's size"
+
+
+# two maps in turn ---------------------------------------------------------------------------------------
+
+
+def _alternation(e: Evidence) -> list[Explanation]:
+    """Two kinds of step in turn."""
+    if e.pairs < 24:
+        return []
+    odd = np.arange(e.pairs) % 2 == 1
+    halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
+    left = max(float(np.max(x.residual)) for x in halves)
+    before = float(np.max(e.found.residual))
+    # a smooth residual is no parity: two maps must do much better than one
+    if before < FALLS * left:
+        return []
+    dets = [float(np.linalg.det(x.entries.astype(np.float64))) - 1 for x in halves]
+    loose = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
+    found = [matched(x, loose) for x in halves]
+    names = [m.scheme for m in found[0] if m.scheme in {n.scheme for n in found[1]}]
+    what = "two maps take turns"
+    if abs(dets[0] - dets[1]) > 4 * left:
+        what = f"a friction of changing sign multiplies areas by 1 {dets[0]:+.2e} and 1 {dets[1]:+.2e}"
+    elif names:
+        one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
+        share = abs(math.sqrt(one.a / other.a) - 1)
+        what = f"the steps of {title(names[0])} alternate by {share:.2g} of their length"
+    return [
+        Explanation(
+            cause=f"Even and odd steps differ and alternate: {what}",
+            remedy="look for a buffer or a sign that is switched in every step",
+            misfit=left / before,
+        )
+    ]
+
+
+# no fixed step ------------------------------------------------------------------------------------------
+
+
+def _solver(e: Evidence) -> list[Explanation]:
+    """The exact solution, as near as a solver with an error of its own comes to it."""
+    joints = search([e.found], [e.terms], range(1, 2))
+    joints += search([e.found], [e.terms], range(1, 2), distinct(damped=True))
+    distances = {x: distance(e.found, x.parts[0]) for x in joints}
+    exact = [x for x in joints if x.scheme == "exact"]
+    if not exact:
+        return []
+    near = min(exact, key=lambda x: distances[x])
+    others = min((d for x, d in distances.items() if x.scheme != "exact" and not x.damped), default=math.inf)
+    residual = float(np.max(e.found.residual))
+    if (
+        distances[near] > max(0.3 * others, 4 * residual)
+        or distances[near] > 0.05
+        or others < 4 * distances[near]
+    ):
+        return []
+    size = max(residual, distances[near])
+    return [
+        Explanation(
+            cause=f"The states are the exact solution to within {size:.1e} of their size in each frame: "
+            "an adaptive solver or one of high order, which has no fixed scheme to find",
+            remedy="compare its error with its tolerance; give a smaller tolerance, or none",
+            misfit=size,
+        )
+    ]
+
+
+def _drift(e: Evidence) -> list[Explanation]:
+    if not e.found.drifts:
+        return []
+    back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
+    fitting = matched(e.found, e.terms)
+    whose = title(fitting[0].scheme) if fitting else "The scheme"
+    return [
+        Explanation(
+            cause=f"{whose} with a constant added to the position in every frame: {back[0]:.6g}",
+            remedy="look for a drift that is not the velocity's, such as a removed centre-of-mass motion",
+            misfit=float(np.max(e.found.residual)),
+        )
+    ]
+
+
+# forces that are not linear, or not constant ------------------------------------------------------------
+
+
+def _left(columns: Floats, missing: Floats) -> float:
+    """Share of the residual that these columns leave over, in the root mean square."""
+    scale = np.sqrt(np.mean(columns**2, axis=0))
+    columns = columns[:, scale > 0] / scale[scale > 0]
+    fitted = columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
+    total = float(np.sqrt(np.mean(missing**2)))
+    share = len(missing) / max(len(missing) - columns.shape[1], 1)
+    return float(np.sqrt(np.mean((missing - fitted) ** 2) * share)) / total if total else 1.0
+
+
+def _hats(x: Floats, count: int) -> Floats:
+    """Piecewise linear functions of x that add up to 1, (f, count)."""
+    at = np.linspace(float(np.min(x)), float(np.max(x)), count)
+    return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
+
+
+def _neighbours(moving: list[int], maps: list[Map]):  # type: ignore[no-untyped-def]
+    def look(e: Evidence) -> list[Explanation]:
+        if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
+            return []
+        others = np.concatenate([m.z[:-1].astype(np.float64) for m in maps], axis=1)
+        share = _left(others, e.misses)
+        if share > 0.3:
+            return []
+        fitted = others @ np.linalg.lstsq(others, e.misses, rcond=None)[0]
+        return [
+            Explanation(
+                cause=f"The oscillators are coupled: coordinate {e.j} follows from the states of all, "
+                f"by {float(np.max(np.abs(fitted))):.1e} of its size in each frame",
+                remedy="leave the coupling out, or give the normal modes, which are independent",
+                misfit=share,
+            )
+        ]
+
+    return look
+
+
+def _shape(e: Evidence) -> list[Explanation]:
+    """What the residual depends on: position, velocity, or time; or nothing, and it is noise."""
+    z, missing = e.found.z[:-1].astype(np.float64), e.misses
+    q, v = z.T
+    t = np.linspace(-1, 1, e.pairs)
+    count = min(14, max(4, e.pairs // 20))
+    linear = [q, v]
+    groups: dict[str, list[Floats]] = {
+        "drag": [*linear, np.abs(v) * v],
+        "quadratic": [*linear, np.ones_like(q), q * q],
+        "cubic": [*linear, q**3],
+        "anharmonic": [
+            *linear,
+            np.ones_like(q),
+            *(q**i * v**k for i in range(4) for k in range(4) if 1 < i + k < 4),
+        ],
+        "position": [v, *_hats(q, 16).T],
+        "velocity": [q, *_hats(v, 16).T],
+        "stiffness in time": [v, *(q[:, None] * _hats(t, count)).T],
+        "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
+        "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
+    }
+    left = {
+        name: _left(np.stack(columns, axis=1), missing)
+        for name, columns in groups.items()
+        if e.pairs > 3 * len(columns)
+    }
+    size = float(np.max(e.found.residual))
+    fitting = [name for name, share in left.items() if share < 0.35]
+    if not fitting:
+        return [_noise(e, size)]
+    best = min(left[name] for name in fitting)
+    # of those that explain nearly as much, the one of the fewest numbers
+    name = next(name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02))
+    cause, remedy = _sentence(e, name, q, v, missing, size)
+    return [Explanation(cause=cause, remedy=remedy, misfit=left[name])]
+
+
+def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, size: float) -> tuple[str, str]:
+    record, found = e.record, e.found
+    if name == "drag":
+        columns = np.stack([q, v, np.abs(v) * v], axis=1)
+        z = found.z.astype(np.float64)
+        row = np.linalg.lstsq(columns, z[1:, 1], rcond=None)[0]
+        mass = 1.0 if record.mass is None else float(record.mass[e.j])
+        h, scale = abs(float(record.interval)), float(found.size[1])
+        c1, c2 = mass * (1 - row[1]) / h, -mass * row[2] / scale
+        unit = " of the mass" if record.mass is None else ""
+        return (
+            f"A drag c1 v + c2 |v| v acts, with c1 = {c1:.4g} and c2 = {c2:.4g}{unit}, explicit in the force",
+            "leave the quadratic drag out, or judge against a scene that has it",
+        )
+    strength = f"{size:.1e} of the state's size in each frame"
+    if name == "cubic":
+        row = np.linalg.lstsq(np.stack([q, v, q**3], axis=1), found.z.astype(np.float64)[1:, 1], rcond=None)[
+            0
+        ]
+        share = row[2] / row[0] * float(np.max(q**2)) if row[0] else math.nan
+        return (
+            f"The force is anharmonic: a cubic part reaches {share:.2g} of the linear one where largest",
+            "look for a bond or a geometry that is not a linear spring",
+        )
+    causes = {
+        "quadratic": "The force is anharmonic: a quadratic part",
+        "anharmonic": "The motion is anharmonic: the force is not linear in the position, which",
+        "position": "The force is not linear in the position, as one that is clipped or anharmonic, which",
+        "velocity": "The friction is not linear in the velocity, which",
+        "stiffness in time": "The stiffness changes in time, which",
+        "friction in time": "The friction changes in time, which",
+        "map in time": "The step or the stiffness changes in time, which",
+    }
+    remedies = {
+        "stiffness in time": "look for a parameter or a clock that moves during the run",
+        "friction in time": "look for a thermostat or a damping that is switched during the run",
+        "map in time": "look for a step that is adapted, or give a part of the trajectory",
+    }
+    return (
+        f"{causes[name]} moves a frame by {strength}",
+        remedies.get(name, "look for a force that is not that of a linear spring"),
+    )
+
+
+def _noise(e: Evidence, size: float) -> Explanation:
+    """What is left over is irregular."""
+    rows = e.found.residual
+    ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
+    where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
+    return Explanation(
+        cause=f"Noise: what one map leaves over is irregular, {size:.1e} of the state's size in each frame, "
+        f"in {where}, and has no quanta of a known arithmetic",
+        remedy="look for a thermostat, an iteration that stops early, or a sum in changing order",
+        misfit=size,
+    )

@@ -1,0 +1,396 @@
+"""Families of one-step maps: every scheme of the catalogue, each way to put friction into it, held forces.
+
+On a spring a scheme is a map of (q, v h) with one unknown, a = (h w)**2, or two where there is friction of
+rate gamma, g = gamma h.  Where friction acts within the step, and by which law, gives different maps, and
+maps of different springs may agree: implicit Euler on k is semi-implicit Euler on a damped spring of
+stiffness k/(1 + a).  `search.coincident` finds such identities by matching families against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from springcheck.arrays import Reals
+from springcheck.schemes import SCHEMES, Scheme, number, roundings
+
+Stage: TypeAlias = tuple[str, Fraction | str]
+"""kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`
+(half of it by the old v, half by the new), and `remembered` (a force of the last half step's velocity)."""
+
+ONE, HALF = Fraction(1), Fraction(1, 2)
+
+EXPLICIT = "explicit friction in the force"
+IMPLICIT = "friction implicit in v"
+EXPONENTIAL = "exponential friction"
+CENTRED = "friction by the mean of old and new v"
+
+HELD_SHARES = 64
+"""Largest number of substeps that a held force is looked for at; a force held over more is a held force."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """A one-step map with unknowns a and, where `damped`, g; `place` says where the friction acts."""
+
+    name: str
+    scheme: str
+    stages: tuple[Stage, ...] = ()
+    stability: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] = ((), ())
+    """Numerator and denominator, from the constant up, of the stability function R(h L)."""
+    damped: bool = False
+    laws: tuple[str, ...] = ()
+    """Friction laws that have this map, each with a rate of its own (`rates`)."""
+    place: str = ""
+    flow: bool = False
+    path: int = 0
+    limit: float = np.inf
+    formula: str = ""
+    """A fault's map that stages do not give, by its name in FORMULAS."""
+    cause: str = ""
+    remedy: str = ""
+    """What is wrong, and what to do, where the family is a fault."""
+    held: bool = False
+    """Whether g is the share of h F/m that enters the position: a force held over substeps."""
+
+    def unit(self, a: Reals, g: Reals) -> Reals:
+        """One-step matrices (c, 2, 2) on (q, v h), a and g (c,), in their width."""
+        a, g = np.broadcast_arrays(a, g)
+        if self.held:
+            one = np.ones_like(a)
+            return _matrices(1 - g * a, one, -a, one)
+        if self.formula:
+            return FORMULAS[self.formula](a)
+        out = _exponential(a, g) if self.flow else _rational(self.stability, a, g)
+        return _staged(self.stages, out, a, g)
+
+    def rate(self, law: str, g: float) -> float:
+        """gamma h of a law whose decay within a step is exp(-g)."""
+        if law.startswith(IMPLICIT):
+            return float(np.expm1(g))
+        return float(-np.expm1(-g)) if law.startswith("a factor") else g
+
+
+def _matrices(a: Reals, b: Reals, c: Reals, d: Reals) -> Reals:
+    return np.moveaxis(np.array([[a, b], [c, d]]), -1, 0)
+
+
+@cache
+def _number(x: Fraction | str) -> np.longdouble:
+    return np.longdouble(number(x, np.longdouble))
+
+
+def _staged(stages: tuple[Stage, ...], start: Reals, a: Reals, g: Reals) -> Reals:
+    """The stages applied to maps (c, 2, 2), one row of them the position, the other the velocity."""
+    q, v = start[:, 0, :], start[:, 1, :]
+    a, g = a[:, None], g[:, None]
+    for kind, share in stages:
+        c = a.dtype.type(_number(share))
+        if kind == "drift":
+            q = q + c * v
+        elif kind == "kick":
+            v = v - (c * a) * q
+        elif kind == "friction":
+            v = v * np.exp(-c * g)
+        elif kind == "explicit":
+            v = v - c * (a * q + g * v)
+        elif kind == "implicit":
+            v = (v - c * a * q) / (1 + c * g)
+        elif kind == "centred":
+            v = ((1 - c * g / 2) * v - c * a * q) / (1 + c * g / 2)
+        else:
+            v = v - c * (a * q + g * (v + c * a * q) / (1 - c * g))
+    return np.stack([q, v], axis=1)
+
+
+def _rational(stability: tuple[tuple[Fraction, ...], tuple[Fraction, ...]], a: Reals, g: Reals) -> Reals:
+    """R(L) of L = [[0, 1], [-a, -g]], by Horner's rule."""
+    numerator, denominator = stability
+    if not numerator:
+        zero, one = np.zeros_like(a), np.ones_like(a)
+        return _matrices(one, zero, zero, one)
+
+    width = a.dtype.type
+
+    def horner(row: tuple[Fraction, ...]) -> tuple[Reals, Reals]:
+        # every polynomial of L is x I + y L, because L**2 = -g L - a I
+        x, y = np.full_like(a, width(_number(row[-1]))), np.zeros_like(a)
+        for c in row[-2::-1]:
+            x, y = width(_number(c)) - a * y, x - g * y
+        return x, y
+
+    x, y = horner(numerator)
+    u, w = horner(denominator)
+    # (x + y L) / (u + w L): the adjugate of u + w L is (u - w g) - w L
+    det = u * u - u * w * g + w * w * a
+    p, r = u - w * g, -w
+    x, y = (x * p - a * y * r) / det, (x * r + y * p - g * y * r) / det
+    return _matrices(x, y, -a * y, x - g * y)
+
+
+def _exponential(a: Reals, g: Reals) -> Reals:
+    """exp(L), of any damping: L + g/2 is traceless, and its square a multiple of one."""
+    w2 = a - g * g / 4
+    w = np.sqrt(np.abs(w2))
+    even = np.where(w2 >= 0, np.cos(w), np.cosh(np.minimum(w, 1e3)))
+    safe = np.where(w == 0, 1, w)
+    odd = np.where(w == 0, 1, np.where(w2 >= 0, np.sin(w), np.sinh(np.minimum(w, 1e3))) / safe)
+    decay = np.exp(-g / 2)
+    return _matrices(
+        decay * (even + odd * g / 2), decay * odd, -decay * odd * a, decay * (even - odd * g / 2)
+    )
+
+
+def stability_function(
+    a: tuple[tuple[Fraction, ...], ...], b: tuple[Fraction, ...]
+) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+    """R(z) = 1 + z b (1 - z A)^-1 1 of a tableau with at most one implicit stage, the last.
+
+    Hairer & Wanner, Solving Ordinary Differential Equations II, IV.3.
+    """
+    own = a[-1][len(b) - 1] if len(a[-1]) == len(b) else Fraction(0)
+    denominator = (ONE, -own)
+    # the stages' derivatives are polynomials of z over that denominator: y_i = 1 + z sum a_ij y_j
+    stages: list[list[Fraction]] = []
+    for i, row in enumerate(a):
+        y = [ONE]
+        for c, past in zip(row[:i], stages, strict=False):
+            y = _plus(y, [Fraction(0), *(c * x for x in past)])
+        stages.append(y)
+    out = [ONE]
+    for i, (c, y) in enumerate(zip(b, stages, strict=True)):
+        last = _plus(y, [Fraction(0), *(-own * x for x in y)]) if own and i < len(b) - 1 else y
+        out = _plus(
+            out if not own or i else _plus(out, [Fraction(0), -own]), [Fraction(0), *(c * x for x in last)]
+        )
+    return tuple(out), denominator if own else (ONE,)
+
+
+def _plus(x: list[Fraction], y: list[Fraction]) -> list[Fraction]:
+    n = max(len(x), len(y))
+    return [
+        p + q for p, q in zip(x + [Fraction(0)] * (n - len(x)), y + [Fraction(0)] * (n - len(y)), strict=True)
+    ]
+
+
+def _of(scheme: Scheme, *, damped: bool) -> Family:
+    """The scheme itself, or with friction as its own force does it."""
+    stages: tuple[Stage, ...] = tuple(("kick" if kind == "pull" else kind, c) for kind, c in scheme.stages)
+    own = any(kind == "friction" for kind, _ in stages)
+    if damped and not own:
+        stages = tuple(("explicit" if kind == "kick" else kind, c) for kind, c in stages)
+    implicit = damped and scheme.implicit
+    law = EXPONENTIAL if own else IMPLICIT if implicit else "" if scheme.flow else EXPLICIT
+    return Family(
+        name=scheme.name + (", damped" if damped else ""),
+        scheme=scheme.name,
+        stages=stages,
+        stability=stability_function(scheme.a, scheme.b) if scheme.b else ((), ()),
+        damped=damped,
+        laws=((law,) if law else ("friction",)) if damped else (),
+        place="",
+        flow=scheme.flow,
+        path=1 if scheme.flow else roundings(scheme),
+        limit=scheme.limit,
+    )
+
+
+UNDAMPED = tuple(_of(s, damped=False) for s in SCHEMES.values() if (s.one_step and not s.mixes) or s.flow)
+DECAY = (IMPLICIT, EXPONENTIAL)
+SCALED = (EXPONENTIAL, IMPLICIT, "a factor 1 - gamma h")
+
+
+def _placed(scheme: str, place: str, laws: tuple[str, ...], *stages: Stage) -> Family:
+    return Family(
+        name=f"{scheme}, friction {place}",
+        scheme=scheme,
+        stages=stages,
+        damped=True,
+        laws=laws,
+        place=place,
+        path=roundings(SCHEMES[scheme]) + 3,
+        limit=SCHEMES[scheme].limit,
+    )
+
+
+def _ended(scheme: Scheme) -> Family:
+    """The velocity scaled after each step."""
+    own = _of(scheme, damped=False)
+    if own.stability[0]:
+        return Family(
+            name=f"{own.name}, friction at the end of the step", scheme=own.name, stages=(("friction", ONE),),
+            stability=own.stability, damped=True, laws=SCALED, place="at the end of the step",
+            path=own.path + 3, limit=own.limit,
+        )  # fmt: skip
+    return _placed(own.name, "at the end of the step", SCALED, *own.stages, ("friction", ONE))
+
+
+KICK, DRIFT, DECAYS = ("kick", ONE), ("drift", ONE), ("friction", ONE)
+HALF_KICK, HALF_DRIFT, HALF_DECAY = ("kick", HALF), ("drift", HALF), ("friction", HALF)
+EULER, EULER_LATE, VERLET, POSITION = (
+    "semi-implicit-euler", "semi-implicit-euler-drift-kick", "velocity-verlet", "position-verlet",
+)  # fmt: skip
+
+DAMPED = (
+    *(_of(s, damped=True) for s in SCHEMES.values() if (s.one_step and not s.mixes) or s.flow),
+    _placed(EULER, "after the kick", DECAY, KICK, DECAYS, DRIFT),
+    _placed(EULER_LATE, "after the kick", DECAY, DRIFT, KICK, DECAYS),
+    _placed(EULER_LATE, "before the drift", DECAY, DECAYS, DRIFT, KICK),
+    _placed(VERLET, "in each half kick", (IMPLICIT,), ("implicit", HALF), DRIFT, ("implicit", HALF)),
+    _placed(VERLET, "explicit before and implicit after the drift (BBK)", (CENTRED,),
+            ("explicit", HALF), DRIFT, ("implicit", HALF)),
+    _placed(VERLET, "of the velocity half a step ago", (EXPLICIT,),
+            ("remembered", HALF), DRIFT, ("explicit", HALF)),
+    _placed(VERLET, "before the first half kick", DECAY, DECAYS, HALF_KICK, DRIFT, HALF_KICK),
+    _placed(VERLET, "after the first half kick", DECAY, HALF_KICK, DECAYS, DRIFT, HALF_KICK),
+    _placed(VERLET, "before the second half kick", DECAY, HALF_KICK, DRIFT, DECAYS, HALF_KICK),
+    _placed(VERLET, "half before and half after the step (OBABO)", (EXPONENTIAL,),
+            HALF_DECAY, HALF_KICK, DRIFT, HALF_KICK, HALF_DECAY),
+    _placed(VERLET, "half before and half after the drift", (EXPONENTIAL,),
+            HALF_KICK, HALF_DECAY, DRIFT, HALF_DECAY, HALF_KICK),
+    _placed(POSITION, "centred in the kick", (CENTRED,), HALF_DRIFT, ("centred", ONE), HALF_DRIFT),
+    _placed(POSITION, "after the kick", DECAY, HALF_DRIFT, KICK, DECAYS, HALF_DRIFT),
+    _placed(POSITION, "before the step", DECAY, DECAYS, HALF_DRIFT, KICK, HALF_DRIFT),
+    *(
+        _ended(SCHEMES[name])
+        for name in ("explicit-euler", EULER, "implicit-euler", VERLET, POSITION, "implicit-midpoint",
+                     "rk2-midpoint", "rk4", "ruth3", "forest-ruth", "yoshida4")
+    ),
+)  # fmt: skip
+
+
+def _tableau(*rows: tuple[int | str, ...]) -> tuple[tuple[Fraction, ...], ...]:
+    return tuple(tuple(Fraction(x) for x in row) for row in rows)
+
+
+RK4_ROWS = ((0,), ("1/2",), (0, "1/2"), (0, 0, 1))
+RK4_WEIGHTS = ("1/6", "1/3", "1/3", "1/6")
+WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
+    (
+        "RK4 whose fourth stage uses the slope of the second stage",
+        ((0,), ("1/2",), (0, "1/2"), (0, 1)),
+        RK4_WEIGHTS,
+    ),
+    (
+        "RK4 whose third stage uses the slope of the first stage",
+        ((0,), ("1/2",), ("1/2",), (0, 0, 1)),
+        RK4_WEIGHTS,
+    ),
+    ("RK4 whose second stage takes a full step", ((0,), (1,), (0, "1/2"), (0, 0, 1)), RK4_WEIGHTS),
+    ("RK4 whose third stage takes a full step", ((0,), ("1/2",), (0, 1), (0, 0, 1)), RK4_WEIGHTS),
+    ("RK4 whose fourth stage takes half a step", ((0,), ("1/2",), (0, "1/2"), (0, 0, "1/2")), RK4_WEIGHTS),
+    ("RK4 with equal weights of its four stages", RK4_ROWS, ("1/4", "1/4", "1/4", "1/4")),
+    ("RK4 with weights 1/6 of all four stages", RK4_ROWS, ("1/6", "1/6", "1/6", "1/6")),
+    ("RK4 with weights 1, 2, 2, 1 divided by 8", RK4_ROWS, ("1/8", "1/4", "1/4", "1/8")),
+    ("RK4 with weights 2, 1, 1, 2 divided by 6", RK4_ROWS, ("1/3", "1/6", "1/6", "1/3")),
+    ("RK4 without its fourth stage", RK4_ROWS, ("1/6", "1/3", "1/3", 0)),
+    ("Heun's method whose weights add up to 2", ((0,), (1,)), (1, 1)),
+    ("the midpoint method whose first stage takes a full step", ((0,), (1,)), (0, 1)),
+)
+"""What is written down wrongly in Runge-Kutta methods, as tableaux."""
+
+
+def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
+    q11, q12 = 1 - drift * first * a, drift + 0 * a
+    return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
+
+
+def _lagging(a: Reals, base: str, steps: int) -> Reals:
+    """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
+    m = FAMILIES[base].unit(a, np.zeros_like(a))
+    det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
+    row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
+    turn = np.zeros_like(m)
+    turn[:, 0, 0], turn[:, 1, :] = 1, row
+    back = np.zeros_like(m)
+    back[:, 0, 0], back[:, 1, 0], back[:, 1, 1] = 1, -row[:, 0] / row[:, 1], 1 / row[:, 1]
+    return np.asarray(turn @ m @ back)
+
+
+FORMULAS: dict[str, Callable[[Reals], Reals]] = {
+    "old force": lambda a: _matrices(1 - a / 2, 1 + 0 * a, -a, 1 + 0 * a),
+    "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
+    "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
+    "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
+    "half drift": lambda a: _splitting(a, 0.5, 0.5, 0.5),
+    "double drift": lambda a: _splitting(a, 0.5, 2, 0.5),
+    "full kicks": lambda a: _splitting(a, 1, 1, 1),
+    "no second kick": lambda a: _splitting(a, 0.5, 1, 0),
+    "no first kick": lambda a: _splitting(a, 0, 1, 0.5),
+    **{
+        f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
+        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for n in (-1, 1)
+    },
+}
+
+_FAULTS = (
+    ("old force", "Velocity Verlet whose second half kick uses the old force, "
+     "so that one force is held over the whole step", "compute the force anew after the drift"),
+    ("halves swapped", "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
+     "move the factor 1/2 from h v to h**2 a"),
+    ("half drift", "Velocity Verlet with a drift of half the step", "drift by the whole step"),
+    ("double drift", "Velocity Verlet with a drift of two steps", "drift by one step between half kicks"),
+    ("full kicks", "Velocity Verlet with two full kicks instead of two half kicks", "halve both kicks"),
+    ("no second kick", "Velocity Verlet without its second half kick", "add the half kick after the drift"),
+    ("no first kick", "Velocity Verlet without its first half kick", "add the half kick before the drift"),
+    ("implicit velocity", "An implicit velocity, but the position is moved by the old velocity",
+     "move the position by the new velocity: q + h v'"),
+    ("one iteration", "Implicit Euler by one fixed-point iteration, so that its equation is not solved",
+     "iterate until the change is rounding, or solve with the Jacobian"),
+)  # fmt: skip
+
+
+def _fault(name: str, cause: str, remedy: str) -> Family:
+    return Family(
+        name=f"fault: {name}", scheme=name, formula=name, cause=cause, remedy=remedy, path=20, limit=1.0
+    )
+
+
+FAULTS = (
+    *(_fault(*row) for row in _FAULTS),
+    *(
+        Family(
+            name=f"fault: {cause}", scheme=cause, cause=cause, path=30, limit=0.0,
+            remedy="compare stages and weights with the tableau",
+            stability=stability_function(_tableau(*rows), _tableau(weights)[0]),
+        )
+        for cause, rows, weights in WRONG_RK4
+    ),
+    *(
+        _fault(
+            f"{name} {side}",
+            f"{SCHEMES[name].title[0].upper()}{SCHEMES[name].title[1:]} whose velocities are one step {side} "
+            f"{'the' if side == 'behind' else 'of the'} positions",
+            "write position and velocity of the same step",
+        )
+        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for side in ("behind", "ahead")
+    ),
+)  # fmt: skip
+"""One-step maps of schemes that are written down or recorded wrongly."""
+
+HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
+
+FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS)}
+
+
+def substeps(share: float, error: float) -> tuple[int | None, bool]:
+    """Number of substeps n that a force is held over, None where no whole number fits and 0 for no end of
+    them; and whether each substep kicks before it drifts.
+
+    The position gets (n + 1)/2n of h**2 F/m where substeps kick first, (n - 1)/2n where they drift first.
+    """
+    off = 2 * share - 1
+    if abs(off) <= 6 * error:
+        return 0, True
+    n = round(1 / abs(off))
+    fits = n >= 2 and n <= HELD_SHARES and abs(abs(off) - 1 / n) <= 6 * error
+    # a whole number is no evidence where the next one fits as well
+    alone = fits and 1 / (n * (n + 1)) > 20 * error
+    return (n if alone else None), off > 0

@@ -1,0 +1,83 @@
+"""What of a record can be judged: the oscillators that move by themselves, or normal modes in their place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from springcheck.errors import IdentificationError
+from springcheck.identify import coupled
+from springcheck.identify.fit import ROUNDING, Map, fit
+from springcheck.identify.record import Record
+from springcheck.identify.search import COARSE
+
+
+def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
+    """The oscillators that can be judged, in a record of their own where they are normal modes; their maps;
+    and notes on those that cannot."""
+    spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
+    moving = np.flatnonzero(spread > 0).tolist()
+    if not moving:
+        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
+    still = len(spread) - len(moving)
+    notes = [f"{still} of {len(spread)} oscillators are at rest and left out"] if still else []
+    free = [j for j in moving if _straight(record, j)]
+    maps = {j: fit(record, j) for j in moving if j not in free}
+    if len(maps) > 1:
+        alone, notes_of = _uncoupled(record, maps)
+        if alone is not None:
+            modes, _ = alone
+            kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
+            good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
+            if good:
+                return modes, good, [kept[i] for i in good], [*notes, *notes_of]
+    good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
+    lost = [j for j in maps if j not in good]
+    if not good:
+        if (lost and maps[lost[0]].conditioned) or not lost:
+            j = lost[0] if lost else free[0]
+            raise IdentificationError(
+                f"no force acts on oscillator {j}: every scheme moves it in a straight line"
+            )
+        raise IdentificationError(
+            f"the states of oscillator {lost[0]} do not span its plane (a standing state, or whole or half "
+            "periods between frames, or an arc shorter than the rounding): record more of the motion"
+        )
+    if free:
+        notes.append(f"{_names(free)} moves freely, in a straight line as by every scheme, and is left out")
+    if lost:
+        notes.append(f"{_names(lost)} shows too little of its motion to be judged, and is left out")
+    return record, good, [maps[j] for j in good], notes
+
+
+def _names(which: list[int]) -> str:
+    return ("oscillator " if len(which) == 1 else "each of oscillators ") + ", ".join(map(str, which))
+
+
+def _straight(record: Record, j: int) -> bool:
+    """Whether a coordinate moves at constant velocity, to the rounding of its numbers and times."""
+    q, v = record.q[:, j], record.v[:, j]
+    size = np.max(np.abs(v))
+    if np.ptp(v) > 64 * ROUNDING * size + 2 * np.max(record.v_quantum[:, j]):
+        return False
+    way = np.arange(len(q)) * record.interval * np.mean(v)
+    unit = 2 * np.max(record.q_quantum[:, j]) + ROUNDING * 64 * np.sqrt(len(q)) * np.max(np.abs(q))
+    return bool(np.max(np.abs(q - q[0] - way)) <= unit + np.abs(way[-1]) * (record.jitter + 64 * ROUNDING))
+
+
+def _forced(found: Map) -> bool:
+    return abs(float(found.entries[1, 0])) >= 6 * math.sqrt(found.covariance[2, 2])
+
+
+def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list[int]] | None, list[str]]:
+    """Normal modes in place of coordinates, where these do not move by themselves and the modes do."""
+    single = max(float(np.max(found.residual)) for found in maps.values())
+    every = list(maps)
+    if single < max(64 * COARSE, 1e-8) or not record.fine:
+        return None, []
+    found = coupled.modes(record, every)
+    if found is None or found[1] > 1e-3 * single:
+        return None, []
+    note = f"the coordinates are coupled, and their {len(every)} normal modes were judged instead of them"
+    return (found[0], every), [note]

@@ -1,0 +1,87 @@
+"""What else could have made the states, and what would tell: sentences beside an identification."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from springcheck.identify.families import FAMILIES
+from springcheck.identify.fit import Map
+from springcheck.identify.record import Record
+from springcheck.identify.search import Joint, coincident, numbers, search, separation
+from springcheck.identify.starts import Terms
+
+APART = 10.0
+"""Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
+may take five away."""
+
+MOST_DIGITS = 9
+"""More digits than single precision has short of double: what needs more, digits do not tell."""
+
+LEAPFROG = {
+    "semi-implicit-euler": "leapfrog with velocities half a step early",
+    "semi-implicit-euler-drift-kick": "leapfrog with velocities half a step late",
+}
+
+
+def hidden_friction(record: Record, found: Map) -> float:
+    """Largest rate c/m [1/T] that the map's determinant leaves room for: five standard errors of it."""
+    gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
+    error = math.sqrt(float(gradient @ found.covariance @ gradient))
+    loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
+    return (loss + 5 * error) / abs(float(record.interval))
+
+
+def same_maps(record: Record, moving: list[int], maps: list[Map], joint: Joint) -> list[str]:
+    """Damped springs that have the very same map, and what tells them from the scheme without friction."""
+    names = coincident(joint.scheme)
+    if not names or joint.stride != 1:
+        return []
+    terms = [Terms(mass_unknown=record.momenta, jitter=record.jitter) for _ in maps]
+    found = [x for x in search(maps, terms, range(1, 2), tuple(FAMILIES[x] for x in names)) if x.accepted]
+    out = []
+    for x in found[:1]:
+        omega, stiffness, friction = numbers(record, moving, x)
+        of = f"stiffness {stiffness[0]:.9g}" if stiffness else f"angular frequency {omega[0]:.9g}"
+        out.append(
+            f"the same map is {x.scheme} on a damped spring of {of} and friction c/m {friction[0]:.6g}: "
+            "the stiffness or the friction, where known, tells the two apart"
+        )
+    return out
+
+
+def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_stated: bool) -> list[str]:
+    """Why several schemes or numbers of steps are left, and what more the states would have to show."""
+    plainest = joints[0]
+    if plainest.scheme == "exact":
+        why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
+        told = ["more digits", "a larger step"]
+    else:
+        others = [x for x in joints[1:] if (x.scheme, x.stride) != (plainest.scheme, plainest.stride)]
+        least, nearest = min(((separation(maps, plainest, x), x) for x in others), key=lambda pair: pair[0])
+        digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
+        pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
+        if digits > MOST_DIGITS:
+            other = "mass" if record.momenta else "stiffness"
+            friction = " and friction" if plainest.damped or nearest.damped else ""
+            why, told = f"{pair} are the same, on springs of different {other}{friction}", []
+        else:
+            why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
+            told = [f"about {digits} more digit{'s' * (digits > 1)}", "a larger step"] if digits > 0 else []
+            told += ["more frames"] if digits <= 2 else []
+    if record.momenta:
+        told.append("the mass")
+    elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
+        told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
+    listed = " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return [why, *([f"what would tell them apart: {listed}"] if told else [])]
+
+
+def _stiffer(one: Joint, other: Joint) -> bool:
+    """Whether a spring differs in stiffness between two schemes by more than six standard errors."""
+    return any(
+        abs(a.a * one.stride**2 - b.a * other.stride**2)
+        > 6 * (a.a_error * one.stride**2 + b.a_error * other.stride**2)
+        for a, b in zip(one.parts, other.parts, strict=True)
+    )

@@ -1,0 +1,194 @@
+"""Linear maps that are no scheme's: schemes written down wrongly, friction of the wrong sign, wrong units."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.identify.evidence import Evidence, distance, title
+from springcheck.identify.families import FAMILIES, FAULTS, HELD
+from springcheck.identify.fit import Map
+from springcheck.identify.record import Record
+from springcheck.identify.result import Explanation
+from springcheck.identify.search import Joint, distinct, search
+from springcheck.identify.starts import Terms
+
+
+def wrong_map(e: Evidence) -> list[Explanation]:
+    """Schemes that are written down wrongly; friction of the wrong sign; held forces; wrong scales."""
+    ranked: list[tuple[int, Explanation]] = []
+    for joint in search([e.found], [e.terms], range(1, 5), FAULTS):
+        family = FAMILIES[joint.family]
+        if joint.accepted:
+            steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
+            ranked.append((_rank(e, joint), _found(f"{family.cause}{steps}", family.remedy, joint)))
+    for rank, look in ((1, _scales), (2, _negative_friction)):
+        ranked += [(rank, x) for x in look(e)]
+    return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
+
+
+def _rank(e: Evidence, joint: Joint) -> int:
+    """0 for a fault that is nothing else and of the stated stiffness, 3 where the stiffness is another."""
+    if e.stiffness is None or e.record.mass is None:
+        return 0 if joint.stride == 1 else 2
+    part = joint.parts[0]
+    k = float(e.record.mass[e.j]) * part.a * (joint.stride / float(e.record.interval)) ** 2
+    agrees = abs(k / e.stiffness - 1) <= 1e-7 + 6 * part.a_error / abs(part.a)
+    return 0 if agrees else 3
+
+
+def _found(cause: str, remedy: str, joint: Joint) -> Explanation:
+    return Explanation(cause=cause, remedy=remedy, misfit=math.sqrt(joint.chi2))
+
+
+def _negative_friction(e: Evidence) -> list[Explanation]:
+    growing = Terms(
+        mass_unknown=e.terms.mass_unknown, rounding=e.terms.rounding, jitter=e.terms.jitter, growing=True
+    )
+    joints = [
+        x
+        for x in search(
+            [e.found], [growing], range(1, 3), tuple(f for f in distinct(damped=True) if f is not HELD)
+        )
+        if x.accepted and x.parts[0].g < 0
+    ]
+    if not joints:
+        return []
+    best = min(joints, key=lambda x: x.plainness)
+    rate = best.parts[0].g * best.stride / float(e.record.interval)
+    return [
+        _found(
+            f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}: friction of the wrong sign, "
+            "which feeds energy in",
+            "change the sign of the damping force",
+            best,
+        )
+    ]
+
+
+CONSTANTS = (
+    (math.degrees(1), "positions are in degrees, velocities in radians"),
+    (math.radians(1), "positions are in radians, velocities in degrees"),
+    (4.184, "kcal and kJ are mixed up"), (1 / 4.184, "kcal and kJ are mixed up"),
+    (math.sqrt(4.184), "kcal and kJ are mixed up"), (1 / math.sqrt(4.184), "kcal and kJ are mixed up"),
+    (2 * math.pi, "a factor 2 pi"), (1 / (2 * math.pi), "a factor 2 pi"),
+    *((10.0**n, f"a factor {10.0**n:g}, as between two units") for n in (-6, -3, -2, -1, 1, 2, 3, 6)),
+    (2.0, "a factor 2"), (0.5, "a factor 1/2"),
+)  # fmt: skip
+"""Factors between velocities and positions that mean something."""
+
+
+def _scales(e: Evidence) -> list[Explanation]:
+    """Schemes that fit once velocities have another scale, and what that scale means."""
+    if e.terms.mass_unknown:
+        return []
+    free = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
+    fitting = [x for x in search([e.found], [free], range(1, 4)) if x.accepted]
+    fitting.sort(key=lambda x: x.plainness)
+    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 1e-3]
+    meant = [(x, meaning) for x in fitting if (meaning := _meaning(e, x))]
+    if meant:
+        x, (cause, remedy) = meant[0]
+        return [_found(f"{title(x.scheme)}, but {cause}", remedy, x)]
+    if not fitting:
+        return []
+    x = fitting[0]
+    others = "" if len(fitting) == 1 else f" ({len(fitting) - 1} more schemes at factors of their own)"
+    return [
+        _found(
+            f"{x} would fit if velocities were {math.exp(-x.parts[0].log_mass):.6g} times as large{others}",
+            "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m",
+            x,
+        )
+    ]
+
+
+def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
+    """What a scale of the velocities means, by the mass, the stated stiffness and well-known factors."""
+    part = x.parts[0]
+    scale = math.exp(-part.log_mass)
+    error = 1e-6 + 6 * part.mass_error
+
+    def is_(one: float, other: float) -> bool:
+        return abs(one / other - 1) <= error
+
+    h = float(e.record.interval) / x.stride
+    mass = None if e.record.mass is None else float(e.record.mass[e.j])
+    k = None if mass is None else mass * part.a / h**2
+    stiffer = None if k is None or not e.stiffness else k / e.stiffness
+    if stiffer is not None and is_(stiffer, scale**2):
+        if is_(scale, 1 / h**2):
+            return "the step taken is 1/h: it divides by the step", "multiply by the step"
+        return (
+            f"times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs",
+            "look at how time is counted: the times are wrong by that factor",
+        )
+    if mass is not None and is_(scale, mass):
+        if stiffer is not None and is_(stiffer, 1.0):
+            return (
+                "p is treated as a velocity: dq/dt = p and dp/dt = F/m",
+                "divide p by the mass in the drift only",
+            )
+        return "the mass is left out: dq/dt = p", "divide the momentum by the mass in the drift"
+    if mass is not None and is_(scale, 1 / mass):
+        return "velocities are divided by the mass once more", "divide the momentum by the mass once"
+    for factor, meaning in CONSTANTS:
+        if is_(scale, factor):
+            return (
+                f"velocities would have to be {scale:.6g} times as large: {meaning}",
+                "look at the units of positions, velocities and times",
+            )
+    return None
+
+
+def faults_of(
+    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], stated: Floats
+) -> list[Explanation]:
+    """Schemes written down wrongly that have the stated stiffness, where a right one has another."""
+    e = Evidence(
+        record=record, j=moving[0], found=maps[0], terms=terms[0], stiffness=float(stated[moving[0]])
+    )
+    return [
+        _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x)
+        for x in search([e.found], [e.terms], range(1, 3), FAULTS)
+        if x.accepted and _rank(e, x) == 0
+    ]
+
+
+def stiffness_ratio(ratio: float, mass: float | None) -> str:
+    """What a stiffness that is `ratio` times the stated one means."""
+    known = [
+        (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
+        (4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
+        (4.184 / 4.814, "4.814 kJ to a kcal instead of 4.184"),
+        (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
+        *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
+    ]  # fmt: skip
+    if mass is not None:
+        known += [
+            (1 / mass, "the force is divided by the mass although p is a momentum"),
+            (mass, "the mass is left out"),
+        ]
+    return next((text for value, text in known if abs(ratio / value - 1) < 1e-5), "")
+
+
+def misfit(e: Evidence) -> Explanation:
+    """How large the misfit is, in physical terms: growth and phase of a frame."""
+    entries = e.found.entries.astype(np.float64)
+    det = float(np.linalg.det(entries))
+    joints = [x for x in search([e.found], [e.terms], range(1, 2)) if math.isfinite(x.chi2)]
+    nearest = min(joints, key=lambda x: distance(e.found, x.parts[0]), default=None)
+    growth = (
+        f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"
+    )
+    near = ""
+    if nearest is not None:
+        off = distance(e.found, nearest.parts[0])
+        near = f"; the nearest, {title(nearest.scheme)}, misses a frame by {off:.1e} of its size"
+    return Explanation(
+        cause=f"One linear map explains the states, but it is none of the known schemes': {growth}{near}",
+        remedy="compare the order of its stages and their coefficients with the scheme's",
+        misfit=math.nan if nearest is None else distance(e.found, nearest.parts[0]),
+    )
