@@ -68,6 +68,9 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     ]
 
 
+SHOWN = 4
+"""Schemes that a sentence names of those that would fit at a scale of their own."""
+
 CONSTANTS = (
     (math.degrees(1), "positions are in degrees, velocities in radians"),
     (math.radians(1), "positions are in radians, velocities in degrees"),
@@ -95,14 +98,17 @@ def _scales(e: Evidence) -> list[Explanation]:
     if not fitting:
         return []
     x = fitting[0]
-    others = "" if len(fitting) == 1 else f" ({len(fitting) - 1} more schemes at factors of their own)"
-    return [
-        _found(
-            f"{x} would fit if velocities were {math.exp(-x.parts[0].log_mass):.6g} times as large{others}",
-            "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m",
-            x,
+    scale = {str(y): math.exp(-y.parts[0].log_mass) for y in fitting}
+    cause = f"{x} would fit if velocities were {scale[str(x)]:.6g} times as large"
+    if len(fitting) > 1:
+        # symmetric schemes have the same map but for the scale, so each has one of its own
+        each = "; ".join(f"{name}: {value:.6g}" for name, value in list(scale.items())[:SHOWN])
+        more = f"; and {len(fitting) - SHOWN} more" if len(fitting) > SHOWN else ""
+        cause = (
+            f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}{more}"
         )
-    ]
+    advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
+    return [_found(cause, advice, x)]
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
