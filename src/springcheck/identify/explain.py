@@ -76,6 +76,9 @@ def _few_bad_frames(e: Evidence) -> list[Explanation]:
     if before < FALLS * after:
         return []
     fitting = matched(found, e.terms)
+    if not fitting and after > 8 * float(np.median(e.unit)):
+        # the rest is no single motion either, as a solver's that begins with small steps
+        return []
     whose = f" of {title(fitting[0].scheme)}" if fitting else ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
