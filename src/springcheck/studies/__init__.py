@@ -5,7 +5,7 @@ They measure how good a scheme is.  A study's own control may fail it; a large e
 
 from __future__ import annotations
 
-from springcheck.studies import ensemble, extremes, faults, precision, run, stability
+from springcheck.studies import census, ensemble, extremes, faults, precision, run, stability
 from springcheck.studies.study import Study
 
 STUDIES: tuple[Study, ...] = (
@@ -15,5 +15,6 @@ STUDIES: tuple[Study, ...] = (
     precision.STUDY,
     stability.STUDY,
     extremes.STUDY,
+    census.STUDY,
 )
 """Every study, in the order in which `--help` names them."""

@@ -1,0 +1,46 @@
+"""All orbits of the blog's spring in one phase portrait, grouped by the scheme that the states show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from springcheck.figures.style import look, save, style
+from springcheck.studies.census.result import Census, title
+
+MOST_NAMES = 4
+
+
+def draw(census: Census, folder: Path) -> list[Path]:
+    """Draw the census into a folder; returns the files."""
+    with style():
+        return save(portrait(census), folder, "census")
+
+
+def portrait(census: Census, axes: Axes | None = None) -> Figure:
+    """Orbits in the plane of q and p: one colour and line a scheme, a dot where each orbit ends."""
+    figure = Figure(figsize=(8.6, 5.6), layout="constrained")
+    axes = figure.add_subplot()
+    turn = np.linspace(0, 2 * np.pi, 400)
+    axes.plot(np.cos(turn), np.sin(turn), color="#bbbbbb", linewidth=4, label="exact", zorder=1)
+    groups = census.grouped
+    for i, (name, members) in enumerate(groups.items()):
+        how = look(i)
+        for j, x in enumerate(members):
+            names = [y.method for y in members[:MOST_NAMES]]
+            more = len(members) - len(names)
+            label = f"{title(name)}\n" + ", ".join(names) + (f" and {more} more" if more else "")
+            axes.plot(x.q, x.p, linewidth=0.9, label=label if j == 0 else None, zorder=2, **how)
+            axes.plot(x.q[-1], x.p[-1], "o", color=how["color"], markersize=4, zorder=3)
+    axes.set_aspect("equal")
+    axes.set_xlabel("q")
+    axes.set_ylabel("p")
+    axes.set_title(
+        f"The blog's spring (m = k = 1, h = 0.1, 200 steps) by {len(census.entries)} methods: "
+        "the attachment decides the scheme"
+    )
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=6.5)
+    return figure

@@ -1,0 +1,184 @@
+"""The census: every method on the blog's spring and on an uneven one, named by its states alone."""
+
+from __future__ import annotations
+
+import hashlib
+from argparse import Namespace
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from springcheck import engines, schemes, simulate
+from springcheck.engines.contract import Label
+from springcheck.errors import IdentificationError, MethodError
+from springcheck.identify import Identification, identify
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import load_scene
+from springcheck.studies import keeper
+from springcheck.studies.census.result import ENTRIES, Census, Entry
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.keeper import Keeper, each
+from springcheck.studies.study import Progress
+from springcheck.trajectory import Trajectory
+
+EVERY = "*:*"
+"""Every method of every engine, default or not."""
+
+BLOG, UNEVEN = "spring", "spring-uneven"
+
+REPEATS = 2
+
+MOST_SUBSTEPS = 64
+"""A force held over more substeps is a force held for good."""
+
+
+def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Census:
+    """Run and name every method that these labels or globs name, all that are here when none is given.
+
+    Raises MethodError where none of them can be run.
+    """
+    usable: list[Label] = []
+    left = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
+    for label in engines.match(tuple(methods) or (EVERY,)):
+        scenes = (load_scene(BLOG), load_scene(UNEVEN))
+        reasons = [engines.refusal(scene, label) for scene in scenes] + [engines.absence(label.engine)]
+        reason = next((x for x in reasons if x), None)
+        if reason:
+            left.append(LeftOut(method=str(label), reason=reason))
+        else:
+            usable.append(label)
+    if not usable:
+        raise MethodError(f"none of these methods moves a spring: {left[0].method}: {left[0].reason}")
+    kept = kept or Keeper()
+    found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
+    return Census(entries=tuple(found), left_out=tuple(left), taken_up=kept.taken_up)
+
+
+def record(
+    path: str | Path, methods: Sequence[str] = (), *, force: bool = False, progress: Progress | None = None
+) -> Census:
+    """Like `measure`, kept in a store; an unfinished census of the same command is taken up."""
+    labels = engines.match(tuple(methods) or (EVERY,))
+    with keeper.kept(path, keeper.command("census", labels), force=force, progress=progress) as kept:
+        census = measure(methods, kept=kept)
+        kept.commit("census", census.document())
+    return census
+
+
+def perform(options: Namespace, progress: Progress | None) -> Census:
+    """What `springcheck census` does."""
+    path = Path(options.output or "census.h5")
+    return replace(record(path, options.method, force=options.force, progress=progress), path=path)
+
+
+def stored(path: str | Path) -> Census:
+    """The census that `record` has kept.  StoreError where the file holds none."""
+    return keeper.restored(path, "census", _restored)
+
+
+def _restored(kept: keeper.Kept) -> Census:
+    return Census(
+        entries=tuple(kept.found(ENTRIES, one["method"]) for one in kept.document["entries"]),
+        left_out=tuple(LeftOut(**one) for one in kept.document["left_out"]),
+        path=kept.path,
+    )
+
+
+def entry(label: Label) -> Entry:
+    """What one method is, by its states."""
+    blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
+    orbit, run = simulate.run(blog, label), simulate.run(uneven, label)
+    # a short run is timed by its fastest repetition
+    times = [run.timing.run, *(simulate.run(uneven, label).timing.run for _ in range(REPEATS))]
+    method = engines.method(label)
+    found = None if method.adaptive else _identified(uneven, run)
+    name = "adaptive" if method.adaptive else _name(uneven, run, found)
+    steps = max(run.outcome.step, 1)
+    states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
+    return Entry(
+        method=str(label),
+        version=", ".join(f"{key} {value}" for key, value in engines.load(label.engine).version().items()),
+        claimed=method.scheme,
+        found=name,
+        agrees=_agrees(uneven, method.scheme, name),
+        substeps=0 if found is None or found.stride is None else found.stride,
+        velocity_offset=np.nan if found is None else float(found.velocity_offset),
+        area=np.nan if method.adaptive else _determinant(run) - 1,
+        friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
+        precision=found.precision if found is not None and found.fits else run.arithmetic.name,
+        amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
+        force_calls=run.force_calls / steps,
+        seconds=min(times) / steps,
+        digest=hashlib.sha256(states.tobytes()).hexdigest()[:16],
+        q=orbit.q[:, 0].copy(),
+        p=orbit.p[:, 0].copy(),
+    )
+
+
+def _spring(scene: Scene) -> tuple[float, float]:
+    """Mass and stiffness of a scene of one mass on one spring."""
+    return float(scene.m[0]), float(scene.system.hessian_diagonal(scene.q)[0])
+
+
+def _identified(scene: Scene, run: Trajectory) -> Identification | None:
+    """What the states say, the mass, the stiffness and the step being known."""
+    m, k = _spring(scene)
+    try:
+        return identify(run.t, run.q, run.p, mass=m, stiffness=k, step=scene.step)
+    except IdentificationError:
+        return None
+
+
+def _map(run: Trajectory) -> np.ndarray:
+    """The one-step matrix (2, 2) on (q, p) that fits the states best."""
+    z = np.stack([run.q[:, 0], run.p[:, 0]])
+    return np.asarray(z[:, 1:] @ np.linalg.pinv(z[:, :-1]))
+
+
+def _determinant(run: Trajectory) -> float:
+    return float(np.linalg.det(_map(run)))
+
+
+def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
+    """The scheme that the states show: of the catalogue, or a force held over substeps, or none."""
+    if found is not None and found.verdict == "named" and found.fits and found.scheme:
+        if found.scheme in schemes.SCHEMES:
+            return found.scheme
+    elif found is not None and found.verdict == "not told apart":
+        return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))
+    return _held(scene, run) or "none that is known"
+
+
+def _held(scene: Scene, run: Trajectory) -> str:
+    """A force held over n substeps, whose map [[1 - g a, h/m], [-h k, 1]] has g = (n + 1)/2n, or ""."""
+    m, k = _spring(scene)
+    h, found = scene.step, _map(run)
+    a = h * h * k / m
+    g = (1 - found[0, 0]) / a
+    expected = np.array([[1 - g * a, h / m], [-h * k, 1.0]])
+    scale = np.array([[1, 1 / np.sqrt(m * k)], [np.sqrt(m * k), 1]])
+    # 200 states of a motion of size 1: the fit of their map is good to some hundred roundings
+    if np.any(np.abs(found - expected) > 1e-12 * scale) or not g + 1e-10 >= 0.5:
+        return ""
+    if abs(g - 0.5) < 1e-10:
+        return "force-held-rk4"
+    n = 1 / (2 * g - 1)
+    whole = round(n)
+    return f"force-held-{whole}" if 2 <= whole <= MOST_SUBSTEPS and abs(n - whole) < 1e-8 * n * n else ""
+
+
+def _agrees(scene: Scene, claimed: str, found: str) -> bool:
+    """Whether two schemes have the same map on a spring; True where one of them has none to compare."""
+    m, k = (np.array([x]) for x in _spring(scene))
+    try:
+        one, other = schemes.scheme(claimed), schemes.scheme(found)
+    except MethodError:
+        # several that nothing tells apart, or an adaptive solver
+        return found == "adaptive" or claimed in found.split(" or ") or claimed == "unknown"
+    if not (one.one_step and other.one_step):
+        return True
+    maps = [schemes.matrix(x, h=scene.step, m=m, k=k)[0] for x in (one, other)]
+    return bool(np.allclose(maps[0], maps[1], rtol=1e-14, atol=1e-14))

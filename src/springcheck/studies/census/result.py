@@ -1,0 +1,99 @@
+"""What the census has found: one entry for each engine and way to attach a spring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springcheck import schemes
+from springcheck.arrays import Floats
+from springcheck.studies import keeper
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.tables import Record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Entry:
+    """One method of one engine.  Numbers that the states do not give are NaN, names empty."""
+
+    method: str
+    version: str
+    claimed: str
+    """The scheme that the engine is declared with here."""
+    found: str
+    """The scheme that the states of `spring-uneven` show, or what they show instead of one."""
+    agrees: bool
+    """Whether the two have the same map; True where nothing can be compared."""
+    substeps: int
+    """Steps of the found scheme from one state to the next; 0 where none was found."""
+    velocity_offset: float
+    """Time of the velocities after that of the positions, in steps."""
+    area: float
+    """Determinant of the measured map of one step less 1: 0 for a step that keeps area."""
+    friction: float
+    """Friction c/m that nobody asked for, with the stiffness as stated [1/T]."""
+    precision: str
+    amplitude: float
+    """Of the blog's spring after its 200 steps; 1 is exact."""
+    force_calls: float
+    """A step, counted by us."""
+    seconds: float
+    """A step, on `spring-uneven`, every state read."""
+    digest: str
+    """Of the states of the blog's spring: equal for engines that agree bit for bit."""
+    q: Floats
+    """The orbit of the blog's spring (f,)."""
+    p: Floats
+
+
+ENTRIES: Record[Entry] = Record(kind=Entry, beginning="census/", signal="p", axes=("q",))
+"""A table for each method: the orbit, and everything else as attributes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Census:
+    """The whole study."""
+
+    entries: tuple[Entry, ...]
+    left_out: tuple[LeftOut, ...]
+    taken_up: int = 0
+    path: Path | None = None
+
+    @property
+    def partners(self) -> Mapping[str, tuple[str, ...]]:
+        """For each method the others whose orbits of the blog's spring are the same bit for bit."""
+        same: dict[str, list[str]] = {}
+        for entry in self.entries:
+            same.setdefault(entry.digest, []).append(entry.method)
+        return {x.method: tuple(y for y in same[x.digest] if y != x.method) for x in self.entries}
+
+    @property
+    def grouped(self) -> Mapping[str, tuple[Entry, ...]]:
+        """Entries by the scheme that was found, the most frequent first."""
+        found: dict[str, list[Entry]] = {}
+        for entry in self.entries:
+            found.setdefault(entry.found, []).append(entry)
+        return {name: tuple(found[name]) for name in sorted(found, key=lambda name: -len(found[name]))}
+
+    @property
+    def status(self) -> int:
+        """1 where an engine is declared with another scheme than its states show, 2 where nothing was run."""
+        if not self.entries:
+            return 2
+        return 0 if all(entry.agrees for entry in self.entries) else 1
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON; the orbits are in the tables of the store."""
+        rows = []
+        for entry in self.entries:
+            row = keeper.plain(entry)
+            rows.append({key: value for key, value in row.items() if key not in ("q", "p")})
+            rows[-1]["partners"] = list(self.partners[entry.method])
+        return {"entries": rows, "left_out": keeper.plain(self.left_out)}
+
+
+def title(name: str) -> str:
+    """A found scheme in words."""
+    return schemes.title(name).partition(":")[0]

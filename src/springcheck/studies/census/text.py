@@ -1,0 +1,63 @@
+"""The census as text: one row a method, under the scheme that its states show."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+import numpy as np
+
+from springcheck.studies.census.result import Census, Entry, title
+from springcheck.studies.text import left_out, taken_up
+from springcheck.text import Lines, Row, plain, seconds, table
+
+TITLES = (
+    "method", "amplitude", "det - 1", "velocity", "friction", "arithmetic", "forces", "time", "same bits as"
+)  # fmt: skip
+
+
+def lines(census: Census, options: Namespace | None = None) -> Lines:
+    """The whole report."""
+    out: Lines = [
+        plain("What every engine runs, by its states", "bold"),
+        plain("Amplitude: of the blog's spring after 200 steps, exactly 1.  All else: spring-uneven."),
+        *taken_up(census.taken_up, "methods"),
+        plain(),
+    ]
+    rows: list[Row] = []
+    partners = census.partners
+    for name, members in census.grouped.items():
+        rows.append(plain(title(name), "italic"))
+        rows += [_row(x, partners[x.method]) for x in members]
+    out.append(table(TITLES, rows, left=("method", "arithmetic", "same bits as")))
+    out += [
+        plain(f"{x.method} is declared as {title(x.claimed)}; its states show {title(x.found)}")
+        for x in census.entries
+        if not x.agrees
+    ]
+    out += left_out(census.left_out)
+    return [*out, plain(f"Stored in {census.path}")] if census.path else out
+
+
+def _row(x: Entry, partners: tuple[str, ...]) -> Row:
+    return [
+        plain("  " + x.method, "" if x.agrees else "bold red"),
+        f"{x.amplitude:.4f}",
+        _number(x.area, 1e-13),
+        "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
+        _number(x.friction, 1e-9),
+        x.precision,
+        f"{x.force_calls:.3g}",
+        seconds(x.seconds),
+        _few(partners),
+    ]
+
+
+def _number(x: float, least: float) -> str:
+    if np.isnan(x):
+        return "-"
+    return "0" if abs(x) < least else f"{x:+.2e}"
+
+
+def _few(names: tuple[str, ...]) -> str:
+    """The names, or two of them and how many more there are."""
+    return ", ".join(names) if len(names) <= 2 else f"{names[0]}, {names[1]} and {len(names) - 2} more"
