@@ -15,9 +15,9 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "workers", "arrays", "physics", "schemes", "engines", "trajectory", "store",
-    "formats", "text", "simulate", "checks", "compare", "identify", "doors", "figures", "studies", "inspect",
-    "plot", "listing", "api", "cli", "__main__",
+    "interrupts", "errors", "slips", "workers", "arrays", "physics", "schemes", "engines",
+    "trajectory", "store", "formats", "text", "simulate", "checks", "compare", "identify", "doors",
+    "figures", "studies", "inspect", "plot", "listing", "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))

@@ -1,6 +1,8 @@
 """``springcheck`` and ``python -m springcheck``."""
 
+import os
 import sys
+import warnings
 
 from springcheck import interrupts
 
@@ -9,15 +11,22 @@ def main() -> int:
     """The command line as a program of its own, which can be interrupted from its first line on."""
     interrupts.install()
     try:
-        from springcheck import cli
+        from springcheck import cli, slips
 
+        slips.open_streams()
+        if not sys.warnoptions:
+            # the tests make errors of them; a user can do nothing about NumPy's
+            warnings.simplefilter("ignore")
         status = cli.main()
         interrupts.finish()
-    except BaseException:
+    except BaseException as error:
         # an import that was interrupted may raise an error of its own
-        if not interrupts.seen():
+        if interrupts.seen():
+            interrupts.leave()
+        if not isinstance(error, Exception) or os.environ.get("SPRINGCHECK_TRACEBACK"):
             raise
-        interrupts.leave()
+        sys.stderr.write(f"springcheck: {slips.one_line(error)}\n")
+        status = 2
     if interrupts.seen():
         interrupts.leave()
     return status

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springcheck import interrupts
-from springcheck.errors import SpringcheckError, StoreError, StoreWarning, plain
+from springcheck import interrupts, slips
+from springcheck.errors import IdentificationError, SpringcheckError, StoreError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study, engine_option
 
@@ -33,12 +32,16 @@ INTERRUPTED = interrupts.STATUS
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 a mistake."""
-    options = _parser().parse_args(arguments)
+    try:
+        options = _parser().parse_args(arguments)
+    except OSError as error:
+        return _mistake(error)
     command: Callable[[argparse.Namespace], int] = options.command
     kept = "keeps" in options and options.keeps(options)
     what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
     interrupts.announce(f"interrupted; {what}")
     try:
+        slips.look(options)
         with _said(), _readable(options):
             if any(getattr(options, name, None) for name in ("engine", "stepper", "program")) and (
                 command is not _identify
@@ -46,7 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 from springcheck import doors
 
                 doors.bring(options)
-            return command(options)
+            status = command(options)
+            # while a full disk can still be said
+            sys.stdout.flush()
+            return status
     except KeyboardInterrupt:
         return _interrupted(what)
     except Exception as error:
@@ -128,14 +134,14 @@ def _mistake(error: SpringcheckError | OSError) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = slips.Parser(
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
     for study in STUDIES:
         parser_of = commands.add_parser(study.name, help=study.about)
@@ -145,9 +151,7 @@ def _parser() -> argparse.ArgumentParser:
     inspect = commands.add_parser("inspect", help="what is in a store")
     inspect.add_argument("file", metavar="FILE")
     inspect.add_argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory")
-    inspect.add_argument(
-        "--rows", type=int, default=20, metavar="N", help="how many frames of it (default 20)"
-    )
+    inspect.add_argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)")
     inspect.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
     inspect.add_argument("--json", action="store_true", help="one JSON document on standard output")
     inspect.set_defaults(command=_inspect)
@@ -199,7 +203,7 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
 
-        print(f"springcheck {version('springcheck')}")
+        print(f"springcheck {version('springcheck')}", flush=True)
         parser.exit()
 
 
@@ -234,6 +238,8 @@ def _study(study: Study, options: argparse.Namespace) -> int:
         _document({**found.document(), **({"not_trusted": doubts} if source else {})})
     elif not options.quiet:
         _show(study.lines(found, options))
+    elif found.status == 2:
+        print("springcheck: nothing was measured; without --quiet the report says why", file=sys.stderr)
     return found.status or int(bool(doubts))
 
 
@@ -271,10 +277,11 @@ def _progress(options: argparse.Namespace, title: str) -> Iterator[Progress | No
 def _inspect(options: argparse.Namespace) -> int:
     from springcheck import inspect
 
-    if options.rows < 1:
-        raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
+    rows = 20 if options.rows is None else options.rows
+    if rows < 1:
+        raise SpringcheckError(f"--rows {rows}: a number of frames from 1 on is needed")
     doubts = _doubts(options.file)
-    found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=options.rows)
+    found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=rows)
     _warn(options.file, doubts)
     if options.json:
         _document({"not_trusted": doubts, **inspect.document(found)})
@@ -291,12 +298,18 @@ def _identify(options: argparse.Namespace) -> int:
         raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
     if options.stepper is not None:
         doubts = []
-        found = {options.stepper: identify.identify_stepper(identify.load_stepper(options.stepper))}
+        # what it prints is not ours to show
+        with redirect_stdout(sys.stderr):
+            found = {options.stepper: identify.identify_stepper(identify.load_stepper(options.stepper))}
     else:
         stated = {"mass": options.mass, "stiffness": options.stiffness, "step": options.step}
         for name, value in stated.items():
-            if value is not None and not (math.isfinite(value) and (value > 0 or name != "mass")):
-                raise SpringcheckError(f"--{name} {value}: a finite number is needed, a mass above 0")
+            if value is None or (value == 0 and name == "stiffness"):
+                continue
+            # beyond these sizes the squares of numbers are none
+            if not 1e-150 < abs(value) < 1e150 or (name == "mass" and value < 0):
+                needed = "a number of a size from 1e-150 to 1e150, a mass above 0"
+                raise SpringcheckError(f"--{name} {value:g}: {needed} is needed")
         found = {}
         doubts = _doubts(options.file)
         for states in files.read(Path(options.file), options.trajectory):
@@ -304,6 +317,12 @@ def _identify(options: argparse.Namespace) -> int:
                 found[states.label] = files.identify_states(states, **stated)
             except SpringcheckError as error:
                 raise type(error)(f"{options.file}, {states.label}: {error}") from error
+            except (ArithmeticError, ValueError) as error:
+                given = [f"--{name} {value:g}" for name, value in stated.items() if value is not None]
+                raise IdentificationError(
+                    f"{options.file}, {states.label}: nothing can be worked out with "
+                    f"{', '.join(given) or 'its numbers'}: {error}"
+                ) from error
     _warn(options.file, doubts)
     documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
     if options.json:

@@ -34,7 +34,16 @@ class _State:
 
 
 def install() -> None:
-    """Turn the first signal into a KeyboardInterrupt; ignore the next ones; end the process in time."""
+    """Turn the first signal into a KeyboardInterrupt; ignore the next ones; end the process in time.
+
+    Standard streams that are closed lead nowhere from here on.
+    """
+    for stream in (0, 1, 2):
+        try:
+            os.fstat(stream)
+        except OSError:
+            # a file that is opened now would take its place, and get what is printed
+            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
     sys.excepthook, sys.unraisablehook = _uncaught, _unraisable
     for name in SIGNALS:
         number = getattr(signal, name, None)

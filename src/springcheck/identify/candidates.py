@@ -38,7 +38,8 @@ def stated_stiffness(
     against = disagreements(record, moving, plainest, stated)
     if not against:
         return True, [], []
-    single = stated.astype(np.float32).astype(np.float64)
+    with np.errstate(over="ignore"):
+        single = stated.astype(np.float32).astype(np.float64)
     quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
     resolved = quantum > 0 or room < 0.1 * float(np.max(np.abs(single / stated - 1)))

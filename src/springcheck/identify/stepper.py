@@ -47,7 +47,7 @@ def load_stepper(spec: str) -> Stepper:
         if missing == module_name.split(".", maxsplit=1)[0] or module_name.startswith(f"{missing}."):
             raise MethodError(f"no module {module_name!r} in {here} or among the installed ones") from error
         raise MethodError(f"module {module_name!r} needs {missing!r}, which is not installed") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise MethodError(
             f"module {module_name!r} cannot be imported: {type(error).__name__}: {error}"
         ) from error
@@ -80,7 +80,7 @@ def _one(
             float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
             for x in (new_q, new_p)
         )
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise MethodError(
             f"the stepper failed at q={q:.6g}, p={p:.6g}, h={h:.6g}: {type(error).__name__}: {error}; "
             "it is called as step(q, p, h, force, mass) and returns (q, p)"

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, nearest
 from springcheck.store import access, digests, files, layout, records, seal, tables, trust
 from springcheck.store.access import Scalar
 from springcheck.store.records import Record
@@ -245,7 +245,8 @@ def source_of(path: Path, label: str) -> Path:
     """The file that holds a trajectory of a store."""
     found = sources(path)
     if label not in found:
-        raise StoreError(f"{path} holds no trajectory {label!r}; it has {', '.join(found) or 'none'}")
+        known = f"{nearest(label, found)}; it has {', '.join(found) or 'none'}"
+        raise StoreError(f"{path} holds no trajectory {label!r}{known}")
     return found[label]
 
 

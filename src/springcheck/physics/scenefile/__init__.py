@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from springcheck.errors import SceneError
+from springcheck.errors import SceneError, nearest
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import building, tables
 
@@ -49,8 +49,8 @@ def _read(name_or_path: str | Path) -> tuple[Path, str]:
         path = folder() / f"{name_or_path}.toml"
         if not path.is_file():
             raise SceneError(
-                f"no scene {str(name_or_path)!r}: shipped are {', '.join(names())}; "
-                "the name of a file of your own ends in .toml"
+                f"no scene {str(name_or_path)!r}{nearest(str(name_or_path), names())}; "
+                f"shipped are {', '.join(names())}; the name of a file of your own ends in .toml"
             )
     try:
         text = path.read_text(encoding="utf-8-sig")  # some editors put a mark in front
@@ -65,8 +65,11 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
     where = where or name
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{where}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise SceneError(f"{where}: not valid as a scene: it is nested too deep") from error
+    except ValueError as error:
+        # an integer of thousands of digits is none of tomllib's own errors
+        raise SceneError(f"{where}: not valid TOML: {str(error).partition(';')[0]}") from error
     return from_tables(data, name=name, where=where)
 
 

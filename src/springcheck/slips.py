@@ -1,0 +1,113 @@
+"""Slips of the hand on the command line: names that are empty or mistyped, options that nothing reads."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from springcheck.errors import SpringcheckError, nearest
+
+NAMES = {
+    "scene": "SCENE",
+    "file": "FILE",
+    "source": "--from",
+    "output": "-o",
+    "label": "LABEL",
+    "trajectory": "--trajectory",
+}
+"""Attributes of the arguments that name something, and how they are called."""
+
+
+UNREAD = (
+    ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
+    ("stepper", "--stepper", ("--mass", "--stiffness", "--step", "--trajectory")),
+)
+"""An option, and those that its command does not read beside it."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that answers a mistake with one line, and a mistyped word with the nearest one."""
+
+    def error(self, message: str) -> NoReturn:
+        wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
+        if wrong:
+            known = [word.strip(" '") for word in wrong[2].split(",")]
+            message = f"{wrong[1]!r} is no command{nearest(wrong[1], known)}; there are {', '.join(known)}"
+        sys.stderr.write(f"springcheck: {message}\n")
+        raise SystemExit(2)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        found, extra = self.parse_known_args(args, namespace)
+        if extra:
+            words = [word.partition("=")[0] for word in extra]
+            known = [option for one in self._of(found) for option in one._option_string_actions]
+            near = nearest(words[0], known)
+            self.error(f"{' '.join(extra)}: unknown or too many arguments{near}; `springcheck -h` shows them")
+        return found
+
+    def _of(self, found: argparse.Namespace) -> Iterable[argparse.ArgumentParser]:
+        """This parser, and the one of the command that was given."""
+        yield self
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                yield from (one for name, one in action.choices.items() if name == found.name)
+
+
+def look(options: argparse.Namespace) -> None:
+    """SpringcheckError for an argument that names nothing, or that the command would not read."""
+    given = vars(options)
+    for attribute, called in NAMES.items():
+        if given.get(attribute) == "":
+            raise SpringcheckError(f"{called}: a name is needed, not an empty one")
+    for attribute in ("file", "source"):
+        if given.get(attribute) is not None:
+            _is_file(given[attribute])
+    if options.name not in ("plot",) and given.get("output"):
+        _leads_somewhere(given["output"])
+    for attribute, called, unread in UNREAD:
+        if given.get(attribute) is not None:
+            for option in unread:
+                if given.get("output" if option == "-o" else option[2:]):
+                    raise SpringcheckError(f"{option} is not read beside {called}: leave it out")
+    if "rows" in given and given["rows"] is not None and given["trajectory"] is None:
+        raise SpringcheckError("--rows is for the numbers of a trajectory: name one with --trajectory")
+
+
+def _is_file(name: str) -> None:
+    path = Path(name)
+    if path.is_dir():
+        raise SpringcheckError(f"{name}: it is a folder, a file is needed")
+    if path.exists() and not path.is_file():
+        raise SpringcheckError(f"{name}: it is a device or a pipe, a file is needed")
+
+
+def _leads_somewhere(name: str) -> None:
+    if os.path.islink(name):
+        try:
+            os.stat(name)
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise SpringcheckError(f"cannot write {name}: {error.strerror}") from error
+
+
+def open_streams() -> None:
+    """Standard streams that were closed lead nowhere; what they cannot encode is written as its escape."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def one_line(error: BaseException) -> str:
+    """What is said of a mistake of ours: no user can mend it, and all of them are to report it."""
+    said = " ".join(str(error).split())[:200]
+    where = "SPRINGCHECK_TRACEBACK=1 shows where"
+    return f"{type(error).__name__}: {said}; this is a mistake in springcheck: {where}"

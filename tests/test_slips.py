@@ -1,0 +1,214 @@
+"""Slips of the hand: one line that says what, where and what to do, exit status 2, and no traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck.cli import main
+from springcheck.physics import scenefile
+
+SPRING = (scenefile.folder() / "spring.toml").read_text()
+
+STEPPERS = """
+import sys
+print("a module that prints")
+
+def step(q, p, h, force, mass):
+    print("a stepper that prints")
+    p = p + h * force(q)
+    return q + h * p / mass, p
+
+def leaves(q, p, h, force, mass):
+    sys.exit(7)
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with a store, hostile scenes, loops of links, and steppers."""
+    monkeypatch.chdir(tmp_path)
+    Path("deep.toml").write_text(SPRING + "\nx = " + "[" * 3000 + "]" * 3000 + "\n")
+    Path("digits.toml").write_text(SPRING.replace("steps = 200", "steps = " + "1" * 4400))
+    Path("steppers.py").write_text(STEPPERS)
+    Path("loop.h5").symlink_to("other.h5")
+    Path("other.h5").symlink_to("loop.h5")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "steppers", raising=False)
+
+
+@pytest.fixture
+def stored(folder: None) -> None:
+    assert main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "a.h5"]) == 0
+
+
+def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:
+    capsys.readouterr()
+    try:
+        status = main(arguments)
+    except SystemExit as left:
+        status = int(str(left.code))
+    said = capsys.readouterr()
+    assert status == 2
+    assert said.out == ""
+    assert said.err.startswith("springcheck: ")
+    assert said.err.count("\n") == 1
+    assert len(said.err) <= 500
+    for word in words:
+        assert word in said.err
+
+
+@pytest.mark.parametrize("command", ["inspect", "check", "plot", "identify"])
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("", "empty"), (".", "folder"), (os.devnull, "device"), ("loop.h5", "loop.h5"), ("none.h5", "none.h5")],
+)
+def test_a_name_that_is_no_file(
+    command: str, name: str, word: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, [command, name], word)
+
+
+@pytest.mark.usefixtures("stored")
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("identify a.h5 --step 1e-300", ("--step 1e-300",)),
+        ("identify a.h5 --step 1e-50", ("--step 1e-50",)),
+        ("identify a.h5 --mass 5e-324", ("--mass 4.94066e-324",)),
+        ("run spring --method own:euler -o loop.h5", ("loop.h5", "symbolic links")),
+        ("run deep.toml", ("deep.toml", "nested too deep")),
+        ("run digits.toml", ("digits.toml", "4300 digits")),
+        ("run --from a.h5 -o x.h5", ("-o", "--from")),
+        ("run --from a.h5 --force", ("--force", "--from")),
+        ("run --from a.h5 --thorough", ("--thorough", "--from")),
+        ("run --from a.h5 --verdicts", ("--verdicts", "--from")),
+        ("identify --stepper steppers:step --mass 3", ("--mass", "--stepper")),
+        ("identify --stepper steppers:step --trajectory x", ("--trajectory", "--stepper")),
+        ("inspect a.h5 --rows 3", ("--rows", "--trajectory")),
+    ],
+)
+def test_numbers_names_and_options_that_serve_nothing(
+    line: str, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, line.split(), *words)
+    assert not Path("x.h5").exists()
+
+
+@pytest.mark.usefixtures("stored")
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ("runn spring", "did you mean run?"),
+        ("run sprin", "did you mean spring?"),
+        ("run spring --forse", "did you mean --force?"),
+        ("run spring --metod=own:euler", "did you mean --method?"),
+        ("run spring --method own:eular", "did you mean own:euler?"),
+        ("run spring --method opemm:verlet", "did you mean openmm"),
+        ("inspect a.h5 --trajectory own:eular", "did you mean own:euler?"),
+    ],
+)
+def test_a_mistyped_word_gets_the_nearest_one(
+    line: str, meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, line.split(), meant)
+
+
+@pytest.mark.parametrize("option", ["-o", "--output"])
+@pytest.mark.parametrize(
+    "command", [["run", "spring"], ["stability", "spring"], ["extremes"], ["plot", "steppers.py"]]
+)
+def test_an_empty_output_is_no_default(
+    command: list[str], option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, [*command, option, ""], "-o", "empty")
+
+
+def test_a_quiet_study_that_measures_nothing_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = SPRING.replace("step = 0.1", "step = 1e300")
+    Path("far.toml").write_text(scene)
+    refused(capsys, ["precision", "far.toml", "--method", "own:euler", "--quiet"], "nothing was measured")
+
+
+def test_a_stepper_may_print_and_may_not_set_the_exit_status(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", "--stepper", "steppers:step", "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["trajectory"] == "steppers:step"
+    assert "a module that prints" in said.err
+    assert "a stepper that prints" in said.err
+    assert main(["identify", "--stepper", "steppers:leaves"]) == 2
+    assert "SystemExit: 7" in capsys.readouterr().err.splitlines()[-1]
+
+
+def program(line: str, *, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    home = str(Path(springcheck.__file__).parents[1])
+    return subprocess.run(
+        ["sh", "-c", f"exec {sys.executable} -m springcheck {line}"],
+        env=os.environ | {"PYTHONPATH": home} | (environment or {}),
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell is needed")
+def test_any_title_in_a_pipe_of_any_encoding() -> None:
+    Path("title.toml").write_text(
+        SPRING.replace('title = "', 'title = "F\u00e4der \u2603 '), encoding="utf-8"
+    )
+    done = program("run title.toml --method own:euler", environment={"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert done.stdout.startswith(r"F\xe4der \u2603 Mass on a spring")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell is needed")
+def test_closed_streams_lead_nowhere_and_not_into_the_store() -> None:
+    for i, closed in enumerate((">&-", "2>&-", "<&-", ">&- 2>&- <&-")):
+        done = program(f"run spring --method own:euler -o {i}.h5 {closed}")
+        assert done.returncode == 0, closed
+        assert done.stderr == ""
+        assert main(["check", f"{i}.h5"]) == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("line", ["list", "run spring --method own:euler --json", "check 0.h5", "--version"])
+def test_a_full_disk_is_one_line(line: str) -> None:
+    main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "0.h5"])
+    done = program(f"{line} > /dev/full")
+    assert done.returncode == 2
+    assert done.stderr == "springcheck: No space left on device\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell is needed")
+def test_a_mistake_of_ours_is_one_line_and_shows_its_place_when_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from springcheck import __main__, cli, interrupts
+
+    def wrong() -> int:
+        raise ZeroDivisionError("division\nby zero")
+
+    monkeypatch.setattr(cli, "main", wrong)
+    for name in ("install", "finish"):
+        monkeypatch.setattr(interrupts, name, lambda: None)
+    assert __main__.main() == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        "springcheck: ZeroDivisionError: division by zero; this is a mistake in springcheck"
+    )
+    assert said.count("\n") == 1
+    monkeypatch.setenv("SPRINGCHECK_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        __main__.main()
+
+
+def test_a_stiffness_beyond_single_precision_gives_no_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "a.h5"]) == 0
+    with np.errstate(over="warn"):
+        assert main(["identify", "a.h5", "--stiffness", "1e90"]) == 1
