@@ -21,7 +21,7 @@ import pytest
 from springcheck import checks, engines, schemes, simulate
 from springcheck.arrays import Floats
 from springcheck.engines import Need, parse
-from springcheck.engines.own import ENGINE, compiled, forces, kernels, simulation, solver, tiles
+from springcheck.engines.own import ENGINE, compiled, forces, kernels, simulation, solver, tiles, updates
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import (
@@ -637,7 +637,7 @@ def test_what_the_engine_says_of_itself_is_its_method_table() -> None:
         "one_tableau",
     } == {
         name
-        for module in (forces, kernels)
+        for module in (forces, updates, kernels)
         for name, thing in vars(module).items()
         if callable(thing) and getattr(thing, "__module__", "").startswith("springcheck")
     }

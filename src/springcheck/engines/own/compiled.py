@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from springcheck.engines.own import forces, kernels
+from springcheck.engines.own import forces, kernels, updates
 
 HELP: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 """How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
@@ -36,18 +36,19 @@ HELPERS: tuple[Callable[..., Any], ...] = (
     forces.pulled_too,
     forces.slowed,
     forces.force_at,
-    kernels.kick,
-    kernels.drift,
-    kernels.kick_drift,
-    kernels.euler,
-    kernels.held_kick_drift,
-    kernels.held_euler,
-    kernels.chain_kick_drift,
-    kernels.chain_euler,
-    kernels.kick_and_drift,
-    kernels.solve,
-    kernels.implicit,
-    kernels.add,
+    updates.kick,
+    updates.drift,
+    updates.kick_drift,
+    updates.euler,
+    updates.held_kick_drift,
+    updates.held_euler,
+    updates.chain_kick_drift,
+    updates.chain_euler,
+    updates.solve,
+    updates.held_implicit,
+    updates.chain_implicit,
+    updates.implicit,
+    updates.add,
 )
 """What the kernels call."""
 
@@ -110,7 +111,7 @@ def _files(folder: Path, kernel: Callable[..., Any]) -> list[Path]:
 
 def _digest(folder: Path, kernel: Callable[..., Any]) -> str:
     """Of the saved code of a kernel, and of the sources that it was compiled from."""
-    sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, kernels))]
+    sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, updates, kernels))]
     sums = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in _files(folder, kernel)]
     return repr([*sums, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in sources)])
 

@@ -14,12 +14,25 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from springcheck.engines.own.forces import Numbers, Slot, force_at, tensions
+from springcheck.engines.own.forces import Numbers, Slot, force_at, held, pulled, tensions
+from springcheck.engines.own.updates import (
+    Solver,
+    add,
+    chain_euler,
+    chain_implicit,
+    chain_kick_drift,
+    drift,
+    euler,
+    held_euler,
+    held_implicit,
+    held_kick_drift,
+    implicit,
+    kick,
+    kick_drift,
+)
 
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
-Solver: TypeAlias = Any
-"""The factors of an implicit step: see `solve`."""
 
 KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT = range(7)
 """Operations on (q, p), with coefficients x and y in units of time:
@@ -29,124 +42,6 @@ DRIFT       q += y p/m          IMPLICIT    P = p + x F(Q, P), Q = q + x P/m; q 
 KICK_DRIFT  one after the other MIDPOINT    the same, but p = P + (P - p)
 FRICTION    p *= decay
 """
-
-
-def kick(x: float, f: Numbers, p: Numbers) -> None:
-    """p += x f."""
-    for i in range(len(p)):
-        p[i] = p[i] + f[i] * x
-
-
-def drift(y: float, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """q += y p/m."""
-    for i in range(len(p)):
-        q[i] = q[i] + (p[i] / m[i]) * y
-
-
-def kick_drift(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """Kick, then drift with the new momentum."""
-    for i in range(len(p)):
-        new = p[i] + f[i] * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def euler(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """Drift and kick, both from the old state."""
-    for i in range(len(p)):
-        old = p[i]
-        p[i] = old + f[i] * x
-        q[i] = q[i] + (old / m[i]) * y
-
-
-def held_kick_drift(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`kick_drift` by one wall spring on every particle, whose force is not stored."""
-    for i in range(len(p)):
-        new = p[i] + (-k[i] * (q[i] - at[i])) * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def held_euler(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`euler` by one wall spring on every particle, whose force is not stored."""
-    for i in range(len(p)):
-        old = p[i]
-        p[i] = old + (-k[i] * (q[i] - at[i])) * x
-        q[i] = q[i] + (old / m[i]) * y
-
-
-def chain_kick_drift(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`kick_drift` by the tensions of a chain."""
-    for i in range(len(p)):
-        new = p[i] + (t[i + 1] - t[i]) * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def chain_euler(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`euler` by the tensions of a chain."""
-    for i in range(len(p)):
-        old = p[i]
-        p[i] = old + (t[i + 1] - t[i]) * x
-        q[i] = q[i] + (old / m[i]) * y
-
-
-def solve(solver: Solver, f: Numbers) -> None:
-    """Solve A z = f in place, A = 1 + x c/m + x**2 K/m by its factors, which are of one of three kinds.
-
-    divisors      1 / A of particles that nothing joins
-    tridiagonal   multipliers of the rows before, 1 / pivots, elements to the right of the diagonal
-    banded        LU factors as LAPACK's dgbtrf stores them (Anderson et al., LAPACK Users' Guide, 1999),
-                  transposed (n, 2 lower + upper + 1) and with 1 / pivots; the interchanges of its pivoting,
-                  the order in which it takes the particles, room (n,), and the number `lower`
-    """
-    divisors, (below, inverse, above), (band, swaps, order, z, lower) = solver
-    n = len(f)
-    if len(divisors):
-        for i in range(n):
-            f[i] = f[i] * divisors[i]
-    elif len(inverse):
-        last = 0.0
-        for i in range(n):
-            last = f[i] - below[i] * last
-            f[i] = last
-        last = 0.0
-        for i in range(n - 1, -1, -1):
-            last = (f[i] - above[i] * last) * inverse[i]
-            f[i] = last
-    else:
-        for j in range(n):
-            z[j] = f[order[j]]
-        for j in range(n):
-            last = z[swaps[j]]
-            z[swaps[j]] = z[j]
-            z[j] = last
-            column = band[j]
-            diagonal = len(column) - 1 - lower
-            for i in range(1, min(lower, n - 1 - j) + 1):
-                z[j + i] -= column[diagonal + i] * last
-        for j in range(n - 1, -1, -1):
-            column = band[j]
-            diagonal = len(column) - 1 - lower
-            last = z[j] * column[diagonal]
-            z[j] = last
-            for i in range(1, min(diagonal, j) + 1):
-                z[j - i] -= column[diagonal - i] * last
-        for j in range(n):
-            f[order[j]] = z[j]
-
-
-def implicit(
-    x: float, y: float, twice: bool, solver: Solver, f: Numbers, m: Numbers, q: Numbers, p: Numbers
-) -> None:
-    """IMPLICIT, or MIDPOINT where `twice`; f holds F(q, 0) and serves as room."""
-    for i in range(len(p)):
-        f[i] = p[i] + f[i] * x
-    solve(solver, f)
-    for i in range(len(p)):
-        new = f[i]
-        q[i] = q[i] + (new / m[i]) * y
-        p[i] = new + (new - p[i]) if twice else new
 
 
 def splitting(
@@ -178,28 +73,65 @@ def splitting(
     out the first `skip` particles.
     """
     n = len(m)
+    # of a simple row the loops are called from here: to hand a whole force on takes as long as 100 particles
+    indices, _, (k_held, at_held), (k, rest, ends), (c, _) = one
+    divisors, factors, _ = solver
+    simple = not indices and len(c) == 0
+    held_alone = simple and len(k) == 0 and len(k_held) == n
+    chain_alone = simple and len(k) > 0 and len(k_held) == 0
     for row in range(len(qs)):
         for _ in range(every):
             for s in range(len(code)):
                 what = code[s]
+                xs, ys, where = x[s], y[s], slot[s]
                 if what == FRICTION:
-                    decayed = decay[slot[s]]
+                    decayed = decay[where]
                     for i in range(n):
                         p[i] = p[i] * decayed[i]
                 elif what == DRIFT:
-                    drift(y[s], m, q, p)
-                else:
-                    force, f = (one, f_one) if slot[s] == 0 else (two, f_two)
-                    if what == KICK:
-                        if stale[slot[s]]:
-                            force_at(force, q, p, t, f)
-                        kick(x[s], f, p)
-                    elif what in (KICK_DRIFT, EULER):
-                        kick_and_drift(what == EULER, stale[slot[s]], x[s], y[s], force, m, f, t, q, p)
+                    drift(ys, m, q, p)
+                elif what in (IMPLICIT, MIDPOINT):
+                    if where == 0 and held_alone:
+                        held_implicit(xs, ys, what == MIDPOINT, divisors, k_held, at_held, m, q, p)
+                    elif where == 0 and chain_alone and len(factors[1]):
+                        tensions(k, rest, ends, q, t)
+                        chain_implicit(xs, ys, what == MIDPOINT, factors, t, f_one, m, q, p)
+                    elif where == 0:
+                        force_at(one, q, p, t, f_one)
+                        implicit(xs, ys, what == MIDPOINT, solver, f_one, m, q, p)
                     else:
-                        force_at(force, q, p, t, f)
-                        implicit(x[s], y[s], what == MIDPOINT, solver, f, m, q, p)
-                    stale[slot[s]] = False
+                        force_at(two, q, p, t, f_two)
+                        implicit(xs, ys, what == MIDPOINT, solver, f_two, m, q, p)
+                elif where == 0 and held_alone and stale[0] and what != KICK:
+                    if what == EULER:
+                        held_euler(xs, ys, k_held, at_held, m, q, p)
+                    else:
+                        held_kick_drift(xs, ys, k_held, at_held, m, q, p)
+                elif where == 0 and chain_alone and stale[0] and what != KICK:
+                    tensions(k, rest, ends, q, t)
+                    if what == EULER:
+                        chain_euler(xs, ys, t, m, q, p)
+                    else:
+                        chain_kick_drift(xs, ys, t, m, q, p)
+                else:
+                    if where == 0 and stale[0]:
+                        if held_alone:
+                            held(k_held, at_held, q, f_one)
+                        elif chain_alone:
+                            tensions(k, rest, ends, q, t)
+                            pulled(t, f_one)
+                        else:
+                            force_at(one, q, p, t, f_one)
+                    elif where == 1 and stale[1]:
+                        force_at(two, q, p, t, f_two)
+                    f = f_one if where == 0 else f_two
+                    if what == KICK:
+                        kick(xs, f, p)
+                    elif what == KICK_DRIFT:
+                        kick_drift(xs, ys, f, m, q, p)
+                    else:
+                        euler(xs, ys, f, m, q, p)
+                    stale[where] = False
                 moved = what not in (KICK, FRICTION)
                 stale[0] = stale[0] or moved or damped[0]
                 stale[1] = stale[1] or moved or damped[1]
@@ -207,41 +139,6 @@ def splitting(
         for i in range(len(out_q)):
             out_q[i] = q[skip + i]
             out_p[i] = p[skip + i]
-
-
-def kick_and_drift(
-    both: bool,
-    stale: bool,
-    x: float,
-    y: float,
-    force: Slot,
-    m: Numbers,
-    f: Numbers,
-    t: Numbers,
-    q: Numbers,
-    p: Numbers,
-) -> None:
-    """KICK_DRIFT, or EULER where `both` are from the old state.  The force of a simple row is not stored."""
-    indices, _, (k_held, at_held), (k, rest, ends), (c, _) = force
-    simple = stale and not indices and len(c) == 0
-    if simple and len(k) == 0 and len(k_held):
-        if both:
-            held_euler(x, y, k_held, at_held, m, q, p)
-        else:
-            held_kick_drift(x, y, k_held, at_held, m, q, p)
-    elif simple and len(k) and len(k_held) == 0:
-        tensions(k, rest, ends, q, t)
-        if both:
-            chain_euler(x, y, t, m, q, p)
-        else:
-            chain_kick_drift(x, y, t, m, q, p)
-    else:
-        if stale:
-            force_at(force, q, p, t, f)
-        if both:
-            euler(x, y, f, m, q, p)
-        else:
-            kick_drift(x, y, f, m, q, p)
 
 
 def tableau(
@@ -287,13 +184,6 @@ def tableau(
         for i in range(len(out_q)):
             out_q[i] = q[skip + i]
             out_p[i] = p[skip + i]
-
-
-def add(c: float, values: Numbers, total: Numbers) -> None:
-    """total += c values, left out where c is 0."""
-    if c != 0.0:
-        for i in range(len(total)):
-            total[i] = total[i] + c * values[i]
 
 
 def one_splitting(

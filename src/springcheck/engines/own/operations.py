@@ -131,8 +131,10 @@ def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
         x = float(number(c, np.float64) * h)
         if kind == "friction":
             found.append(Operation(code=FRICTION, x=x))
-        elif kind != "drift":
+        elif kind in _FORCE:
             found.append(Operation(code=KICK, x=x, force=_FORCE[kind]))
+        elif kind != "drift":
+            raise MethodError(f"own: the scheme {scheme.name} has a stage that is not served: {kind}")
         elif found and found[-1].code == KICK:
             found[-1] = Operation(code=KICK_DRIFT, x=found[-1].x, y=x, force=found[-1].force)
         else:
