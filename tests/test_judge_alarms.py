@@ -10,6 +10,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes
+from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Term, WallSpring
 from springcheck.studies.faults import clean, steppers
@@ -126,3 +127,26 @@ def test_implicit_euler_loses_what_underflows_in_its_matrix() -> None:
         )
         verdicts = checks.judge(scene, springcheck.simulate(scene, "own:implicit-euler"))
         assert alarms(verdicts) == []
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-6, 1e-10])
+def test_a_double_well_near_its_top_has_a_number_for_its_exact_solution(size: float) -> None:
+    """Near the top it is u0 exp(t); later its energy, as small as it is, stays that of the start."""
+    well = Quartic(i=np.array([0]), b=np.ones(1), at=np.zeros(1))
+    scene = one(wall(-1.0), well, m=1.0, q=size, p=size, step=0.1, steps=100)
+    q, p = exact.true_motion(scene, np.arange(51), scene.step)
+    assert np.all(np.isfinite([q, p]))
+    assert np.allclose(q[:51, 0], size * np.exp(scene.step * np.arange(51)), rtol=1e-6)
+
+
+def test_a_motion_that_escapes_in_finite_time_ends_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    from springcheck.engines.sundials import simulation
+
+    monkeypatch.setattr(simulation, "MOST_STEPS", 3000)
+    escaping = Quartic(i=np.array([0]), b=-np.ones(1), at=np.zeros(1))
+    scene = one(escaping, m=1.0, q=1.0, p=0.5, step=0.1, steps=100)
+    with np.errstate(all="ignore"):
+        run = springcheck.simulate(scene, "sundials:adams")
+    assert run.outcome.status in ("stopped", "diverged")
+    assert run.outcome.message
+    assert simulation.most_steps(replace(scene, every=100), 1e6) > 10**7

@@ -91,7 +91,8 @@ def _stiffening(scene: Scene, t: Extended) -> States:
     well, at = found
     u, v = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     softening = well.b <= 0
-    caught = ~softening & (well.root < -well.k)
+    # the sign of the energy: beside |k| it may be lost in the root
+    caught = ~softening & (well.plus < 0)
     for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
         if np.any(which):
             u[:, which], v[:, which] = law(well[which], t)
