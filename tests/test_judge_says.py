@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,17 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks
+from springcheck import checks, engines, simulate
+from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.studies.extremes import grid, running
+from springcheck.studies.faults import clean
 from springcheck.studies.run import measure
+
+Need = Callable[[str], None]
+LAZY = "ase:velocity-verlet"
 
 UNTELLING = """
 title = "A well, recorded so rarely that no step can be told"
@@ -71,3 +79,41 @@ def test_a_repetition_is_held_against_the_numbers_and_not_against_their_digest(t
         for data in found:
             data[5] = np.nextafter(data[5], 2.0)
     assert not any(one.equal for one in measure.repeat(path))
+
+
+def lone(size: float) -> Scene:
+    return clean.scene(
+        np.array([3.7]), (clean.walls(np.array([2.9]), np.zeros(1)),), np.array([0.3 * size]),
+        np.array([0.7 * size]), step=0.1, steps=60,
+    )  # fmt: skip
+
+
+def test_ase_keeps_its_forces_for_motions_below_1e_15_and_the_verdict_says_so(need: Need) -> None:
+    need("ase:velocity-verlet")
+    assert all(v.passed is not False for v in checks.judge(lone(1.0), springcheck.simulate(lone(1.0), LAZY)))
+    scene = lone(1e-14)
+    failed = [v for v in checks.judge(scene, springcheck.simulate(scene, LAZY)) if v.passed is False]
+    (defect,) = (v for v in failed if v.check == "step-defect")
+    assert "forces are kept while no position moves by more than 1e-15" in defect.why
+
+
+def test_a_cell_of_the_atlas_is_judged_alone_where_company_would_refresh_its_force(need: Need) -> None:
+    need("ase:velocity-verlet")
+    large = grid.Spec(block="size", m=3.7, k=2.9, q=0.3, p=0.7, h=0.1, steps=20)
+    small = replace(large, q=3e-15, p=7e-15)
+    one, other = running.cells(engines.parse(LAZY), [large, small])
+    assert one.outcome == "right"
+    assert other.outcome == "engine's limit"
+    assert "forces are kept" in other.reason
+
+
+@pytest.mark.parametrize(
+    ("label", "size", "passed"),
+    [(LAZY, 1.0, True), (LAZY, 1e-14, False), ("openmm:verlet", 1e-14, True), ("own:euler", 1e-14, True)],
+)
+def test_company_changes_nothing_but_ase_s_smallest_motions(
+    label: str, size: float, passed: bool, need: Need
+) -> None:
+    need(label)
+    bench = checks.Bench(scene=lone(size), label=label, run=simulate.run)
+    assert experiments.company(bench).passed is passed

@@ -88,6 +88,7 @@ THOROUGH: tuple[Experiment, ...] = (
     experiments.reversibility,
     experiments.mirror,
     experiments.repeatability,
+    experiments.company,
     laws.order,
     laws.order_anharmonic,
     laws.rounding_bias,

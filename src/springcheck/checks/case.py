@@ -296,6 +296,11 @@ def overflows(how: Arithmetic) -> str:
     return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
 
 
+def keeps(how: Arithmetic) -> str:
+    """The reason of steps that are off because an engine took a force again that it had computed before."""
+    return f"forces are kept while no position moves by more than {how.stale:g}"
+
+
 REPEATED = 2000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""
 

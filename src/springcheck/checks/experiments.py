@@ -250,6 +250,30 @@ def mirror(bench: Bench) -> Verdict:
     )
 
 
+@check("company", family="repeat", needs="a linear scene and an explicit scheme")
+def company(bench: Bench) -> Verdict:
+    """A livelier copy beside it, which acts on nothing of it, changes no number of the motion."""
+    if not bench.scheme.one_step:
+        return bench.not_applicable("company", "an adaptive solver takes its steps by all components")
+    if bench.scheme.implicit or not bench.scene.system.is_linear:
+        return bench.not_applicable("company", "what is solved, or exponentiated, may round otherwise")
+    alone, scene = bench.forwards, bench.scene
+    steps = len(alone.t) - 1
+    if steps < 1:
+        return bench.not_applicable("company", ENDED)
+    two = scene.system.tiled(2)
+    lively = 3 * scene.p + np.sqrt(2 * scene.m) * (float(scene.system.norm.unit) or 1.0)
+    beside = replace(two, p=np.concatenate([scene.p, lively]), steps=steps, every=1)
+    both = bench.run(beside, bench.label)
+    if len(both.t) != len(alone.t):
+        return bench.verdict("company", float("inf"), 0.0, "frames", "the two runs differ in length")
+    n = scene.n
+    differ = np.any((both.q[:, :n] != alone.q) | (both.p[:, :n] != alone.p), axis=1)
+    return bench.verdict(
+        "company", float(np.count_nonzero(differ)), 0.0, "frames", "systems side by side share nothing"
+    )
+
+
 @check("repeat", family="repeat", needs="a run of one step at least")
 def repeatability(bench: Bench) -> Verdict:
     """A second run of the same scene gives the same numbers, bit for bit."""

@@ -72,6 +72,8 @@ class Arithmetic:
     """Width in which force constants and rest lengths are kept."""
     excess: float = 0.0
     """Every force is too large by this fraction."""
+    stale: float = 0.0
+    """Forces are kept while no position has moved by more than this since they were computed [L]."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck import checks, engines, schemes, trajectory
 from springcheck.arrays import Extended, Floats
-from springcheck.checks.case import overflows
+from springcheck.checks.case import keeps, overflows
 from springcheck.engines.contract import Arithmetic, Label
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
@@ -77,6 +77,8 @@ class Sizes:
     largest: Extended
     smallest: Extended
     force: Extended
+    moved: Extended
+    """How far the position goes."""
 
 
 def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2: Extended) -> Sizes:
@@ -98,7 +100,9 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
         parts += [x * x, y / m * (y / m) * h * h]
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
-    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
+    return Sizes(
+        largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force, moved=np.abs(q2 - q)
+    )
 
 
 def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
@@ -182,6 +186,7 @@ def _reason(
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
             len(bad), how.quantum > DIGITS * peak
         ),
+        keeps(how): inside.moved[bad, i] <= 2 * how.stale,
         f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
         f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
     }

@@ -41,9 +41,16 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     except MethodError as error:
         return [_own_refusal(label, spec, str(error)) for spec in specs]
     found = judging.judge(label, specs, scene, q, p, said)
-    if not said:
-        return found
     if len(specs) == 1:
+        return found
+    if stale := engines.load(label.engine).arithmetic(label).stale:
+        # in company of a larger motion an engine computes forces anew that it would keep for the cell alone
+        slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
+        found = [
+            cells(label, [spec])[0] if alone else cell
+            for spec, cell, alone in zip(specs, found, slow, strict=True)
+        ]
+    if not said:
         return found
     # the engine gave up over some: those that had left its numbers are done, the others run again
     over = [x.outcome not in ("silently wrong", "right") and bool(x.reason) for x in found]

@@ -189,6 +189,20 @@ def stale_force(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     return textbook(scene, scheme, force=stale)
 
 
+def kept_force(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+    """The force is kept while no position has moved by more than a part of the start's farthest."""
+    force = scene.system.force
+    near = size * float(np.max(np.abs(scene.q)))
+    kept = [scene.q, force(scene.q, scene.p)]
+
+    def lazy(q: Reals, p: Reals) -> Reals:
+        if np.max(np.abs(q - kept[0])) > near:
+            kept[:] = [q, force(q, p)]
+        return kept[1]
+
+    return textbook(scene, scheme, force=lazy)
+
+
 def other_scheme(name: str) -> Make:
     """The engine runs another scheme than it claims."""
     return stepping(lambda scene, scheme, size: textbook(scene, schemes.SCHEMES[name]))

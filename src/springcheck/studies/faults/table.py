@@ -387,6 +387,13 @@ REPORTS = (
         make=seeded.reporting(seeded.half_step_energy, again=False),
     ),
     Fault(
+        name="kept-force",
+        about="forces are kept while no position moves by more than a part of its start",
+        size=0.01,
+        caught_by=("step-defect", "company"),
+        make=seeded.stepping(seeded.kept_force),
+    ),
+    Fault(
         name="off-axis",
         about="particles leave their line",
         size=1e-12,
