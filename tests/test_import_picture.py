@@ -16,8 +16,8 @@ HOME = Path(springcheck.__file__).parent
 
 ROWS = [
     "interrupts", "errors", "slips", "workers", "arrays", "physics", "schemes", "engines",
-    "trajectory", "store", "formats", "text", "simulate", "checks", "compare", "identify", "doors",
-    "figures", "studies", "inspect", "plot", "listing", "api", "cli", "__main__",
+    "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
+    "doors", "figures", "studies", "inspect", "plot", "listing", "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))

@@ -1,0 +1,215 @@
+"""Checks of an engine for its own test-suite: that it keeps the contract, and does what its scheme promises.
+
+In a test module of an engine, with pytest::
+
+    from springcheck.conformance import parametrize_with_checks
+
+    @parametrize_with_checks(ENGINE)
+    def test_springcheck(check):
+        check()
+
+`assert_right` judges one trajectory, however it was made.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from springcheck import checks, engines, simulate
+from springcheck.arrays import Floats
+from springcheck.engines import Engine, Label
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring
+from springcheck.trajectory import Trajectory
+
+__all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "uneven_scenes"]
+
+SEED = 20260101
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check of one method; call it.  AssertionError says what is wrong, in words."""
+
+    name: str
+    label: Label
+    test: Callable[[Label], None]
+
+    def __call__(self) -> None:
+        self.test(self.label)
+
+    def __str__(self) -> str:
+        return f"{self.label}-{self.name}"
+
+
+def parametrize_with_checks(engine: Engine) -> Any:
+    """A decorator that runs a test once for each check of each method; its argument is named `check`."""
+    import pytest
+
+    return pytest.mark.parametrize("check", checks_of(engine), ids=str)
+
+
+def checks_of(engine: Engine) -> list[Check]:
+    """Every check of every method of an engine."""
+    if engine.name not in engines.names() or engines.engine(engine.name) is not engine:
+        engines.bring(engine, "the tests of its own")
+    labels = [Label(engine=engine.name, method=name) for name in engine.methods]
+    found = [Check("declaring imports no library", labels[0], _imports_nothing)]
+    return found + [Check(name, label, test) for label in labels for name, test in TESTS.items()]
+
+
+def assert_right(scene: Scene, run: Trajectory) -> None:
+    """AssertionError, with every verdict that failed and why, where a trajectory is not its scheme's."""
+    wrong = [verdict for verdict in checks.judge(scene, run) if verdict.passed is False]
+    if wrong:
+        lines = [
+            f"  {verdict.check}: {verdict.value:.3g} where {verdict.bound:.3g} {verdict.unit} is allowed; "
+            f"{verdict.why}"
+            for verdict in wrong
+        ]
+        raise AssertionError(f"{run.label} is not {run.scheme} on {scene.name}:\n" + "\n".join(lines))
+
+
+def uneven_scenes() -> Iterator[Scene]:
+    """Twelve scenes of uneven numbers, so that no mass, stiffness, step or rest point can hide."""
+    rng = np.random.default_rng(SEED)
+
+    def some(low: float, high: float, n: int) -> Floats:
+        return np.asarray(rng.uniform(low, high, n))
+
+    for number in range(12):
+        n = 1 if number < 6 else 3
+        i = np.arange(n)
+        m, k = some(0.4, 4.0, n), some(0.5, 3.0, n)
+        at = some(-0.7, 0.7, n) if number % 2 else np.zeros(n)
+        terms: list[Any] = [WallSpring(i=i, k=k, at=at)]
+        if number in (8, 9):
+            a = np.arange(n - 1)
+            terms.append(Spring(a=a, b=a + 1, k=some(0.5, 2.0, n - 1), rest=some(0.1, 0.9, n - 1)))
+        if number == 10:
+            terms.append(Quartic(i=i, b=some(0.3, 1.5, n), at=np.zeros(n)))
+        if number == 11:
+            terms.append(Damping(i=i, c=some(0.1, 0.5, n)))
+        yield Scene(
+            name=f"uneven-{number + 1}", m=m, q=some(-1.2, 1.2, n), p=some(-1.5, 1.5, n), terms=tuple(terms),
+            step=float(rng.uniform(0.02, 0.2)), steps=120, every=1 if number % 3 else 3,
+        )  # fmt: skip
+
+
+def _served(label: Label) -> list[Scene]:
+    found = [scene for scene in uneven_scenes() if engines.refusal(scene, label) is None]
+    return found or [_damped(scene) for scene in list(uneven_scenes())[:2]]
+
+
+def _damped(scene: Scene) -> Scene:
+    return replace(scene, terms=(*scene.terms, Damping(i=np.arange(scene.n), c=0.3 * scene.m)))
+
+
+def _imports_nothing(label: Label) -> None:
+    engine = engines.engine(label.engine)
+    module = getattr(engine.start, "__module__", "")
+    if not engine.imports or module == "__main__":
+        return
+    code = f"import sys, {module}; sys.exit({engine.imports!r} in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode != 1 or done.stderr, (
+        f"importing {module} imports {engine.imports}: import it inside start and version, so that "
+        "engines can be listed without it"
+    )
+
+
+def _right(label: Label) -> None:
+    for scene in _served(label):
+        run = simulate.run(scene, label)
+        assert run.outcome.status == "complete", (
+            f"{label} {run.outcome.status} on {scene.name}: {run.outcome.message}"
+        )
+        assert_right(scene, run)
+
+
+def _chunks(label: Label) -> None:
+    """Rows asked for at once or one by one are the same."""
+    scene = replace(_served(label)[0], every=1)
+    whole, parts = engines.start(scene, label), engines.start(scene, label)
+    q, p = np.full((24, scene.n), np.nan), np.full((24, scene.n), np.nan)
+    whole.advance(1, q, p)
+    a, b = np.full((24, scene.n), np.nan), np.full((24, scene.n), np.nan)
+    for rows in (slice(0, 1), slice(1, 7), slice(7, 24)):
+        parts.advance(1, a[rows], b[rows])
+    assert np.array_equal(q, a), "rows asked for in parts are not those asked for at once: keep the state"
+    assert np.array_equal(p, b), "momenta asked for in parts are not those asked for at once: keep the state"
+
+
+def _strides(label: Label) -> None:
+    """Every tenth state is the tenth of all."""
+    scene = replace(_served(label)[0], every=1)
+    if engines.method(label).adaptive:
+        return
+    q, p = np.full((30, scene.n), np.nan), np.full((30, scene.n), np.nan)
+    engines.start(scene, label).advance(1, q, p)
+    a, b = np.full((3, scene.n), np.nan), np.full((3, scene.n), np.nan)
+    engines.start(scene, label).advance(10, a, b)
+    assert np.array_equal(q[9::10], a), "advance(10, ...) does not give every tenth state of advance(1, ...)"
+    assert np.array_equal(p[9::10], b), (
+        "advance(10, ...) does not give every tenth momentum of advance(1, ...)"
+    )
+
+
+def _untouched(label: Label) -> None:
+    """The scene is the caller's, and two runs of it are the same."""
+    scene = _served(label)[0]
+    q, p = scene.q.copy(), scene.p.copy()
+    one, other = simulate.run(scene, label), simulate.run(scene, label)
+    assert np.array_equal(scene.q, q), "the run has changed scene.q: copy it"
+    assert np.array_equal(scene.p, p), "the run has changed scene.p: copy it"
+    assert np.array_equal(one.q, other.q), "two runs of one scene differ: is a state shared between them?"
+
+
+def _backwards(label: Label) -> None:
+    """A negative step goes backwards by the same scheme, or is refused."""
+    scene = next((x for x in _served(label) if x.system.is_linear and not x.system.is_damped), None)
+    if scene is None or engines.method(label).adaptive:
+        return
+    scene = replace(scene, step=-scene.step)
+    try:
+        run = simulate.run(scene, label)
+    except MethodError:
+        return
+    assert_right(scene, run)
+
+
+def _refuses(label: Label) -> None:
+    """What it does not serve is refused, not moved wrongly."""
+    for scene in uneven_scenes():
+        if engines.refusal(scene, label) is not None:
+            try:
+                simulate.run(scene, label)
+            except MethodError:
+                continue
+            raise AssertionError(f"{label} ran {scene.name}, which it is not declared for")
+
+
+def _versions(label: Label) -> None:
+    """Versions are named: without them no run can be repeated."""
+    found = engines.load(label.engine).version()
+    assert all(isinstance(x, str) and x for pair in found.items() for x in pair), (
+        f"version() returned {found!r}"
+    )
+
+
+TESTS: dict[str, Callable[[Label], None]] = {
+    "right on uneven scenes": _right,
+    "rows in parts": _chunks,
+    "frames apart": _strides,
+    "scene untouched": _untouched,
+    "negative step": _backwards,
+    "refusals": _refuses,
+    "versions": _versions,
+}
