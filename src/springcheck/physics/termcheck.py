@@ -19,6 +19,13 @@ ROUNDINGS = 32
 """Operations in one formula at most."""
 
 
+RESERVED = (
+    "particle", "rotor", "inductor", "capacitor", "resistor", "chain", "ends", "fast", "title", "source",
+    "units", "kind", "time", "methods", "record",
+)  # fmt: skip
+"""Words of a scene file that no term may take."""
+
+
 def check(term: type[Term]) -> None:
     """Raise TypeError where the class lacks a part, ValueError where its functions contradict each other.
 
@@ -53,6 +60,12 @@ def _check_parts(term: type[Term]) -> None:
     for name in ("key", "formula", "columns", "ends", "potential", "slope", "second", "rounding"):
         if not hasattr(term, name):
             raise TypeError(f"{term.__name__} lacks {name!r}, which a term needs")
+    words = [term.key, *(column.name for column in term.columns)]
+    bad = [word for word in words if not word.replace("-", "_").isidentifier() or word in RESERVED]
+    if bad:
+        raise TypeError(
+            f"{term.__name__}: {bad[0]!r} cannot be the name of a table or a column in a scene file"
+        )
     fields = [column.field for column in term.columns]
     given = getattr(term, "__dataclass_fields__", {})
     unknown = [name for name in (*fields, *term.ends) if name not in given]

@@ -137,7 +137,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from _springs(table.spring, bodies)
     yield from _capacitors(table, bodies)
     for key, (term, _) in tables.of_terms().items():
-        rows = getattr(table, key.replace("-", "_"))
+        rows = getattr(table, tables.identifier(key))
         if rows:
             yield _by_columns(term, rows, bodies)
     yield from _friction(table, bodies)
@@ -205,23 +205,22 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
         if column.inverse:
             values[column.field] = np.array([_inverse(term, column, j, row) for j, row in enumerate(rows)])
         else:
-            values[column.field] = np.array([getattr(row, column.name) for row in rows])
+            values[column.field] = np.array([getattr(row, tables.identifier(column.name)) for row in rows])
     if len(term.ends) == 1:
         field = f"{term.key}[{{}}].particle"
-        chosen = [_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]
-        found: Term = term(i=np.array(chosen), **values)
-        return found
-    for j, row in enumerate(rows):
-        one, other = (_number(end, bodies, f"{term.key}[{j}].ends") for end in row.ends)
-        _two_ends(one, other, f"{term.key}[{j}].ends")
-    a, b = zip(*(row.ends for row in rows), strict=True)
-    joined: Term = term(a=np.array(a), b=np.array(b), **values)
-    return joined
+        ends = [[_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]]
+    else:
+        for j, row in enumerate(rows):
+            one, other = (_number(end, bodies, f"{term.key}[{j}].ends") for end in row.ends)
+            _two_ends(one, other, f"{term.key}[{j}].ends")
+        ends = [list(end) for end in zip(*(row.ends for row in rows), strict=True)]
+    found: Term = term(**dict(zip(term.ends, map(np.array, ends), strict=True)), **values)
+    return found
 
 
 def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
     """What the field of an inverse column holds: given as such, or as the inverse of what is given."""
-    given, inverse = getattr(row, column.name), getattr(row, column.field)
+    given, inverse = getattr(row, tables.identifier(column.name)), getattr(row, column.field)
     if given is not None and inverse is not None:
         raise MistakeError(f"{term.key}[{j}]: {column.name} and its inverse {column.field} are both given")
     if inverse is not None:

@@ -148,15 +148,25 @@ _SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": Non
 def _of_term(term: Any) -> type[Table]:
     """The table of a term: the particle or the two ends on which it acts, and its columns."""
     fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
+    names = {}
     for column in term.columns:
         kind: Any = _SIGNS[column.sign]
+        name = identifier(column.name)
+        names[name] = column.name
         if column.inverse:
             # given itself, or its inverse under the name of the field
-            fields += [(column.name, kind | None, None), (column.field, kind | None, None)]
+            fields += [(name, kind | None, None), (column.field, kind | None, None)]
             continue
-        fields.append((column.name, kind) if column.default is None else (column.name, kind, column.default))
-    table = msgspec.defstruct(f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True)
+        fields.append((name, kind) if column.default is None else (name, kind, column.default))
+    table = msgspec.defstruct(
+        f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True, rename=names
+    )
     return cast(type[Table], table)
+
+
+def identifier(name: str) -> str:
+    """The attribute under which a struct holds what a scene file calls so: words with dashes are none."""
+    return name.replace("-", "_")
 
 
 OTHERWISE = ("wall-spring", "spring", "damping")
@@ -182,11 +192,11 @@ def scene_table() -> Any:
 def _scene_table(known: tuple[type[terms.Term], ...]) -> Any:
     return msgspec.defstruct(
         "SceneTable",
-        [(key.replace("-", "_"), tuple[table, ...], ()) for key, (_, table) in _of_terms(known).items()],  # type: ignore[valid-type]
+        [(identifier(key), tuple[table, ...], ()) for key, (_, table) in _of_terms(known).items()],  # type: ignore[valid-type]
         bases=(SceneBase,),
         frozen=True,
         kw_only=True,
-        rename=lambda name: name.replace("_", "-"),
+        rename={identifier(key): key for key in _of_terms(known)},
     )
 
 
