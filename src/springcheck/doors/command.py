@@ -12,7 +12,6 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -77,11 +76,10 @@ def files(text: str) -> list[str]:
 
 def as_json(scene: Scene, step: float, every: int) -> dict[str, Any]:
     """A scene as plain data.  One mass on one spring to a wall stands in four plain numbers beside it."""
-    terms = []
-    for term in scene.terms:
-        values = {field.name: getattr(term, field.name) for field in fields(term)}  # type: ignore[arg-type]
-        arrays = {key: value.tolist() for key, value in values.items() if isinstance(value, np.ndarray)}
-        terms.append({"key": term.key, **arrays})
+    terms: list[dict[str, Any]] = [
+        {"key": term.key} | {name: values.tolist() for name, values in term.arrays.items()}
+        for term in scene.terms
+    ]
     out: dict[str, Any] = {
         "name": scene.name, "step": step, "steps": scene.steps, "every": every, "units": scene.units,
         "m": scene.m.tolist(), "q": scene.q.tolist(), "p": scene.p.tolist(), "terms": terms,

@@ -108,6 +108,11 @@ class Term:
         return tuple(getattr(self, name) for name in self.ends)
 
     @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Its numbers by the names of their fields, (s,) each: the ends of each row, then the columns."""
+        return {name: getattr(self, name) for name in (*self.ends, *(c.field for c in self.columns))}
+
+    @property
     def parameters(self) -> tuple[Floats, ...]:
         """What the functions of the law take after u, each (s,)."""
         return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)
@@ -208,8 +213,8 @@ class Term:
 
     def joined(self, other: Self) -> Self:
         """The rows of both in one term, these first."""
-        names = [*self.ends, *(column.field for column in self.columns)]
-        return self._changed(**{name: np.append(getattr(self, name), getattr(other, name)) for name in names})
+        rows = other.arrays
+        return self._changed(**{name: np.append(values, rows[name]) for name, values in self.arrays.items()})
 
     def separated(self, q: Reals) -> tuple[Self, Reals]:
         """The term with particles of its own for each row, and their positions for q (..., n)."""
@@ -218,8 +223,7 @@ class Term:
         return self._changed(**dict(zip(self.ends, own, strict=True))), where
 
     def __getstate__(self) -> dict[str, Any]:
-        names = (*self.ends, *(column.field for column in self.columns))
-        return {name: getattr(self, name) for name in names} | ({"fast": True} if self.fast else {})
+        return self.arrays | ({"fast": True} if self.fast else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         refrozen(self, state)
