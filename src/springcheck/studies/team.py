@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
+from springcheck.studies.cluster import Cluster
 from springcheck.workers import carried_out
 
 T = TypeVar("T")
@@ -57,6 +58,11 @@ def options(parser: ArgumentParser, default: int = 1) -> None:
         metavar="N",
         help=f"processes that measure at the same time (default {default})",
     )
+    parser.add_argument(
+        "--cluster",
+        metavar="tcp://HOST:PORT|FILE",
+        help="the workers of a dask scheduler, by its address or its scheduler file",
+    )
 
 
 def _count(text: str) -> int:
@@ -67,4 +73,4 @@ def _count(text: str) -> int:
 
 def of(options: Namespace) -> Team:
     """Those that the command line asks for."""
-    return Processes(options.workers)
+    return Cluster(options.cluster) if options.cluster else Processes(options.workers)

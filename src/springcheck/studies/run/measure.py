@@ -43,8 +43,10 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         raise SpringcheckError(
             "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
         )
-    if not options.vary and (options.samples is not None or options.seed or options.workers > 1):
-        raise SpringcheckError("--samples, --seed and --workers go with --vary")
+    if not options.vary and (
+        options.samples is not None or options.seed or options.workers > 1 or options.cluster
+    ):
+        raise SpringcheckError("--samples, --seed, --workers and --cluster go with --vary")
     if options.vary and (options.source is not None or options.thorough or options.verdicts):
         raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
     if options.vary:
