@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import springcheck
+from springcheck.physics.terms import known
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -35,9 +36,9 @@ def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> N
     (tmp_path / "sextic.py").write_text(term)
     (scene,) = (block for block in blocks("toml", DATA) if "sextic" in block)
     (tmp_path / "well.toml").write_text(scene)
-    arguments = ["run", "well.toml", "--method", "ase:*", "--method", "sundials:*"]
     done = subprocess.run(
-        [sys.executable, "-c", f"import sextic, springcheck.cli as c; raise SystemExit(c.main({arguments}))"],
+        [sys.executable, "-m", "springcheck", "run", "well.toml", "--engine", "sextic.py",
+         "--method", "ase:*", "--method", "own:*", "--method", "sundials:*"],
         capture_output=True, text=True, check=False, cwd=tmp_path,
     )  # fmt: skip
     # no exact solution is known of it, so nothing tells how far a solver may be off
@@ -46,6 +47,13 @@ def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> N
     assert "not judged: ase" not in done.stdout
     assert "ase:velocity-verlet" in done.stdout
     assert "0 failed" in done.stdout
+
+
+def test_the_table_of_terms_has_every_term_with_its_formula_and_columns() -> None:
+    for term in known().values():
+        assert term.formula in DATA, term.key
+        for column in term.columns:
+            assert f"`{column.name}`" in DATA, (term.key, column.name)
 
 
 def test_the_scene_of_the_readme_is_read(tmp_path: Path) -> None:

@@ -20,8 +20,9 @@ def bring(options: Namespace) -> None:
     scheme = getattr(options, "scheme", None) or ""
     labels = []
     for text in getattr(options, "engine", []):
-        found = engines.from_file(Path(text))
-        labels += [f"{found.name}:{name}" for name, method in found.methods.items() if method.default]
+        # a file may only register a term
+        if (own := engines.from_file(Path(text))) is not None:
+            labels += [f"{own.name}:{name}" for name, method in own.methods.items() if method.default]
     if getattr(options, "stepper", None):
         file = function.file_of(options.stepper)
         found = engines.bring(function.engine(options.stepper, scheme), file, _digest(file))

@@ -32,6 +32,7 @@ from springcheck.engines.contract import (
     named,
 )
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.physics import terms
 from springcheck.physics.scene import Scene
 
 __all__ = [
@@ -222,11 +223,17 @@ def brought(found: Engine, where: str) -> Iterator[Engine]:
         del _brought[found.name]
 
 
-def from_file(path: Path) -> Engine:
-    """Bring the engine of a Python file: its one `Engine`, or the one that it calls ENGINE."""
+def from_file(path: Path) -> Engine | None:
+    """Bring the engine of a Python file: its one `Engine`, or the one that it calls ENGINE.
+
+    None for a file that only registers terms.
+    """
+    before = terms.known()
     module = module_of(path)
     there = {id(x): x for x in vars(module).values() if isinstance(x, Engine)}
     found = getattr(module, "ENGINE", None) or next(iter(there.values()), None)
+    if found is None and terms.known() != before:
+        return None
     if found is None:
         raise MethodError(f"{path} has no engine: a springcheck.engines.Engine named ENGINE")
     try:
