@@ -547,7 +547,7 @@ def _fault(counts: Counts, scene: Scene, wrong: Trajectory, what: str) -> None:
             off = np.abs(a - wrong.q[row + 1]), np.abs(b - wrong.p[row + 1])
             allowed = case.ahead.of_q[row], case.ahead.of_p[row]
             ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, allowed, strict=True)]
-            effect = max(effect, float(np.nanmax(ratios)))
+            effect = max(effect, float(np.nanmax(np.append(ratios, 0.0))))
             if effect > 1e3 * COUNTED:
                 break
     verdicts = judged(counts, scene, wrong, what)

@@ -1,0 +1,35 @@
+"""The campaign against the judge, in short: `validation/judge_campaign.py` runs thousands of scenes."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "validation"))
+_spec = importlib.util.spec_from_file_location("judge_campaign", ROOT / "validation" / "judge_campaign.py")
+assert _spec is not None
+assert _spec.loader is not None
+judge_campaign = importlib.util.module_from_spec(_spec)
+sys.modules["judge_campaign"] = judge_campaign
+_spec.loader.exec_module(judge_campaign)
+
+
+def test_the_campaign_has_more_than_a_hundred_kinds_of_faults() -> None:
+    assert len(judge_campaign.FAULTS) >= 100
+    assert len(judge_campaign.LEGAL) == 7
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_no_legal_engine_is_rejected_and_no_large_fault_is_missed(first: int) -> None:
+    found = judge_campaign.campaign(first, 10)
+    assert found.sets >= 20
+    assert found.alarms == []
+    assert found.missed == []
+    assert found.numbers == []
+    assert found.seen >= 5
+    assert np.median(found.noise) < 1
