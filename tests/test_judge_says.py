@@ -16,6 +16,7 @@ from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic
 from springcheck.studies.extremes import grid, running
 from springcheck.studies.faults import clean
 from springcheck.studies.run import measure
@@ -117,3 +118,39 @@ def test_company_changes_nothing_but_ase_s_smallest_motions(
     need(label)
     bench = checks.Bench(scene=lone(size), label=label, run=simulate.run)
     assert experiments.company(bench).passed is passed
+
+
+def test_a_run_that_left_no_frame_has_no_error(tmp_path: Path) -> None:
+    well = clean.scene(
+        np.array([1.0]),
+        (Quartic(i=[0], b=[1.0], at=[0.0]),),
+        np.array([1e60]),
+        np.zeros(1),
+        step=1.0,
+        steps=40,
+        every=20,
+    )
+    report = measure.run(well, tmp_path / "a.h5", methods=["own:euler"])
+    (line,) = report.runs
+    assert line.outcome == "diverged"
+    assert line.steps == 0
+    assert np.isnan(line.max_error)
+    assert np.isnan(line.energy_drift)
+
+
+def test_what_the_scenes_say_of_verlet_s_frequency_follows_from_their_numbers() -> None:
+    """A step turns the phase by 2 asin(h w/2) instead of h w."""
+    light = 2.99792458e10
+    for name, number, cases in (
+        ("carbon-monoxide", 2169.81358, {1.0: ("0.71 %", "15.4 1/cm"), 2.0: ("3.02 %", "65.5 1/cm")}),
+        ("ch-bond", 2936.0, {2.0: ("5.96 %",)}),
+    ):
+        for femtoseconds, said in cases.items():
+            hw = 2 * np.pi * light * number * femtoseconds * 1e-15
+            excess = 2 * np.arcsin(hw / 2) / hw - 1
+            shown = (f"{100 * excess:.2f} %", f"{excess * number:.1f} 1/cm")
+            assert shown[: len(said)] == said
+            source = (Path(__file__).parent.parent / "data" / "scenes" / f"{name}.toml").read_text()
+            assert all(part in source for part in said)
+    source = (Path(__file__).parent.parent / "data" / "scenes" / "morse-bond.toml").read_text()
+    assert f"{2990.9463**2 / (4 * 52.8186):.2f} 1/cm" in source

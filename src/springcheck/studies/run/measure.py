@@ -238,14 +238,16 @@ class _Tally:
 
 
 def _line(piece: Trajectory, tally: _Tally) -> MethodRun:
+    # a run that left no frame but the start has no error: that of the start is nothing
+    ended = piece.outcome.status != "complete" and piece.outcome.step == 0
     return MethodRun(
         method=piece.label,
         scheme=piece.scheme,
         outcome=piece.outcome.status,
         steps=piece.outcome.step,
         message=piece.outcome.message,
-        max_error=tally.error,
-        energy_drift=tally.drift,
+        max_error=np.nan if ended else tally.error,
+        energy_drift=np.nan if ended else tally.drift,
         start_seconds=piece.timing.start,
         run_seconds=piece.timing.run,
         force_calls=piece.force_calls,
