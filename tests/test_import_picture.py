@@ -96,3 +96,18 @@ FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
 )
 def test_what_is_not_needed_is_not_imported(code: str, absent: set[str]) -> None:
     assert not _loaded(code) & absent
+
+
+@pytest.mark.parametrize("path", sorted(HOME.glob("studies/**/*.py")), ids=lambda path: path.name)
+def test_the_keeper_alone_of_the_studies_knows_the_store(path: Path) -> None:
+    own = path.relative_to(HOME).as_posix()
+    uses = {name for name in _imports(path) if name.startswith("springcheck.store")}
+    # study.py names a type of it for the reader
+    assert not uses or own in ("studies/keeper.py", "studies/tables.py", "studies/study.py"), uses
+
+
+@pytest.mark.parametrize("place", ["cli.py", "inspect.py", "plot.py"])
+def test_no_study_is_named_outside_of_the_list(place: str) -> None:
+    named = {name for name in _imports(HOME / place) if name.startswith("springcheck.studies.")}
+    for study in STUDIES:
+        assert not any(name.startswith(f"springcheck.studies.{study}") for name in named), named

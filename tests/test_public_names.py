@@ -16,8 +16,8 @@ from springcheck.physics.terms import Quartic
 from springcheck.trajectory import Comparison
 
 NAMES = [
-    "Scene", "Trajectory", "Verdict", "__version__", "compare", "exact", "identify", "judge", "load_scene",
-    "plot", "read", "run", "simulate",
+    "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",
+    "load_scene", "plot", "read", "run", "simulate", "spring",
 ]  # fmt: skip
 
 

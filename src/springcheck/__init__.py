@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from springcheck import plot
     from springcheck.api import exact, judge, read, run
+    from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
     from springcheck.trajectory import Trajectory, Verdict
@@ -28,19 +29,21 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
-    "Scene", "Trajectory", "Verdict", "__version__", "compare", "exact", "identify", "judge", "load_scene",
-    "plot", "read", "run", "simulate",
+    "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",
+    "load_scene", "plot", "read", "run", "simulate", "spring",
 ]  # fmt: skip
 
 _HOMES = {
     "Scene": "physics.scene",
     "Trajectory": "trajectory",
     "Verdict": "trajectory",
+    "chain": "physics.builders",
     "exact": "api",
     "judge": "api",
     "load_scene": "physics.scenefile",
     "read": "api",
     "run": "api",
+    "spring": "physics.builders",
 }
 _MODULES = {"compare", "identify", "simulate"}
 """Modules that are called as the public function of their name, which stands in `api`."""

@@ -170,8 +170,8 @@ def _answers(
             elif future.status in ("cancelled", "lost") or client.status != "running":
                 raise SpringcheckError(GONE)
             else:
-                error = future.exception(timeout=patience)
-                if not isinstance(error, distributed.KilledWorker):
-                    raise error
+                cause = future.exception(timeout=patience)
+                if not isinstance(cause, distributed.KilledWorker):
+                    raise cause
                 give(i)
     client.cancel(list(number), force=True)
