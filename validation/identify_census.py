@@ -1,143 +1,263 @@
-"""Claim: `identify` names scheme, stride and precision from states alone, and never names another scheme.
+"""Claim: `identify` names scheme and steps from states alone, never names another scheme, and never takes a
+systematic error for an arithmetic.
 
-For each scheme random springs (m over four decades, h over four, h w log-uniform from 0.02 to 1.5 or
-0.95 of the limit of stability, any start, 1 to 8 steps to a frame, 101 frames; friction gamma h = 0.07),
-with mass and stiffness stated.  A name that is not the scheme's, a list without it, and "no scheme" are
-wrong.  Measured, nothing wrong in any of them:
+Each trajectory is drawn at random: a scheme of the catalogue, or one with friction by any law and at any place
+in its step, or a force held over substeps; a spring that is stated or not, about an equilibrium at 0 or away
+from it (a weight), from rest or not; 1 to 8 steps to a frame; steps that are h, or the differences of a rounded
+clock (linspace or accumulated); h, k or m rounded to single precision; numbers in double or single precision or
+as text of 6 digits; h w log-uniform from 0.02 to 1.5 or 0.95 of the limit.  One in six carries a systematic
+error, of 1e-12 to 1e-3 of the force or the state: a stiffness that wobbles, a cubic force, a constant drift of
+the position, noise, alternating steps, one kick; then "fits" is a false fit, unless the error hides within the
+rounding of the file.
 
-* double precision, 100 springs for each of 17 schemes: all named, with stride and as
-  "double", but 44 exact flows, which schemes of up to 100 steps a frame come as near to;
-* numbers rounded to single precision, 50 springs for each of the ten schemes up to second order and 100 for
-  each of the seven others: all named up to second order, with friction, Ruth and Yoshida; not told apart
-  were RK4 9 of 100, Forest-Ruth 3 and the exact flow 87.  All are "double, stored in single" but one, an
-  implicit Euler that dies down in a few frames, of which it is said that it does not show;
-* text of 6 digits, 30 and 50 springs: all named up to second order and with friction; not told apart were RK4
-  16 of 50, Ruth 2, Forest-Ruth 10, Yoshida 6 and the exact flow 50, and RK4 1 and Ruth 2 named without their
-  number of steps to a frame;
-* arithmetic of single precision ("computed-single", 30 springs, 16 schemes, no stiffness stated, so that
-  position Verlet, the implicit midpoint and the trapezoidal rule have one map): all "single"; 299 named, 179
-  not told apart, 2 named without their number of steps.
+Steps are carried out in plain floats from the stages, without the matrices that `identify` matches.
 
-Command: python validation/identify_census.py [double|single|text|computed-single|computed-single-text]
-[springs] [scheme ...]
+Command: python validation/identify_census.py [trajectories] [seed]
 """
 
 from __future__ import annotations
 
-from collections import Counter
+import math
+import time
+from collections import Counter, defaultdict
+from typing import Any
 
 import numpy as np
 
 from arguments import arguments
-from springcheck.arrays import Floats, Reals
+from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
-from springcheck.identify.search import aliases
-from springcheck.schemes import SCHEMES, step
+from springcheck.identify.families import DAMPED, UNDAMPED, Family
+from springcheck.identify.search import aliases, frictionless
+from springcheck.schemes import SCHEMES, number
 
 FRAMES = 101
-FRICTION = 0.07
-"""gamma h of the schemes that have friction."""
+ERRORS = (
+    "wobbling stiffness",
+    "cubic force",
+    "drift of the position",
+    "noise",
+    "alternating steps",
+    "one kick",
+)
 
-FORMS = ("double", "single", "text", "computed-single", "computed-single-text")
+
+class Draw:
+    """One random trajectory and what it was made of."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        kind = rng.choice(["plain", "plain", "damped", "damped", "held"])
+        pool = {"plain": UNDAMPED, "damped": DAMPED, "held": UNDAMPED[:1]}[str(kind)]
+        self.family: Family = pool[int(rng.integers(len(pool)))]
+        self.held = int(rng.integers(2, 9)) if kind == "held" else 0
+        self.scheme = "held-force" if self.held else self.family.scheme
+        flow = self.family.flow
+        self.error = str(rng.choice(ERRORS)) if rng.random() < 1 / 6 and not flow else ""
+        self.size = float(10 ** rng.uniform(-12, -3))
+        self.stride = 1 if flow else int(rng.integers(1, 9)) if rng.random() < 0.7 else 1
+        self.clock = (
+            "even" if flow or self.error else str(rng.choice(["even", "even", "linspace", "accumulated"]))
+        )
+        self.single = "" if flow or self.error else str(rng.choice(["", "", "", "h", "k", "m"]))
+        self.form = "double" if self.error else str(rng.choice(["double", "double", "single", "text"]))
+        self.stated = bool(rng.random() < 0.5)
+        limit = self.family.limit
+        highest = min(1.5, 0.95 * limit) if limit > 0 else 1.0
+        x = math.exp(rng.uniform(math.log(0.02), math.log(highest)))
+        self.m, self.h = float(10 ** rng.uniform(-2, 2)), float(10 ** rng.uniform(-3, 1))
+        self.k = self.m * (x / self.h) ** 2
+        self.g = float(rng.uniform(0.01, 0.3)) * min(x, 1.0) if self.family.damped and not self.held else 0.0
+        self.x = x
+        scale = float(10 ** rng.uniform(-1, 2))
+        self.at = float(rng.choice([0.0, 0.0, scale * rng.normal()]))
+        self.q, self.v = scale * rng.normal() + self.at, scale * rng.normal() * x / self.h
+        if rng.random() < 0.15:
+            self.v = 0.0
+            self.q = self.at + scale if self.at == 0 else 0.0
+        self.rng = rng
+
+    def __str__(self) -> str:
+        return (
+            f"{self.family.name}{f', held over {self.held}' if self.held else ''}, {self.stride} steps, "
+            f"h w {self.x:.3g}, {self.form}, clock {self.clock}, single {self.single or '-'}, at {self.at:.3g}, "
+            f"stated {self.stated}{f', {self.error} {self.size:.1e}' if self.error else ''}"
+        )
+
+    def move(self, *, clean: bool = False) -> tuple[Floats, Floats, Floats]:
+        """Times, positions and velocities of the frames."""
+        steps = (FRAMES - 1) * self.stride
+        h, k, m = self.h, self.k, self.m
+        if self.clock == "even":
+            t: Floats = np.asarray(np.arange(steps + 1) * h, np.float64)
+        elif self.clock == "linspace":
+            t = np.asarray(np.linspace(0, steps * h, steps + 1), np.float64)
+        else:
+            t = np.concatenate([[0.0], np.cumsum(np.full(steps, h))])
+        given = (("h", h), ("k", k), ("m", m))
+        h, k, m = (float(np.float32(x)) if self.single == name else x for name, x in given)
+        if self.family.flow:
+            return self._flow(t)
+        noise = np.random.default_rng(5).standard_normal(steps + 1)
+        error = "" if clean else self.error
+        q, v = self.q, self.v
+        frames = [(q, v)]
+        for i in range(steps):
+            step = h if self.clock == "even" else float(t[i + 1] - t[i])
+            if error == "alternating steps":
+                step *= 1 + self.size * (-1) ** i
+
+            def force(x: float, i: int = i) -> float:
+                out = -k * (x - self.at)
+                if error == "wobbling stiffness":
+                    out *= 1 + self.size * math.sin(0.37 * i * self.x)
+                if error == "cubic force":
+                    out *= (
+                        1 + self.size * ((x - self.at) / (abs(self.q) + abs(self.v) * self.h / self.x)) ** 2
+                    )
+                return out + (self.size * k * abs(self.q) * noise[i] if error == "noise" else 0.0)
+
+            if error == "one kick" and i == steps // 2:
+                v += self.size * abs(v)
+            q, v = (
+                self._held(q, v, step, m, force)
+                if self.held
+                else _step(self.family, q, v, step, m, k, self, force)
+            )
+            if error == "drift of the position":
+                q += self.size * abs(self.q)
+            if (i + 1) % self.stride == 0:
+                frames.append((q, v))
+        qs, vs = np.array(frames).T
+        return t[:: self.stride], qs, vs
+
+    def _held(self, q: float, v: float, h: float, m: float, force: Any) -> tuple[float, float]:
+        held = force(q)
+        for _ in range(self.held):
+            v = v + h / self.held * held / m
+            q = q + h / self.held * v
+        return q, v
+
+    def _flow(self, t: Floats) -> tuple[Floats, Floats, Floats]:
+        g, w2 = np.longdouble(self.g) / self.h, np.longdouble(self.k) / self.m
+        w = np.sqrt(w2 - g * g / 4)
+        y, u = np.longdouble(self.q - self.at), np.longdouble(self.v)
+        b = (u + g / 2 * y) / w
+        decay = np.exp(-g / 2 * t.astype(np.longdouble))
+        c, s = np.cos(w * t), np.sin(w * t)
+        q = decay * (y * c + b * s)
+        v = decay * ((b * w - g / 2 * y) * c - (y * w + g / 2 * b) * s)
+        return t, np.asarray(self.at + q, np.float64), np.asarray(v, np.float64)
 
 
-def motion(
-    name: str, rng: np.random.Generator, width: type = np.float64
-) -> tuple[Floats, Floats, Floats, Floats, Floats, int]:
-    """Times, positions, momenta, mass, stiffness and steps per frame of one random spring, moved by
-    arithmetic of this width."""
-    scheme = SCHEMES[name]
-    highest = min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.5
-    m, h = 10 ** rng.uniform(-2, 2, 1), float(10 ** rng.uniform(-3, 1))
-    x = np.exp(rng.uniform(np.log(0.02), np.log(highest), 1))
-    k = m * (x / h) ** 2
-    q = rng.normal(size=1) * 10 ** rng.uniform(-1, 2)
-    p = rng.normal(size=1) * m * x / h * np.abs(q)
-    if scheme.flow:
-        t = np.asarray(np.arange(FRAMES) * h, dtype=np.float64)
-        w = np.sqrt(k.astype(np.longdouble) / m)
-        c, s = np.cos(w * t[:, None]), np.sin(w * t[:, None])
-        return t, (q * c + p / (m * w) * s).astype(float), (p * c - m * w * q * s).astype(float), m, k, 1
-    stride = int(rng.integers(1, 9))
-    rate = np.full(1, FRICTION / h) if name.startswith("langevin") else None
-    # a coarser arithmetic keeps its constants so, too; what is stated is what it has
-    m, k = (x.astype(width).astype(float) for x in (m, k))
-    q, p = q.astype(width), p.astype(width)
-    stiff: Reals = k.astype(width)
-    states = [(q, p)]
-    for _ in range(FRAMES - 1):
-        for _ in range(stride):
-            new = step(scheme, q, p, h=h, m=m, force=lambda q, p: -stiff * q, stiffness=np.diag(k), rate=rate)
-            q, p = (np.asarray(x, dtype=width) for x in new)
-        # a scheme that grows without bound leaves the range of single precision, and the file ends
-        if not max(abs(q[0]), abs(p[0])) < 1e30:
-            break
-        states.append((q, p))
-    qs, ps = (np.array([state[i] for state in states], dtype=np.float64) for i in (0, 1))
-    return np.asarray(np.arange(len(states)) * (stride * h), dtype=np.float64), qs, ps, m, k, stride
+def _step(
+    family: Family, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any
+) -> tuple[float, float]:
+    """One step in plain floats."""
+    rate = draw.g / draw.h
+    if family.stability[0]:
+        q, v = _tableau(family, q, v, h, m, k, draw, force, rate if not family.stages else 0.0)
+    for kind, share in family.stages:
+        c = float(number(share, np.longdouble)) * h
+        if kind == "drift":
+            q = q + c * v
+        elif kind == "kick":
+            v = v + c * (force(q) / m)
+        elif kind == "friction":
+            v = v * math.exp(-c * rate)
+        elif kind == "explicit":
+            v = v + c * (force(q) / m - rate * v)
+        elif kind == "implicit":
+            v = (v + c * (force(q) / m)) / (1 + c * rate)
+        elif kind == "centred":
+            v = ((1 - c * rate / 2) * v + c * (force(q) / m)) / (1 + c * rate / 2)
+        else:
+            half = (v - c * (force(q) / m)) / (1 - c * rate)
+            v = v + c * (force(q) / m - rate * half)
+    return q, v
+
+
+def _tableau(
+    family: Family, q: float, v: float, h: float, m: float, k: float, draw: Draw, force: Any, rate: float
+) -> tuple[float, float]:
+    scheme = SCHEMES[family.scheme]
+    slopes: list[tuple[float, float]] = []
+    for row in scheme.a:
+        x, u = q, v
+        for c, (dq, dv) in zip(row, slopes, strict=False):
+            x, u = x + h * float(c) * dq, u + h * float(c) * dv
+        own = float(row[len(slopes)]) * h if len(row) > len(slopes) else 0.0
+        if own:
+            # u' = u + own (F(x + own u')/m - rate u'), linear
+            u = (u + own * (force(x) / m)) / (1 + own * rate + own * own * k / m)
+            x = x + own * u
+        slopes.append((u, force(x) / m - rate * u))
+    for c, (dq, dv) in zip(scheme.b, slopes, strict=True):
+        q, v = q + h * float(c) * dq, v + h * float(c) * dv
+    return q, v
 
 
 def written(x: Floats, form: str) -> Floats:
     """Numbers as a file of this form returns them."""
     if form == "single":
         return x.astype(np.float32).astype(np.float64)
-    if form.endswith("text"):
-        return np.array([[float(f"{y:.6g}") for y in row] for row in x])
-    return x
+    return np.array([float(f"{y:.6g}") for y in x]) if form == "text" else x
 
 
-def judged(name: str, stride: int, found: Identification) -> tuple[str, bool]:
-    """What was said, in words, and whether it is wrong: a name that is another's, or a list without it."""
-    same = {name, *aliases(name)}
-    listed = any(x.scheme in same and x.stride == stride for x in found.candidates)
+def judged(draw: Draw, found: Identification, hidden: bool) -> str:
+    """What was said: right, short of it, or wrong."""
+    if draw.error:
+        return "error seen" if not found.fits else "error within rounding" if hidden else "FALSE FIT"
+    same = {draw.scheme}
+    if draw.scheme in SCHEMES:
+        same |= {*aliases(draw.scheme), *(frictionless(draw.scheme) if not draw.g else ())}
+        same |= {f.scheme for f in UNDAMPED if not draw.g and draw.scheme in frictionless(f.scheme)}
+    listed = any(x.scheme in same and x.stride == draw.stride for x in found.candidates)
     if found.verdict == "none":
-        return "taken for no scheme", True
-    said = f"{found.precision}; {'fits' if found.fits else 'does not fit'}"
+        return "none"
     if found.verdict == "not told apart":
-        return (f"not told apart; {said}", False) if listed else (f"LISTED WITHOUT IT; {said}", True)
-    if found.scheme not in same or not listed:
-        return f"WRONG: {found.scheme}, {found.stride}; {said}", True
-    return f"{'named' if found.stride else 'named without its stride'}; {said}", False
+        return "not told apart" if listed else "LISTED WITHOUT IT"
+    if found.scheme not in same:
+        return "WRONG NAME"
+    return ("named" if listed else "WRONG STEPS") + ("" if found.fits else ", but not what was stated")
 
 
 def main() -> None:
-    """Print, scheme by scheme, what the springs were taken for."""
-    given = arguments(__doc__, form="double", count=200, schemes=[])
-    form, count, chosen = given.form, given.count, given.schemes
-    if form not in FORMS:
-        raise SystemExit(f"form {form!r}: one of {', '.join(FORMS)}")
-    width = np.float32 if form.startswith("computed") else np.float64
-    # the exact flow is evaluated, not computed step by step
-    flow = width is np.float64
-    names = [
-        scheme.name
-        for scheme in SCHEMES.values()
-        if (scheme.one_step and not scheme.mixes) or (scheme.flow and flow)
-    ]
-    everything: Counter[str] = Counter()
-    for number, name in enumerate(names):
-        if chosen and name not in chosen:
+    """Print what was said, class by class, and everything that is wrong."""
+    given = arguments(__doc__, count=2000, seed=1)
+    seen: dict[str, Counter[str]] = defaultdict(Counter)
+    begun = time.perf_counter()
+    spent = 0.0
+    for number_ in range(given.count):
+        draw = Draw(np.random.default_rng([given.seed, number_]))
+        with np.errstate(all="ignore"):
+            t, q, v = draw.move()
+            clean = draw.move(clean=True) if draw.error else (t, q, v)
+        if not (np.all(np.isfinite(q)) and np.max(np.abs(q)) < 1e30):
             continue
-        rng = np.random.default_rng([number, 2026])
-        seen: Counter[str] = Counter()
-        for _ in range(count):
-            t, q, p, m, k, stride = motion(name, rng, width)
-            stated = None if form.startswith("computed") else k
-            try:
-                found = identify(t, written(q, form), written(p, form), mass=m, stiffness=stated)
-            except IdentificationError as error:
-                seen[f"refused: {error}"] += 1
-                continue
-            said, wrong = judged(name, stride, found)
-            seen[said] += 1
-            if wrong or not found.fits:
-                x = float(np.sqrt(k[0] / m[0]) * t[1] / stride)
-                print(f"  {name}, {stride} steps, h w = {x:.4g}, {len(t)} frames: {said}", flush=True)
-        print(f"{name:32s}", "; ".join(f"{n} {what}" for what, n in seen.most_common()), flush=True)
-        for said, n in seen.items():
-            everything[said.split(";")[0]] += n
-    print("all", dict(everything))
+        # an error of a frame below some units in the last place of the file is none of the file's
+        size = np.max(np.abs(q - draw.at)) + abs(draw.at)
+        first = [float(np.max(np.abs(x[1] - y[1]))) for x, y in zip((q, v), clean[1:], strict=True)]
+        late = float(np.max(np.abs(q - clean[1])))
+        hidden = bool(late <= 64 * 2.0**-52 * size * draw.stride and max(first) <= 64 * 2.0**-52 * size)
+        stated = draw.k if draw.stated else None
+        name = draw.error or f"{'held' if draw.held else 'damped' if draw.g else 'plain'}, {draw.form}"
+        now = time.perf_counter()
+        try:
+            found = identify(t, written(q, draw.form), v=written(v, draw.form), mass=draw.m, stiffness=stated)
+            said = judged(draw, found, hidden)
+        except IdentificationError as error:
+            said = f"refused: {str(error)[:60]}"
+        spent += time.perf_counter() - now
+        seen[name][said] += 1
+        if said.isupper() or said.split(",")[0].isupper() or said == "none":
+            print(f"{said}: number {number_}: {draw}: {found.statement[:150]}", flush=True)
+    for name, counts in sorted(seen.items()):
+        print(f"{name:28s}", "; ".join(f"{n} {said}" for said, n in counts.most_common()))
+    total = sum(sum(x.values()) for x in seen.values())
+    print(
+        f"{total} trajectories, {spent / total * 1e3:.0f} ms each, {time.perf_counter() - begun:.0f} s in all"
+    )
 
 
 if __name__ == "__main__":

@@ -66,7 +66,9 @@ class Family:
             return _matrices(1 - g * a, one, -a, one)
         if self.formula:
             return FORMULAS[self.formula](a)
-        out = _exponential(a, g) if self.flow else _rational(self.stability, a, g)
+        # a tableau's own friction is in its force, unless the velocity is scaled after the step
+        inside = 0 * g if self.stages else g
+        out = _exponential(a, g) if self.flow else _rational(self.stability, a, inside)
         return _staged(self.stages, out, a, g)
 
     def rate(self, law: str, g: float) -> float:

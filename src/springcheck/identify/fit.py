@@ -13,6 +13,9 @@ from springcheck.identify.record import Record
 
 ROUNDING = 2.0**-53
 
+DEAD = 2.0**-40
+"""Distance from an equilibrium, as a share of its own from 0, below which a motion has died down to it."""
+
 FEWEST_PAIRS = 5
 """More pairs than these are needed before a constant part is looked for."""
 
@@ -96,6 +99,12 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
     quanta = quanta / size.astype(np.float64)
     first = _preliminary(z, chosen)
+    # at rest beside 0 the numbers' rounding is all that is left, and the same in every step
+    away = np.sqrt(np.sum((z[:-1].astype(np.float64) - first) ** 2, axis=1))
+    dead = away < DEAD * float(np.sqrt(np.sum(first**2)))
+    if np.count_nonzero(chosen & ~dead) > 2 * FEWEST_PAIRS:
+        chosen = chosen & ~dead
+        pairs = int(np.count_nonzero(chosen))
     weight = _pair_weights(z, quanta, first) * chosen
     w = weight[:, None].astype(np.longdouble)
     before, after = w * z[:-1], w * z[1:]
@@ -116,7 +125,10 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
         free = after - np.concatenate([before, w], axis=1) @ y
         if better(left, free, 1):
             entries, at, resting = _about_rest(before, after, w, y)
-            drifts = better(resting, free, 1)
+            # at rest the roundings are the same in every step, and add up to a constant of their own
+            off = y[2] - (np.eye(2) - y[:2].T) @ at
+            room = 64 * ROUNDING * float(np.max(np.abs(z)))
+            drifts = better(resting, free, 1) and float(np.max(np.abs(off))) > room
             if drifts:
                 back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
                 at = back @ y[2]

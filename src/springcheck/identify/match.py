@@ -31,6 +31,9 @@ STRIDES = 12, 100
 WHOLE = 2
 """Roundings of a step that act on a whole state and not on what a step adds to it."""
 
+FAR = 1e300
+"""Chi-squared of what is not worth a comparison."""
+
 HOPELESS = 1e4
 """Chi-squared that is not refined any further after the first few steps: a hundred standard errors."""
 
@@ -72,17 +75,13 @@ class Match:
 def match(family: Family, found: Map, terms: Terms, strides: range, root: Roots | None = None) -> list[Match]:
     """The family fitted to a map at these strides; `root` are the map's roots where it turns."""
     base = FAMILIES[family.scheme] if family.damped and not family.held else family
+    far = False
     if rotation(found.entries[None]).angle[0] > 0:
         if family.flow:
             s, turns, a, g = flow_starts(found, damped=family.damped, growing=terms.growing)
         else:
-            s, turns, a, g = starts(
-                family,
-                base,
-                root or roots(found, strides),
-                terms,
-                100 * float(np.sqrt(found.covariance.max())),
-            )
+            spread = 100 * float(np.sqrt(found.covariance.max()))
+            s, turns, a, g, far = starts(family, base, root or roots(found, strides), terms, spread)
     elif family.held:
         return []
     else:
@@ -108,7 +107,7 @@ def match(family: Family, found: Map, terms: Terms, strides: range, root: Roots 
             down = np.abs(found.entries[1, 0] / guess[:, 1, 0])
             unknowns[2] = np.nan_to_num(np.log(up * down) / 2)
         free.append(2)
-    return _refine(family, found, terms, s, turns, unknowns, free)
+    return _refine(family, found, terms, s, turns, unknowns, free, rounds=1 if far else 20)
 
 
 def _refine(
@@ -119,6 +118,8 @@ def _refine(
     turns: Floats,
     unknowns: list[Extended],
     free: list[int],
+    *,
+    rounds: int,
 ) -> list[Match]:
     """Gauss-Newton on the four entries, weighted by their covariance; all first guesses at once."""
     observed = found.entries.reshape(4)
@@ -133,6 +134,14 @@ def _refine(
         return frame(family, values[:, 0], values[:, 1], masses, strides, found.size).reshape(-1, 4)
 
     values = np.stack(unknowns, axis=1)
+    if rounds == 1:
+        # far off: what it predicts is wanted, and no best fit
+        with np.errstate(all="ignore"):
+            entries = entries_at(values, s)
+        chi2, errors = np.full(len(s), FAR), np.zeros((len(s), 3))
+        return _matches(
+            family, terms, s, turns, values, log_masses(values, s), errors, chi2, entries, len(free)
+        )
     weights = _weights(family, found, terms, s, values[:, 0], values[:, 1])
     kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
     chi2, stalled = np.full(len(s), np.inf), np.zeros(len(s), dtype=int)
@@ -141,7 +150,7 @@ def _refine(
     # Newton's steps double the digits of a guess, and what has not come close by then will not
     hopeless = 4 if len(free) == 1 else 8
     with np.errstate(all="ignore"):
-        for turn in range(20):
+        for turn in range(rounds):
             now_s, now_weights, now_values = s[alive], weights[alive], values[alive]
             predicted = entries_at(now_values, now_s)
             miss = np.asarray(observed - predicted, dtype=np.float64)
@@ -174,7 +183,22 @@ def _refine(
             if not len(alive):
                 break
     masses = log_masses(kept, s)
-    physical = np.isfinite(chi2)
+    return _matches(family, terms, s, turns, kept, masses, errors, chi2, entries, len(free))
+
+
+def _matches(
+    family: Family,
+    terms: Terms,
+    s: Floats,
+    turns: Floats,
+    kept: Extended,
+    masses: Extended,
+    errors: Floats,
+    chi2: Floats,
+    entries: Extended,
+    unknowns: int,
+) -> list[Match]:
+    physical = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=1)
     if family.damped and not family.held and not terms.growing:
         physical &= kept[:, 1] > 0
     return [
@@ -189,7 +213,7 @@ def _refine(
             log_mass=float(masses[i]),
             mass_error=float(errors[i, 2]),
             chi2=float(chi2[i]),
-            freedom=4 - len(free),
+            freedom=4 - unknowns,
             predicted=tuple(float(x) for x in entries[i]),
         )
         for i in np.flatnonzero(physical)

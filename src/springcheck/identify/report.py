@@ -14,7 +14,7 @@ from springcheck.identify import arithmetic
 from springcheck.identify.candidates import candidates_of, common, other_names, rows, stated_stiffness
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, substeps
+from springcheck.identify.families import FAMILIES, HELD, substeps
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
@@ -24,6 +24,7 @@ from springcheck.identify.search import (
     Joint,
     difference,
     disagreements,
+    distinct,
     find,
     frictionless,
     numbers,
@@ -176,22 +177,35 @@ def _single_parameters(
         return [], ""
     loose = [replace(x, mass_unknown=True) for x in base]
     strides = range(stride, stride + 1) if stride is not None and stride > 0 else range(1, 13)
-    for joint in sorted((x for x in search(maps, loose, strides) if x.accepted), key=lambda x: x.plainness):
-        h = float(record.interval) / joint.stride
-        step = float(np.log(np.longdouble(np.float32(h)) / np.longdouble(h)))
-        masses = [0.0 if record.mass is None else float(record.mass[j]) for j in moving]
-        rounded = [math.log(float(np.float32(m)) / m) if m else 0.0 for m in masses]
-        for what, expected in (
-            ("step", [-step] * len(masses)),
-            ("mass", rounded),
-            ("step and the mass", [m - step for m in rounded]),
-        ):
-            off = [abs(part.log_mass - x) for part, x in zip(joint.parts, expected, strict=True)]
-            room = [6 * part.mass_error + 2 * record.jitter + 8 * ROUNDING for part in joint.parts]
-            clear = any(abs(x) > 100 * r for x, r in zip(expected, room, strict=True))
-            if clear and all(x <= r for x, r in zip(off, room, strict=True)):
-                return [joint], f"the {what} was rounded to single precision in double arithmetic"
+    found: dict[str, list[Joint]] = {}
+    for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
+        for joint in search(maps, loose, strides, families):
+            if joint.accepted and (what := _rounded(record, moving, joint)):
+                found.setdefault(what, []).append(joint)
+        if found:
+            what, joints = max(found.items(), key=lambda pair: len(pair[1]))
+            remark = f"the {what} was rounded to single precision in double arithmetic"
+            return sorted(joints, key=lambda x: x.plainness), remark
     return [], ""
+
+
+def _rounded(record: Record, moving: list[int], joint: Joint) -> str:
+    """Which parameter's rounding to single precision is the scale of velocities that a scheme fits with."""
+    h = float(record.interval) / joint.stride
+    step = float(np.log(np.longdouble(np.float32(h)) / np.longdouble(h)))
+    masses = [0.0 if record.mass is None else float(record.mass[j]) for j in moving]
+    rounded = [math.log(float(np.float32(m)) / m) if m else 0.0 for m in masses]
+    for what, expected in (
+        ("step", [-step] * len(masses)),
+        ("mass", rounded),
+        ("step and the mass", [m - step for m in rounded]),
+    ):
+        off = [abs(part.log_mass - x) for part, x in zip(joint.parts, expected, strict=True)]
+        room = [6 * part.mass_error + 2 * record.jitter + 8 * ROUNDING for part in joint.parts]
+        clear = any(abs(x) > 100 * r for x, r in zip(expected, room, strict=True))
+        if clear and all(x <= r for x, r in zip(off, room, strict=True)):
+            return what
+    return ""
 
 
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:

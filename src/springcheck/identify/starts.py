@@ -118,8 +118,9 @@ def roots(found: Map, strides: range) -> Roots:
 
 def starts(
     family: Family, base: Family, root: Roots, terms: Terms, spread: float
-) -> tuple[Floats, Floats, Extended, Extended]:
-    """Strides, turns and first guesses of a and g of the roots that a family comes near to."""
+) -> tuple[Floats, Floats, Extended, Extended, bool]:
+    """Strides, turns and guesses of a and g of the roots that a family comes near to; where it comes near
+    none, the nearest, and True."""
     parts = []
     if family.held:
         parts.append((np.arange(len(root.s)), root.phase))
@@ -147,11 +148,12 @@ def starts(
         a = a + np.square(g / 2)
     if not len(index):
         none = np.zeros(0, dtype=np.longdouble)
-        return root.s[index], root.turns[index], none, none
+        return root.s[index], root.turns[index], none, none, True
     values, off = solved(family, a, g, wanted, free_scale=terms.mass_unknown, spread=spread)
     near = off <= NEAR + spread
+    far = not np.any(near)
     near[np.argmin(off)] = True
-    return root.s[index][near], root.turns[index][near], values[near, 0], values[near, 1]
+    return root.s[index][near], root.turns[index][near], values[near, 0], values[near, 1], far
 
 
 def solved(
@@ -186,8 +188,17 @@ def solved(
         if not turns and not family.damped:
             # a first guess from the phase is good to 1e-3 where the family is right
             first = np.max(np.abs(entries(values) - target) / np.maximum(np.abs(target), 1e-2), axis=1)
-            if not np.any(first <= GUESSED + spread):
+            good = first <= GUESSED + spread
+            if not np.any(good):
                 return values.astype(np.longdouble), np.where(np.isfinite(first), first, np.inf)
+            if not np.all(good):
+                # the others stay what they are
+                better, off = solved(
+                    family, a[good], g[good], wanted[good], free_scale=free_scale, spread=spread
+                )
+                out = values.astype(np.longdouble)
+                out[good], first[good] = better, off
+                return out, np.where(np.isfinite(first), first, np.inf)
         for _ in range(turns or (6 if family.damped else 3)):
             now = entries(values)
             slopes = np.empty((len(values), 4, columns))
