@@ -8,11 +8,13 @@ import resource
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import power
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.store import adopt, files, merge, reading, seal
@@ -320,3 +322,13 @@ def test_a_link_stays_a_link_and_leads_to_the_store(tmp_path: Path) -> None:
     assert link.is_symlink()
     assert list(store.read(tmp_path / "disk" / "real.h5")) == list(made) == list(store.read(link))
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["disk", "s.h5"]
+
+
+def test_a_loss_of_power_at_any_moment_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adopt, "LARGE", adopt.LARGE)
+    with warnings.catch_warnings():
+        # parts that a loss has torn were never reported
+        warnings.simplefilter("ignore", store.StoreWarning)
+        assert power.losses(100, promises=True) == 0
+        # the check sees losses
+        assert power.losses(20, promises=False) > 0

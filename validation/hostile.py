@@ -1,6 +1,6 @@
 """Stores that a stranger made to do harm: built here, and shown to every command in a process of its own.
 
-    python validation/hostile.py [stores]
+    python validation/hostile.py [stores] [mutated]
 
 Each kind (`KINDS`) changes a whole store: numbers that lie in other files, sizes that memory cannot hold,
 links that lead in circles, texts with control characters, fields of the wrong type.  Every second one gets
@@ -37,6 +37,7 @@ import numpy as np
 from arguments import arguments
 from springcheck.errors import StoreError
 from springcheck.store import seal, trust
+from store_fuzz import damaged
 
 LABEL, OTHER = "own:euler", "own:semi-implicit-euler"
 SECRET = "do-not-show-this-4711"
@@ -554,6 +555,11 @@ def base(folder: Path) -> Path:
 
 def build(name: str, whole: Path, path: Path, own: Path, seed: int, *, forged: bool) -> None:
     """A hostile store of a kind; `own` holds the reader's files, `forged` gives it a seal."""
+    if name == "mutated":
+        damaged(whole.read_bytes(), random.Random(seed), path)
+        if forged:
+            seal.attach(path, [])
+        return
     shutil.copyfile(whole, path)
     with h5py.File(path, "r+", libver=("v110", "latest")) as file:
         KINDS[name](file, random.Random(seed), own)
@@ -701,6 +707,8 @@ class Server:
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.close()
         self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
 
 def main() -> int:
@@ -708,7 +716,8 @@ def main() -> int:
     if sys.argv[1:2] == ["--serve"]:
         serve()
         return 0
-    count = arguments(__doc__, stores=500).stores
+    given = arguments(__doc__, stores=500, mutated=5000)
+    count = given.stores + given.mutated
     bad, shown, longest, largest = 0, 0, 0.0, 0
     with tempfile.TemporaryDirectory() as name:
         folder, own, place = Path(name), Path(name) / "own", Path(name) / "stores"
@@ -718,7 +727,7 @@ def main() -> int:
         whole = base(folder)
         server = Server()
         for i in range(count):
-            what = list(KINDS)[i % len(KINDS)]
+            what = list(KINDS)[i % len(KINDS)] if i < given.stores else "mutated"
             path = place / "s.h5"
             build(what, whole, path, own, i, forged=i // len(KINDS) % 2 == 1)
             for result in server(path):
@@ -731,7 +740,8 @@ def main() -> int:
             path.unlink()
         server.close()
     print(
-        f"{count} hostile stores of {len(KINDS)} kinds, {shown} commands: {bad} wrong; "
+        f"{given.stores} hostile stores of {len(KINDS)} kinds, {given.mutated} mutated, {shown} commands: "
+        f"{bad} wrong; "
         f"at most {longest:.1f} s and {largest / 2**20:.0f} MiB"
     )
     return int(bad > 0)

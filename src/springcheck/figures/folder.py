@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
 
 from springcheck.errors import StoreError
 from springcheck.store import files
 
 FIGURES = "springcheck-figures.json"
-"""In a folder of figures: the store that they show, and the sha256 by which its own files are known."""
+"""In a folder of figures: of each file the store that it shows, and the sha256 by which it is known."""
 
 
 def folder_of(path: Path) -> Path:
@@ -20,23 +19,22 @@ def folder_of(path: Path) -> Path:
 
 
 def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
-    """Put figures into their folder; StoreError where that would replace a file that is not this store's."""
+    """Put figures of a store into a folder; StoreError where that would replace any other file."""
     mine = str(path.absolute())
     known = _known(folder)
-    if known["store"] not in {"", mine}:
-        raise StoreError(f"{folder} holds the figures of {known['store']}: name another folder with -o")
     content = {one.name: one.read_bytes() for one in drawn}
-    figures: dict[str, list[str]] = known["figures"]
     for name, figure in content.items():
         target = folder / name
-        old = figures.get(name, [])
+        whose, *old = known.get(name, [mine])
         if target.is_symlink() or (target.exists() and _sha256(target.read_bytes()) not in old):
-            raise StoreError(f"{target} is no figure of {path} as it was drawn: move it away")
+            raise StoreError(f"{target} is no figure of ours as it was drawn: move it away")
+        if target.exists() and whose != mine:
+            raise StoreError(f"{target} shows {whose}: name another folder with -o")
         # the last one too: whoever is killed in between may find it in its place
-        figures[name] = [*old[-1:], _sha256(figure)]
+        known[name] = [mine, *old[-1:], _sha256(figure)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files.put_bytes(json.dumps({"store": mine, "figures": figures}, indent=1).encode(), folder / FIGURES)
+        files.put_bytes(json.dumps(known, indent=1).encode(), folder / FIGURES)
         for name, figure in content.items():
             files.put_bytes(figure, folder / name)
     except OSError as error:
@@ -44,16 +42,15 @@ def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
     return [folder / name for name in content]
 
 
-def _known(folder: Path) -> dict[str, Any]:
-    """The store whose figures lie in a folder, and their digests."""
+def _known(folder: Path) -> dict[str, list[str]]:
+    """Of each figure in a folder: its store, then its digests."""
     try:
         with files.own(folder / FIGURES) as file:
             found = json.loads(file.read())
-        figures = {name: list(map(str, old)) for name, old in found["figures"].items()}
-        return {"store": str(found["store"]), "figures": figures}
+        return {str(name): [str(one) for one in known] for name, known in found.items() if known}
     except FileNotFoundError:
-        return {"store": "", "figures": {}}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return {}
+    except (OSError, ValueError, TypeError, AttributeError) as error:
         raise StoreError(f"{folder / FIGURES} cannot be read: move it away") from error
 
 
