@@ -55,6 +55,7 @@ class Disk:
     )
     reports: list[str] = field(default_factory=list)
     promises: bool = True
+    held: dict[int, int] = field(default_factory=dict)
 
     def name(self, path: Any) -> str:
         """A path below the root."""
@@ -76,7 +77,13 @@ class Disk:
                 self.pending.append(("put", name, inode))
         for name in known.keys() - now.keys():
             self.pending.append(("remove", name, 0))
-        content = {inode: (self.root / name).read_bytes() for name, inode in now.items() if inode}
+        content = {}
+        for name, inode in now.items():
+            if inode:
+                if inode not in self.held:
+                    # as long as it is open no other file gets its number
+                    self.held[inode] = os.open(self.root / name, os.O_RDONLY)
+                content[inode] = (self.root / name).read_bytes()
         self.states.append(
             (self.synced.copy(), self.names.copy(), self.pending.copy(), content, len(self.reports))
         )

@@ -93,15 +93,21 @@ def _is_free(parts: Path) -> bool:
         with contextlib.suppress(StoreError):
             return reading.claim(parts) is not None
         return False
-    # what a kill at the very beginning or end has left; the lock is looked at as it is taken
-    return all(name == "lock" or files.TEMPORARY.fullmatch(name) for name in known)
+    # left by a kill or a loss of power at the very beginning or end; the lock is looked at as it is taken
+    return all(
+        name == "lock"
+        or files.TEMPORARY.fullmatch(name)
+        or (_NAMES.fullmatch(name) and not (parts / name).is_symlink() and _is_ours(parts / name))
+        for name in known
+    )
 
 
 def _is_ours(path: Path) -> bool:
     """Whether a file is a store of ours, whole or damaged, or empty."""
     with path.open("rb") as file:
         start = file.read(1 << 20)
-    return not start or (start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start)
+    hdf5 = start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start
+    return not start or hdf5 or start.startswith(b'{"name": "run-')
 
 
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
