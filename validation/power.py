@@ -7,7 +7,8 @@ every fsync, rename, removal and new folder is noted with the bytes of the files
 between any two of them.  What the disk holds then is what the system has promised, and no more:
 
 * of a file, its bytes at its last fsync; of later writes each block of 4 kB may have arrived or not;
-* of a folder, its names at its last fsync; of later changes the first few have arrived, or any of them.
+* of a folder, its names at its last fsync; of later changes the first few have arrived, or any of them,
+  each rename whole or not at all.
 
 Each state is built in a folder of its own, a writer takes it up, and everything reported before the loss must
 be there with its digest, and `check` must find nothing wrong.  The same with fsync taken away must lose:
@@ -49,7 +50,7 @@ class Disk:
     names: Names = field(default_factory=dict)
     """Names (path below the root -> inode; 0 for a folder) at the last fsync of their folder."""
     pending: list[tuple[str, str, int]] = field(default_factory=list)
-    """Changes since: ("put" or "remove", path, inode)."""
+    """Changes since: ("put " and the old name, if it has one, or "remove", path, inode)."""
     states: list[tuple[dict[int, bytes], Names, list[tuple[str, str, int]], dict[int, bytes], int]] = field(
         default_factory=list
     )
@@ -72,11 +73,14 @@ class Disk:
         for how, name, inode in self.pending:
             _change(known, how, name, inode)
         # names of new files come up without a call that is seen here
+        gone = known.keys() - now.keys()
         for name, inode in now.items():
             if known.get(name) != inode:
-                self.pending.append(("put", name, inode))
-        for name in known.keys() - now.keys():
-            self.pending.append(("remove", name, 0))
+                # a rename is done whole or not at all, from one folder to another too
+                old = next((one for one in gone if inode and known[one] == inode), "")
+                gone -= {old}
+                self.pending.append((f"put {old}", name, inode))
+        self.pending += [("remove", name, 0) for name in gone]
         content = {}
         for name, inode in now.items():
             if inode:
@@ -96,7 +100,11 @@ class Disk:
             return
         if path.is_dir():
             below = "" if path == self.root else self.name(path)
-            mine = [change for change in self.pending if str(Path(change[1]).parent) == (below or ".")]
+            mine = [
+                change
+                for change in self.pending
+                if (below or ".") in {str(Path(name).parent) for name in (change[1], _old(change))}
+            ]
             for how, name, inode in mine:
                 _change(self.names, how, name, inode)
                 self.pending.remove((how, name, inode))
@@ -105,9 +113,16 @@ class Disk:
         self.look()
 
 
+def _old(change: tuple[str, str, int]) -> str:
+    """The old name of a renamed file; its only name else."""
+    how, name, _ = change
+    return how[4:] if how.startswith("put ") and how[4:] else name
+
+
 def _change(names: Names, how: str, name: str, inode: int) -> None:
-    if how == "put":
+    if how.startswith("put "):
         names[name] = inode
+        names.pop(how[4:], None)
     else:
         for one in [one for one in names if one == name or one.startswith(name + "/")]:
             del names[one]
