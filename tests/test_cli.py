@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -231,7 +232,9 @@ def test_a_narrow_terminal_cuts_no_number_and_breaks_sentences(
     monkeypatch.setenv("TERM", "dumb")  # 80 columns, no colours
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     cli._show([numbers])
-    assert capsys.readouterr().out.split() == " ".join(words).split()
+    shown = capsys.readouterr().out
+    assert not Counter(" ".join(words).split()) - Counter(shown.split())
+    assert max(map(len, shown.splitlines())) <= 80
     cli._show([sentences])
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 

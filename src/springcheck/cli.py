@@ -212,7 +212,7 @@ def _show(lines: Sequence[RenderableType], *, quiet: bool = False) -> None:
 
     # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
     terminal = sys.stdout.isatty()
-    console = Console(quiet=quiet, highlight=False, width=None if terminal else 100)
+    console = Console(quiet=quiet, highlight=False, width=None if terminal else 1 << 16)
     if quiet or terminal:
         for line in lines:
             console.print(line, crop=False)

@@ -29,7 +29,11 @@ def plain(text: str = "", style: str = "") -> Text:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table without lines, as narrow as its cells; `prose` alone is broken to fit the width."""
+    """A table without lines, as narrow as its cells; `prose` alone is broken to fit the width.
+
+    Columns that do not fit beside each other stand below each other, each block beside the first column:
+    nothing is cut, and no terminal has to fold a number.
+    """
 
     titles: tuple[str, ...]
     rows: tuple[Row, ...]
@@ -45,24 +49,34 @@ class Table:
         ]
         if self.prose in self.titles:
             j = self.titles.index(self.prose)
-            others = sum(widths) - widths[j] + GAP * (len(widths) - 1)
-            widths[j] = min(widths[j], max(PROSE, options.max_width - others))
-        for row in (head, *self.rows):
-            if isinstance(row, Text):
-                yield _line(row)
-            else:
-                yield from self._lines(row, widths)
+            words = [len(word) for row in cells if j < len(row) for word in str(row[j]).split()]
+            widths[j] = min(widths[j], max(self._free(widths, j, options.max_width), *words, 1))
+        for i, block in enumerate(_blocks(widths, options.max_width)):
+            if i:
+                yield plain()
+            for row in (head, *self.rows):
+                if isinstance(row, Text):
+                    yield row
+                else:
+                    yield from self._lines(row, widths, block)
+
+    def _free(self, widths: Sequence[int], j: int, room: int) -> int:
+        """Columns for the prose: what the others leave, or what the first does where that is too little."""
+        others = room - sum(widths) + widths[j] - GAP * (len(widths) - 1)
+        return others if others >= PROSE or j == 0 else room - widths[0] - GAP
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
         return Measurement(1, options.max_width)
 
-    def _lines(self, row: Sequence[Cell], widths: Sequence[int]) -> Iterator[Text]:
+    def _lines(self, row: Sequence[Cell], widths: Sequence[int], block: Sequence[int]) -> Iterator[Text]:
         parts = []
-        for title, width, cell in zip(self.titles, widths, row, strict=False):
+        for j in block:
+            title, width, cell = self.titles[j], widths[j], row[j] if j < len(row) else ""
             whole = plain(cell) if isinstance(cell, str) else cell
             pieces = [whole]
             if title == self.prose and len(whole) > width:
-                pieces = [plain(piece, str(whole.style)) for piece in textwrap.wrap(whole.plain, width)]
+                broken = textwrap.wrap(whole.plain, width, break_long_words=False, break_on_hyphens=False)
+                pieces = [plain(piece, str(whole.style)) for piece in broken]
             parts.append((title in self.left or title == self.prose, width, pieces))
         for i in range(max(len(pieces) for _, _, pieces in parts)):
             out = plain()
@@ -73,6 +87,18 @@ class Table:
                 out.append(blank + " " * GAP if left else " " * GAP)
             out.rstrip()
             yield _line(out)
+
+
+def _blocks(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Columns that fit beside each other, the first one in each block."""
+    blocks, used = [[0]], widths[0]
+    for j in range(1, len(widths)):
+        if used + GAP + widths[j] > room and len(blocks[-1]) > 1:
+            blocks.append([0])
+            used = widths[0]
+        blocks[-1].append(j)
+        used += GAP + widths[j]
+    return blocks
 
 
 def _line(text: Text) -> Text:
