@@ -2,8 +2,8 @@
 
 A chain of masses between two walls whose links differ by twelve decades in stiffness, so that their rates
 sqrt(k/m) differ by six: every fifth link is stiff, 1e6 to 1e12, the others about 1.  Stiff links start at
-rest and unstretched, and what moves is the lattice of the pairs that they form; the run ends at t = 2, about a
-third of a period of a soft link.
+rest and unstretched, and what moves is the lattice of the pairs that they form.  The run ends at t = 2, about
+a third of a period of a soft link.
 
 Claim: an implicit method pays by its step, not by the fastest rate (an explicit one needs h w < 2, a million
 steps), and a step costs as many nanoseconds a mass for any number of them, to the width of the caches:
