@@ -14,16 +14,16 @@ Command: python validation/kernel_speed.py        (2 min; without a C compiler `
 Processor time of the thread is taken, not the clock on the wall, so that what else runs counts little; the
 rounds go through all jobs in turn, and a ratio is that of the least times.
 
-Expected (Intel Xeon, Sapphire Rapids, gcc 12, numba 0.68; nanoseconds a mass and step, least of 9 rounds, C
-in brackets):
+Expected (Intel Xeon, Sapphire Rapids, shared with other work; gcc 12, numba 0.68; nanoseconds a mass and
+step, least of 9 rounds, and in brackets the ratio to C):
 
-                                        explicit        semi-implicit   implicit Euler
-    one spring                          6.8 (9.4)       13.9 (13.5)     16.2 (15.7)
-    4096 springs                        1.0 (0.85)      1.0 (0.84)      1.7 (0.86)
-    chain of 1,000 masses               1.2 (1.0)       1.2 (1.0)       8.9 (7.0)
-    chain of 10,000 masses              1.7 (1.2)       1.6 (1.2)       8.8 (7.0)
-    chain of 100,000 masses             1.8 (1.9)       1.8 (2.1)       12.6 (7.3)
-    chain of 1,000,000 masses           2.6 (2.9)       2.6 (3.2)       15.7 (7.9)
+                                     explicit        semi-implicit   implicit Euler
+    one spring                       6.4 (0.71)      12.8 (0.99)     14.5 (1.02)
+    4096 springs                     0.82 (0.97)     0.88 (1.09)     0.87 (0.99)
+    chain of 1,000 masses            1.0 (0.99)      1.1 (1.00)      7.7 (1.04)
+    chain of 10,000 masses           1.7 (1.43)      1.7 (1.34)      8.0 (1.14)
+    chain of 100,000 masses          1.8 (0.95)      1.7 (0.79)      9.0 (1.20)
+    chain of 1,000,000 masses        2.9 (0.84)      2.8 (0.79)      10.9 (1.25)
 
 Exit status 0 when every ratio holds, 1 otherwise.
 """
