@@ -171,6 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     identify.add_argument(
         "--mass", type=float, metavar="M", help="mass of every particle, where the file has none"
     )
+    identify.add_argument("--columns", metavar="NAMES", help="names of a table's columns, as t,q,v")
     identify.add_argument("--step", type=float, metavar="H", help="is this the time step?")
     identify.add_argument(
         "--stepper",
@@ -179,6 +180,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     identify.add_argument("--json", action="store_true", help="one JSON document on standard output")
     identify.set_defaults(command=_identify)
+
+    judge = commands.add_parser("judge", help="is a trajectory of any program what its scheme promises")
+    judge.add_argument("file", metavar="FILE", help="a table, NPY, NPZ, extended XYZ, LAMMPS dump, H5MD ...")
+    judge.add_argument("--scene", required=True, metavar="SCENE", help="the scene that it is of")
+    judge.add_argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have")
+    judge.add_argument("--columns", metavar="NAMES", help="names of its columns, as t,q,v")
+    judge.add_argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
+    judge.add_argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
+    judge.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    judge.set_defaults(command=_judge)
 
     check = commands.add_parser("check", help="is a store whole: digests, completeness, structure")
     check.add_argument("file", metavar="FILE")
@@ -290,8 +301,30 @@ def _inspect(options: argparse.Namespace) -> int:
     return int(bool(doubts))
 
 
+def _columns(options: argparse.Namespace) -> list[str]:
+    return [name.strip() for name in (options.columns or "").split(",") if name.strip()]
+
+
+def _judge(options: argparse.Namespace) -> int:
+    from springcheck.doors import file
+
+    found = file.judge(
+        Path(options.file),
+        scene=options.scene,
+        scheme=options.scheme,
+        columns=_columns(options),
+        step=options.step,
+        trajectory=options.trajectory,
+    )
+    if options.json:
+        _document(found.document())
+    else:
+        _show(found.lines())
+    return found.status
+
+
 def _identify(options: argparse.Namespace) -> int:
-    from springcheck import identify
+    from springcheck import formats, identify
     from springcheck.identify import files, text
 
     if (options.file is None) == (options.stepper is None):
@@ -311,8 +344,8 @@ def _identify(options: argparse.Namespace) -> int:
                 needed = "a number of a size from 1e-150 to 1e150, a mass above 0"
                 raise SpringcheckError(f"--{name} {value:g}: {needed} is needed")
         found = {}
-        doubts = _doubts(options.file)
-        for states in files.read(Path(options.file), options.trajectory):
+        doubts = _doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
+        for states in files.read(Path(options.file), options.trajectory, _columns(options), options.step):
             try:
                 found[states.label] = files.identify_states(states, **stated)
             except SpringcheckError as error:

@@ -1,4 +1,4 @@
-"""Trajectories of others: text tables and NumPy files, told by what is in them, not by their names."""
+"""Trajectories of others, told by what is in them, not by their names; HDF5 is the store's to read."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from springcheck.errors import StoreError
 from springcheck.formats.columns import Columns, States, split
+from springcheck.formats.molecular import read_ase, read_gro, read_lammps, read_trr
 from springcheck.formats.numbers import read_npy, read_npz
 from springcheck.formats.tables import read_table
 
@@ -28,10 +29,12 @@ def is_hdf5(path: Path) -> bool:
     return _head(path) == HDF5
 
 
-def read(path: Path, columns: Sequence[str] = ()) -> States:
-    """The states of a text table, an NPY or an NPZ file; `columns` names what has no names, as t, q, v.
+def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> States:
+    """The states of a file that is no HDF5; `columns` names what has no names, as t, q, v.
 
-    Raises StoreError, in one line, where it cannot be read, or lacks times, positions or velocities.
+    Text tables, NPY, NPZ, extended XYZ, ASE's .traj, LAMMPS dumps, GROMACS .gro and .trr.  `step` is the time
+    step of files that count steps alone.  Raises StoreError, in one line, where it cannot be read, or lacks
+    times, positions or velocities.
     """
     head = _head(path)
     if not head:
@@ -41,6 +44,20 @@ def read(path: Path, columns: Sequence[str] = ()) -> States:
             return read_npy(path, columns)
         if head.startswith(b"PK\x03\x04"):
             return read_npz(path)
-        return read_table(path, columns)
+        if head.startswith(b"ITEM: "):
+            return read_lammps(path, step)
+        if head.startswith((b"\x00\x00\x07\xcb", b"\x00\x00\x07\xe7")) or head[4:8] == b"CORD":
+            raise StoreError(f"{path}: XTC and DCD files hold no velocities; positions alone tell nothing")
+        if head.startswith(b"\x00\x00\x07\xc9"):
+            return read_trr(path, step)
+        if head.startswith(b"- of Ulm") or _is_extended_xyz(path):
+            return read_ase(path, step)
+        return read_gro(path, step) if path.suffix == ".gro" else read_table(path, columns)
     except UnicodeDecodeError as error:
-        raise StoreError(f"{path}: is neither a text table nor a NumPy file") from error
+        raise StoreError(f"{path}: is of no format that is known here") from error
+
+
+def _is_extended_xyz(path: Path) -> bool:
+    with path.open("rb") as file:
+        first, second = file.readline(200), file.readline(2000)
+    return first.strip().isdigit() and b"Properties=" in second

@@ -47,7 +47,8 @@ def read_table(path: Path, names: Sequence[str]) -> States:
 
 def _cells(line: str) -> list[str]:
     text = line.strip().lstrip("#").strip()
-    parts = re.split(r"\s*[,;\t]\s*|\s+", text) if text else []
+    # a name may hold a blank, as in "t [s]", where something else lies between the columns
+    parts = re.split(r"\s*[,;\t]\s*", text) if re.search(r"[,;\t]", text) else text.split()
     return [part for part in parts if part]
 
 

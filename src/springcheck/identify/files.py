@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from springcheck import schemes, store
+from springcheck import formats, schemes, store
 from springcheck.arrays import Floats, Integers
 from springcheck.errors import MethodError, StoreError
 from springcheck.identify.report import identify_arrays
@@ -41,11 +41,15 @@ class States:
     """The title of the adaptive solver that one of our own stores says made them."""
 
 
-def read(path: Path, label: str | None = None) -> list[States]:
-    """The trajectories of a file, or the one of this label.
+def read(
+    path: Path, label: str | None = None, columns: Sequence[str] = (), step: float | None = None
+) -> list[States]:
+    """The trajectories of a file, or the one of this label; `columns` and `step` as in `formats.read`.
 
     Raises StoreError where the file cannot be read, holds no velocities, or has no such trajectory.
     """
+    if path.is_file() and not formats.is_hdf5(path) and not label:
+        return [_plain(path, formats.read(path, columns, step))]
     try:
         own = store.summary(path).runs
     except StoreError:
@@ -55,6 +59,26 @@ def read(path: Path, label: str | None = None) -> list[States]:
         names = [run.label for run in own] or list(store.read_foreign(path, 2))
         raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
     return found
+
+
+def _plain(path: Path, found: formats.States) -> States:
+    """The only trajectory of a file that is no HDF5."""
+    kept = slice(MOST_FRAMES)
+    speed = found.p if found.p is not None else found.v
+    notes = [f"the first {MOST_FRAMES} frames were looked at"] if len(found.t) > MOST_FRAMES else []
+    chosen, remarks = _chosen(found.q[kept], np.asarray(speed)[kept], notes)
+    p, v, mass = found.p, found.v, found.mass
+    if mass is not None and len(mass) != found.q.shape[1]:
+        mass = np.repeat(mass, found.q.shape[1] // len(mass))
+    return States(
+        label=path.name,
+        t=found.t[kept],
+        q=found.q[kept][:, chosen],
+        p=None if p is None else p[kept][:, chosen],
+        v=None if v is None else v[kept][:, chosen],
+        mass=None if mass is None else mass[chosen],
+        notes=remarks,
+    )
 
 
 def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[States]:

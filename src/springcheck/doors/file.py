@@ -1,0 +1,191 @@
+"""Judging a trajectory that stands in a file, whoever made it, against the law of a scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import checks, schemes, store
+from springcheck.arrays import Floats
+from springcheck.engines import Arithmetic
+from springcheck.errors import StoreError
+from springcheck.formats import States, is_hdf5, read
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import load_scene
+from springcheck.text import Lines, plain, table
+from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """The verdicts on a file."""
+
+    path: Path
+    scene: str
+    scheme: str
+    frames: int
+    notes: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def status(self) -> int:
+        """0 where every verdict that applies passed, 1 where one failed, 2 where none applies."""
+        judged = [verdict.passed for verdict in self.verdicts if verdict.passed is not None]
+        return 2 if not judged else 0 if all(judged) else 1
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "file": str(self.path), "scene": self.scene, "scheme": self.scheme, "frames": self.frames,
+            "notes": list(self.notes),
+            "verdicts": [
+                {
+                    "check": v.check, "value": _finite(v.value), "bound": _finite(v.bound), "unit": v.unit,
+                    "passed": v.passed, "why": v.why,
+                }
+                for v in self.verdicts
+            ],
+        }  # fmt: skip
+
+    def lines(self) -> Lines:
+        """The report as text."""
+        told = {True: plain("passed"), False: plain("FAILED", "bold red"), None: plain("-")}
+        rows = [
+            (
+                v.check, told[v.passed],
+                "" if v.passed is None else f"{v.value:.3g} of {v.bound:.3g} {v.unit}".strip(), v.why,
+            )
+            for v in self.verdicts
+        ]  # fmt: skip
+        head = f"{self.path}: {self.frames} frames of {self.scene}, judged as {schemes.title(self.scheme)}"
+        return [
+            plain(head, "bold"),
+            *(plain(f"  {note}") for note in self.notes),
+            plain(),
+            table(
+                ("check", "verdict", "value", "why"), rows, left=("check", "verdict", "value"), prose="why"
+            ),
+        ]
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
+
+
+def judge(
+    path: Path,
+    *,
+    scene: str | Scene,
+    scheme: str,
+    columns: Sequence[str] = (),
+    step: float | None = None,
+    trajectory: str | None = None,
+) -> Judgement:
+    """The verdicts on the trajectory of a file.
+
+    Raises SpringcheckError, in one line, where it cannot be read or is not of the scene.
+    """
+    found = load_scene(scene) if isinstance(scene, str) else scene
+    known = schemes.scheme(scheme)
+    states = _states(path, trajectory) if is_hdf5(path) else read(path, columns, step)
+    judged, run, notes = as_trajectory(path, states, found, known.name)
+    return Judgement(
+        path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
+        verdicts=tuple(checks.judge(judged, run)),
+    )  # fmt: skip
+
+
+def _states(path: Path, label: str | None) -> States:
+    """One trajectory of an HDF5 file: a store of ours, or an H5MD file of any program."""
+    try:
+        own = store.summary(path).runs
+    except StoreError:
+        own = ()
+    found: dict[str, States] = {}
+    if own:
+        for run in own:
+            # one frame more than is looked at in a piece of a very long run
+            piece = next(store.windows(path, run.label, run.frames + 1))
+            found[run.label] = States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None)
+    else:
+        for name, group in store.read_foreign(path).items():
+            flat = group.q.reshape(len(group.t), -1), group.v.reshape(len(group.t), -1)
+            found[name] = States(
+                t=group.t, q=flat[0], p=None, v=flat[1], mass=group.mass, roundoff=max(2.0**-53, group.roundoff)
+            )
+    if label is None and len(found) == 1:
+        return next(iter(found.values()))
+    if label not in found:
+        raise StoreError(f"{path}: holds {len(found)} trajectories; choose by --trajectory: {', '.join(found)}")
+    return found[label]
+
+
+def as_trajectory(
+    path: Path, states: States, scene: Scene, scheme: str
+) -> tuple[Scene, Trajectory, tuple[str, ...]]:
+    """States as a trajectory of a scene with the file's grid and start, and notes on what was done to them.
+
+    StoreError where they are not of the scene: another number of particles, other times, another start.
+    """
+    notes: list[str] = []
+    q = states.q
+    other = states.p if states.p is not None else np.asarray(states.v)
+    if q.shape[1] == 3 * scene.n:
+        q, other = _along(path, q, other, scene, notes)
+    if q.shape[1] != scene.n:
+        raise StoreError(f"{path}: {q.shape[1]} positions a frame, {scene.n} in scene {scene.name}")
+    p = other if states.p is not None else other * scene.m
+    if len(q) < 2:
+        raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
+    every = round(float(states.t[1] - states.t[0]) / scene.step)
+    t = np.arange(len(q), dtype=np.float64) * max(every, 1) * scene.step
+    off = np.abs(states.t - states.t[0] - t)
+    allowed = 1e-9 * (t + abs(scene.step)) + 2 * states.roundoff * np.abs(states.t)
+    if every < 1 or np.any(off > np.abs(allowed)):
+        row = int(np.argmax(off > np.abs(allowed)))
+        raise StoreError(
+            f"{path}: row {row + 1} is at t = {states.t[row]:.8g}; frames lie whole steps of "
+            f"{scene.step:g} apart in scene {scene.name}"
+        )
+    if np.any(states.t != t):
+        notes.append("times were taken as whole numbers of steps from the first frame on")
+    size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
+    if not size <= max(1e-9, 10 * states.roundoff):
+        raise StoreError(
+            f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}"
+        )
+    if size > 0:
+        notes.append("the start was taken as it is written in the file")
+    if states.roundoff > 2.0**-53:
+        notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
+    steps = (len(q) - 1) * every
+    judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
+    run = Trajectory(
+        label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
+        step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
+        timing=Timing(start=0.0, run=0.0), force_calls=0,
+        arithmetic=Arithmetic(name="as written", state=states.roundoff),
+    )  # fmt: skip
+    return judged, run, tuple(notes)
+
+
+def _along(path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str]) -> tuple[Floats, Floats]:
+    """Motions in space (f, 3n) along the one line that they keep to (f, n)."""
+    r = q.reshape(len(q), -1, 3)
+    moved = (r - r[0]).reshape(-1, 3)
+    _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
+    if sizes[0] == 0:
+        raise StoreError(f"{path}: nothing moves")
+    if sizes[1] > 1e-6 * sizes[0]:
+        raise StoreError(f"{path}: the motion is not along one line")
+    line = axes[0]
+    positions, rest = r @ line, other.reshape(len(q), -1, 3) @ line
+    if np.max(np.abs(positions[0] + scene.q)) < np.max(np.abs(positions[0] - scene.q)):
+        line, positions, rest = -line, -positions, -rest
+    where = ", ".join(f"{x:.4g}" for x in line)
+    notes.append(f"motion along ({where})")
+    return positions, rest
