@@ -115,12 +115,19 @@ def _states(path: Path, label: str | None) -> States:
         for name, group in store.read_foreign(path).items():
             flat = group.q.reshape(len(group.t), -1), group.v.reshape(len(group.t), -1)
             found[name] = States(
-                t=group.t, q=flat[0], p=None, v=flat[1], mass=group.mass, roundoff=max(2.0**-53, group.roundoff)
+                t=group.t,
+                q=flat[0],
+                p=None,
+                v=flat[1],
+                mass=group.mass,
+                roundoff=max(2.0**-53, group.roundoff),
             )
     if label is None and len(found) == 1:
         return next(iter(found.values()))
     if label not in found:
-        raise StoreError(f"{path}: holds {len(found)} trajectories; choose by --trajectory: {', '.join(found)}")
+        raise StoreError(
+            f"{path}: holds {len(found)} trajectories; choose by --trajectory: {', '.join(found)}"
+        )
     return found[label]
 
 
