@@ -26,7 +26,7 @@ HOMES = {
     "h5py": ("store",),
     "matplotlib": ("plot.py", "figures", *(f"studies/{name}/figure.py" for name in STUDIES)),
     "openmm": ("engines/openmm/simulation.py",),
-    "ase": ("engines/ase/simulation.py",),
+    "ase": ("engines/ase/simulation.py", "formats/molecular.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
     "rich": ("text.py", "studies/run/text.py", "cli.py"),
