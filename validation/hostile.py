@@ -11,6 +11,9 @@ forked for the purpose.  What must hold, whatever the file:
 * no control character on standard output or standard error;
 * at most 1 GiB of memory and 20 seconds of the processor;
 * nothing of a file beside it is shown, and nothing is written but into the folder of the command.
+
+So far one store of each of the 44 kinds was shown to every command (352 commands, every second store with a seal):
+none did harm.  The counts above are the script's defaults, not yet what was run.
 """
 
 # ruff: noqa: D103 (the name of a kind says it)
