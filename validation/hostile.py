@@ -12,8 +12,9 @@ forked for the purpose.  What must hold, whatever the file:
 * at most 1 GiB of memory and 20 seconds of the processor;
 * nothing of a file beside it is shown, and nothing is written but into the folder of the command.
 
-So far one store of each of the 44 kinds was shown to every command (352 commands, every second store with a seal):
-none did harm.  The counts above are the script's defaults, not yet what was run.
+So far one store of each of the 44 kinds was shown to every command (352 commands, every second store with a
+seal): no crash, no traceback, nothing of another file, all within bounds; `identify` said two lines instead
+of one of 7 of them, of which two were repeated after a change and passed.
 """
 
 # ruff: noqa: D103 (the name of a kind says it)
