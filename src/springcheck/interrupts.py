@@ -31,6 +31,8 @@ class _State:
     """Its KeyboardInterrupt is on its way; further signals hurry nothing and spoil nothing."""
     held = 0
     message = "interrupted"
+    errors = 2
+    """Standard error as it was: a library's messages may be caught while the signal comes."""
 
 
 def install() -> None:
@@ -44,6 +46,7 @@ def install() -> None:
         except OSError:
             # a file that is opened now would take its place, and get what is printed
             os.dup2(os.open(os.devnull, os.O_RDWR), stream)
+    _State.errors = os.dup(2)
     sys.excepthook, sys.unraisablehook = _uncaught, _unraisable
     for name in SIGNALS:
         number = getattr(signal, name, None)
@@ -118,9 +121,9 @@ def _say() -> None:
     if not _State.message:
         return
     # a progress bar may have hidden the cursor
-    shown = "\x1b[?25h" if os.isatty(2) else ""
+    shown = "\x1b[?25h" if os.isatty(_State.errors) else ""
     try:
-        os.write(2, f"{shown}springcheck: {_State.message}\n".encode(errors="backslashreplace"))
+        os.write(_State.errors, f"{shown}springcheck: {_State.message}\n".encode(errors="backslashreplace"))
     except OSError:
         return
 

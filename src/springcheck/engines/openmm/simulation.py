@@ -287,8 +287,9 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
         raise MethodError(f"{label}: OpenMM has no platform {name} on this machine; it has {', '.join(here)}")
     properties = {"Precision": label.precision} if label.precision else {}
     try:
-        # OpenMM's C++ warns on standard output, where results go, that an OpenCL is a processor's
-        with quiet.caught(1):
+        # OpenMM's C++ warns on standard output, where results go, that an OpenCL is a processor's; the
+        # compiler behind it says on standard error that Ctrl-C has met it
+        with quiet.caught(1), quiet.caught(2):
             return mm.Context(system, integrator, mm.Platform.getPlatformByName(name), properties)
     except mm.OpenMMException as error:
         raise MethodError(f"{label}: OpenMM cannot start there: {error}") from error
