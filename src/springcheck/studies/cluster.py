@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,6 +29,9 @@ WAITING = 30.0
 """Seconds to wait for the scheduler and for a first worker."""
 
 GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
+
+OUT = 256
+"""Pieces that are given out at a time: what looking after them costs does not grow with the study."""
 
 NAMES = (
     "springcheck", "numpy", "numba", "scipy", "openmm", "ase", "scikit-sundae", "mujoco", "pymunk", "rebound",
@@ -133,7 +137,8 @@ def _answers(
         # the first has the highest priority: longest pieces are in front
         number[client.submit(_checked, parts[i], wanted, key=key, pure=False, priority=-i, retries=0)] = i
 
-    for i in range(len(parts)):
+    following = iter(range(len(parts)))
+    for i in islice(following, OUT):
         give(i)
     done: set[int] = set()
     while len(done) < len(parts):
@@ -166,6 +171,8 @@ def _answers(
                     give(i)
                     continue
                 done.add(i)
+                for another in islice(following, 1):
+                    give(another)
                 yield i, answer
             elif future.status in ("cancelled", "lost") or client.status != "running":
                 raise SpringcheckError(GONE)
