@@ -245,3 +245,15 @@ def test_no_explanation_is_without_a_remedy() -> None:
             assert one.cause
             assert one.remedy
             assert math.isfinite(one.misfit)
+
+
+def test_a_trajectory_that_failed_says_what_its_states_are() -> None:
+    import springcheck
+    from springcheck.identify.files import sentence
+
+    scene = springcheck.load_scene("spring")
+    run_ = springcheck.simulate(scene, "own:euler")
+    assert sentence(run_, scene.m).startswith("Explicit Euler")
+    assert sentence(springcheck.simulate(scene, "own:semi-implicit-euler"), scene.m).startswith(
+        "Semi-implicit"
+    )

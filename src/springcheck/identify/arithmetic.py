@@ -72,8 +72,10 @@ def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -
     z, centre = found.z, found.centre / found.size
     signed = misses(match, found).astype(np.float64)
     missing = np.abs(signed)
+    # a force is that of the whole position, whose rounding it carries into the velocity
+    at = np.abs(centre) + np.abs(b) @ np.abs(centre)
     # sums of absolute values: what a rounding of either term is relative to
-    size = np.abs(z[:-1]) @ np.abs(b).T + np.abs(z[1:]) + 2 * np.abs(centre)
+    size = np.abs(z[:-1]) @ np.abs(b).T + np.abs(z[1:]) + 2 * at
     if match.stride > 1:
         # states between two frames lie on the same orbit: either component may be as large as the whole
         size = size + np.sqrt(np.sum(z[:-1] ** 2, axis=1) + np.sum(z[1:] ** 2, axis=1))[:, None]

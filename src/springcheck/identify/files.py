@@ -10,13 +10,17 @@ import numpy as np
 
 from springcheck import formats, schemes, store
 from springcheck.arrays import Floats, Integers
-from springcheck.errors import MethodError, StoreError
+from springcheck.errors import IdentificationError, MethodError, StoreError
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
+from springcheck.trajectory import Trajectory
 
 MOST_FRAMES = 20_000
 """Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""
+
+MOST_FAILED = 1000
+"""Frames that are looked at to say what a trajectory is that has failed."""
 
 MOST_OSCILLATORS = 16
 """Moving coordinates that are looked at in a file of many particles."""
@@ -144,6 +148,19 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
         notes = [*notes, f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
     chosen = moving[:MOST_OSCILLATORS] if len(moving) else np.arange(min(1, q.shape[1]))
     return np.asarray(chosen), tuple(notes)
+
+
+def sentence(run: Trajectory, mass: Floats) -> str:
+    """What the states of a trajectory really are, in one sentence, for a verdict that failed; "" where they
+    show nothing."""
+    chosen, _ = _chosen(run.q, run.p, [])
+    frames = slice(MOST_FAILED)
+    try:
+        return identify_arrays(
+            run.t[frames], run.q[frames, chosen], run.p[frames, chosen], mass=mass[chosen]
+        ).statement
+    except IdentificationError:
+        return ""
 
 
 def identify_states(
