@@ -45,8 +45,6 @@ DECADES = tuple(10.0**-d for d in range(4, 13))
 def _scene(terms: tuple[WallSpring | Quartic, ...], q: Floats, p: Floats, m: Floats) -> Scene:
     return Scene(
         name="experiment",
-        title="",
-        source="",
         m=m,
         q=q,
         p=p,

@@ -23,23 +23,24 @@ def spring(
     steps: int = 200,
     *,
     at: ArrayLike = 0.0,
-    c: ArrayLike = 0.0,
+    c: ArrayLike | None = None,
     fast: bool = False,
     **rest: Any,
 ) -> Scene:
     """A mass on a spring, or many side by side: numbers, or arrays (n,) of them.
 
     Masses m [M] at q [L] with momenta p [M L/T], on springs of stiffness k [M/T2] that rest at `at` [L], with
-    friction -c p/m, c [M/T]; `fast` as in `WallSpring`.  The rest are fields of `Scene`.  Raises SceneError.
+    friction -c p/m where c [M/T] is given; `fast` as in `WallSpring`.  The rest are
+    fields of `Scene`.  Raises SceneError.
 
     >>> spring(m=2.0, k=[1.0, 4.0], p=[1.0, 0.5]).n
     2
     """
-    m, k, q, p, at, c = _together(m=m, k=k, q=q, p=p, at=at, c=c)
+    m, k, q, p, at, friction = _together(m=m, k=k, q=q, p=p, at=at, c=0.0 if c is None else c)
     index = np.arange(len(m))
     terms: list[Term] = [WallSpring(i=index, k=k, at=at, fast=fast)]
-    if np.any(c):
-        terms.append(Damping(i=index, c=c))
+    if c is not None:
+        terms.append(Damping(i=index, c=friction))
     words = {"name": "spring", "title": "Mass on a spring", **rest}
     return Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, **words)
 

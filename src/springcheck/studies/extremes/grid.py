@@ -10,8 +10,8 @@ import numpy as np
 
 from springcheck import engines
 from springcheck.engines.contract import Label, Need
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Term, WallSpring
 from springcheck.studies.stability.propagators import MASS, STEP
 
 STEPS = 20
@@ -168,29 +168,26 @@ def solver_specs(*, quick: bool = False) -> list[Spec]:
 def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
     """Cells of one step and one length as a scene of particles side by side."""
     first = cells[0]
-    n = len(cells)
-    index = np.arange(n)
     m = np.array([x.m for x in cells])
-    fast = Need.FAST_SPRINGS in requires
-    terms: list[Term] = [WallSpring(i=index, k=np.array([x.k for x in cells]), at=np.zeros(n), fast=fast)]
+    c = None
     if Need.DAMPING in requires:
         # the method is there for friction: h c/m = 1/80
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):
-            c = np.minimum(rate * m, 1e300)
-        terms.append(Damping(i=index, c=np.where(first.block == "force", c, 0.0)))
-    every = max(1, first.steps // 10) if first.block == "length" else 1
-    return Scene(
+            c = np.where(first.block == "force", np.minimum(rate * m, 1e300), 0.0)
+    return spring(
+        m=m,
+        k=np.array([x.k for x in cells]),
+        q=np.array([x.q for x in cells]),
+        p=np.array([x.p for x in cells]),
+        c=c,
+        fast=Need.FAST_SPRINGS in requires,
+        step=first.h,
+        steps=first.steps,
+        every=max(1, first.steps // 10) if first.block == "length" else 1,
         name="extreme",
         title="extreme cases side by side",
         source="springcheck",
-        m=m,
-        q=np.array([x.q for x in cells]),
-        p=np.array([x.p for x in cells]),
-        terms=tuple(terms),
-        step=first.h,
-        steps=first.steps,
-        every=every,
         tolerance=first.tolerance,
         quantities=("q", "p"),
     )

@@ -15,18 +15,7 @@ def scene(
     m: Floats, terms: tuple[Term, ...], q: Floats, p: Floats, *, step: float, steps: int, every: int = 1
 ) -> Scene:
     """A scene made of numbers."""
-    return Scene(
-        name="random",
-        title="",
-        source="",
-        m=np.asarray(m, np.float64),
-        q=np.asarray(q, np.float64),
-        p=np.asarray(p, np.float64),
-        terms=terms,
-        step=float(step),
-        steps=steps,
-        every=every,
-    )
+    return Scene(m=m, terms=terms, q=q, p=p, step=step, steps=steps, every=every, name="random")
 
 
 def walls(k: Floats, at: Floats) -> WallSpring:

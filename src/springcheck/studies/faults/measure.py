@@ -5,7 +5,6 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from springcheck import checks, engines, schemes, simulate
 from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
 from springcheck.studies import team as teams
@@ -29,28 +29,20 @@ from springcheck.trajectory import Trajectory
 def scene(where: Where) -> Scene:
     """The scenes of the faults: no mass, stiffness, rest point or step that is 1, h w about 0.1."""
     if where == "chain":
-        made = clean.scene(
-            np.array([1.3, 0.7, 2.1]),
-            (
-                Spring(
-                    a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])
-                ),
-            ),
-            np.array([0.2, 1.0, 1.9]),
-            np.array([0.4, -0.3, 0.5]),
+        springs = Spring(
+            a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])
+        )
+        return Scene(
+            m=np.array([1.3, 0.7, 2.1]),
+            terms=(springs,),
+            q=np.array([0.2, 1.0, 1.9]),
+            p=np.array([0.4, -0.3, 0.5]),
             step=0.05,
             steps=200,
+            name=where,
         )
-    else:
-        made = clean.scene(
-            np.array([3.7]),
-            (clean.walls(np.array([2.9]), np.array([0.0])),),
-            np.array([0.3]),
-            np.array([0.7]),
-            step=0.1,
-            steps=2100 if where == "long spring" else 200,
-        )
-    return replace(made, name=where)
+    steps = 2100 if where == "long spring" else 200
+    return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
 
 
 SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")

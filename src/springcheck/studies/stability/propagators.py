@@ -16,8 +16,8 @@ from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats
 from springcheck.engines.contract import Arithmetic, Label, Need
 from springcheck.errors import MethodError
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Term, WallSpring
 
 FORCE = 1024.0
 """Largest force on a scanned spring, in the scene's unit of force."""
@@ -70,26 +70,23 @@ def scene(
     springs: Springs, q: Floats, p: Floats, *, copies: int = 1, steps: int = 1, every: int = 1
 ) -> Scene:
     """A scene of `copies` of these springs, one set behind the other, from q, p (copies * n,)."""
-    n = copies * len(springs.turn)
-    k = np.tile(springs.k, copies)
     requires = engines.method(springs.label).requires
-    fast = Need.FAST_SPRINGS in requires
-    terms: list[Term] = [WallSpring(i=np.arange(n), k=k, at=np.zeros(n), fast=fast)]
-    if np.any(springs.brake) or Need.DAMPING in requires:
-        c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
-        terms.append(Damping(i=np.arange(n), c=c))
-    return Scene(
-        name="scan",
-        title="springs side by side",
-        source="springcheck",
-        m=np.full(n, MASS),
+    has_friction = np.any(springs.brake) or Need.DAMPING in requires
+    c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
+    return spring(
+        m=MASS,
+        k=np.tile(springs.k, copies),
         q=q,
         p=p,
-        terms=tuple(terms),
+        c=c if has_friction else None,
+        fast=Need.FAST_SPRINGS in requires,
         step=STEP,
         steps=steps,
         every=every,
         quantities=("q", "p"),
+        name="scan",
+        title="springs side by side",
+        source="springcheck",
     )
 
 
