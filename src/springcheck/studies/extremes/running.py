@@ -45,7 +45,9 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         return found
     if stale := engines.load(label.engine).arithmetic(label).stale:
         # in company of a larger motion an engine computes forces anew that it would keep for the cell alone
-        slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
+        with np.errstate(invalid="ignore"):
+            # a state that has left all numbers is not slow
+            slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
         found = [
             cells(label, [spec])[0] if alone else cell
             for spec, cell, alone in zip(specs, found, slow, strict=True)
