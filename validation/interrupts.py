@@ -15,7 +15,12 @@ In the end each command is given once more in the folder of its last interrupt, 
 undisturbed, with the same files.  Signals before the first line of springcheck meet the interpreter, which
 starts in some 50 ms and has its own way with them; they are counted apart, as are those that came too late.
 
-Expected, in about half an hour on two cores for 500 interrupts: every line ends in "0 wrong".
+Expected for 500 interrupts: every line ends in "0 wrong"; an idle machine takes about half an hour.
+
+Measured so far, on two cores with a load of ten: 272 signals to run (plain, thorough, forced, repeated, JSON),
+precision, stability and extremes, of which 221 met our code, 50 came too late and one too early.  The slowest
+end took 1.4 s, and nothing was wrong but 7 times in extremes, where the compiler behind OpenCL said on
+standard error that the signal had met it; that is caught since.
 """
 
 from __future__ import annotations
@@ -224,6 +229,8 @@ def campaign(name: str, count: int, store: Path, rng: random.Random) -> list[str
             wrong.append(f"{name}: given again it leaves {sorted(names(folder) ^ names(whole))}")
     said = ", ".join(f"{number} {what}" for what, number in counts.items())
     print(f"{name:16} {usual:5.1f} s  {said}; slowest end {slowest:.2f} s; {len(wrong)} wrong", flush=True)
+    for line in wrong:
+        print(f"    {line}", flush=True)
     return wrong
 
 
@@ -242,8 +249,6 @@ def main() -> int:
         undisturbed(("run", "spring-uneven", "-o", "input.h5"), Path(home))
         for name in COMMANDS:
             wrong += campaign(name, -(-given.interrupts // len(COMMANDS)), Path(home) / "input.h5", rng)
-    for line in wrong:
-        print(line)
     print(f"{given.interrupts} interrupts, {len(wrong)} wrong")
     return 1 if wrong else 0
 
