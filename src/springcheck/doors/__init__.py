@@ -34,6 +34,8 @@ def bring(options: Namespace) -> None:
         made = command.engine(options.program, scheme, seconds)
         found = engines.bring(made, options.program, _digest(*command.files(options.program)))
         labels += [f"{found.name}:{name}" for name in found.methods]
+    if labels and (getattr(options, "workers", 1) or 1) > 1:
+        raise MethodError("--workers: what a call brings is known to its own process alone; leave it out")
     if labels and hasattr(options, "method"):
         # where methods are named, those that are brought here are meant as well
         options.method = [*(options.method or ["*"]), *(x for x in labels if x not in options.method)]

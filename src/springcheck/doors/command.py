@@ -20,7 +20,7 @@ import numpy as np
 from springcheck import formats, schemes
 from springcheck.arrays import Floats
 from springcheck.doors.function import UNKNOWN
-from springcheck.engines import ANY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation
+from springcheck.engines import EVERY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.scene import Scene
 
@@ -56,7 +56,7 @@ def engine(text: str, scheme: str = "", seconds: float = SECONDS) -> Engine:
                 name=name,
                 scheme=known,
                 about=f"{line.strip()}; its time is the whole command's",
-                terms=frozenset({ANY_POTENTIAL, "damping"}),
+                terms=EVERY_POTENTIAL | {"damping"},
             )
         },
         schemes=(UNKNOWN,),

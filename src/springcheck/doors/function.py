@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck import engines, schemes
 from springcheck.arrays import Floats
-from springcheck.engines import ANY_POTENTIAL, Engine, Label, Method, Simulation, Stopped
+from springcheck.engines import EVERY_POTENTIAL, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper, load_stepper
 from springcheck.physics.scene import Scene
@@ -65,9 +65,7 @@ def engine(spec: str, scheme: str = "") -> Engine:
     return Engine(
         name="stepper",
         title=f"the function {spec}",
-        methods={
-            name: Method(name=name, scheme=known, about=about, terms=frozenset({ANY_POTENTIAL, "damping"}))
-        },
+        methods={name: Method(name=name, scheme=known, about=about, terms=EVERY_POTENTIAL | {"damping"})},
         schemes=(UNKNOWN,),
         start=start,
         version=dict,

@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 from springcheck import schemes
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
+    EVERY_POTENTIAL,
     Arithmetic,
     Engine,
     Label,
@@ -37,6 +38,7 @@ from springcheck.physics.scene import Scene
 
 __all__ = [
     "ANY_POTENTIAL",
+    "EVERY_POTENTIAL",
     "Arithmetic",
     "Engine",
     "GROUP",

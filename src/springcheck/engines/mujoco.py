@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.engines.contract import (
-    ANY_POTENTIAL,
+    EVERY_POTENTIAL,
     Arithmetic,
     Engine,
     Label,
@@ -31,7 +31,7 @@ from springcheck.physics.terms import Damping, Spring, WallSpring
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 DAMPED = SPRINGS | {"damping"}
-FORCES = frozenset({ANY_POTENTIAL, "damping"})
+FORCES = EVERY_POTENTIAL | {"damping"}
 
 IMPLICIT_FRICTION = "semi-implicit-euler-implicit-friction"
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, named
 from springcheck.physics.scene import Scene
 
 
@@ -83,7 +83,7 @@ def _columns(sim: Any, first: int, n: int) -> dict[str, Floats]:
 
 
 def _method(name: str, scheme: str, about: str) -> Method:
-    return Method(name=name, scheme=scheme, about=about, terms=frozenset({ANY_POTENTIAL}), default=False)
+    return Method(name=name, scheme=scheme, about=about, terms=EVERY_POTENTIAL, default=False)
 
 
 ENGINE = Engine(

@@ -19,6 +19,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
+from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
@@ -49,7 +50,7 @@ def measure(
     for label in chosen:
         absent = engines.absence(label.engine)
         if label not in propagators.one_step_labels(chosen):
-            adaptive = engines.method(label).adaptive
+            adaptive = not scheme(engines.method(label).scheme).one_step
             absent = absent or ("it has no fixed step and no limit" if adaptive else "it moves no springs")
         else:
             absent = absent or propagators.absence(label)
