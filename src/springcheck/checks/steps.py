@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from springcheck import schemes
 from springcheck.arrays import Floats, Reals
-from springcheck.checks.case import REPEATED, Case, keeps, overflows
+from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import check
 from springcheck.checks.stretch import Stretch
 from springcheck.engines.contract import Arithmetic
@@ -161,8 +161,7 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
     """The limit of the engine's arithmetic that explains every step that is off (f-1,), or nothing."""
     how = case.trajectory.arithmetic
     if how.stale and np.any(off) and case.trajectory.every == 1:
-        # from where the force was computed a position has come back, or not moved as far as that
-        moved = np.max(np.abs(np.diff(case.trajectory.q, axis=0)), axis=1)
+        moved = least_moved(np.max(np.abs(np.diff(case.trajectory.q, axis=0)), axis=1))
         if np.all(moved[off] <= 2 * how.stale):
             first = int(np.argmax(off))
             return (

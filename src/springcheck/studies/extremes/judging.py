@@ -9,14 +9,14 @@ that is off without a reason makes the cell silently wrong.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from springcheck import checks, engines, schemes, trajectory
 from springcheck.arrays import Extended, Floats
-from springcheck.checks.case import keeps, overflows
+from springcheck.checks.case import keeps, least_moved, overflows
 from springcheck.engines.contract import Arithmetic, Label
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
@@ -119,6 +119,8 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         inside = sizes(
             label, case.judged, q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), exact_q, exact_p
         )
+        # what the engine moved by itself: with the forces that it has kept
+        inside = replace(inside, moved=np.abs(np.diff(q, axis=0)))
         growth = growth_of(case, scene)
     bound = float(case.roundings)
     low, high = range_of(how)
@@ -186,7 +188,7 @@ def _reason(
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
             len(bad), how.quantum > DIGITS * peak
         ),
-        keeps(how): inside.moved[bad, i] <= 2 * how.stale,
+        keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
         f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
         f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
     }
