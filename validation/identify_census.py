@@ -10,9 +10,9 @@ systematic error, of 1e-12 to 1e-3 of the force or the state: a stiffness that w
 constant drift of the position, noise, alternating steps, one kick; then "fits" is a false fit, unless the
 error hides within the rounding of the file.
 
-Measured on the first 50 of seeds 11 and 12, 98 trajectories: no wrong name; 58 named, 3 more named but said not
-to be what was stated, 19 not told apart, 3 taken for none, 14 errors seen, and one false fit: noise of 6e-10 of
-the force, six steps of RK4 to a frame, which has the size of a 64-bit fixed-point force.
+Measured on the first 50 of seeds 11 and 12, 98 trajectories: no wrong name; 58 named, 3 more named but said
+not to be what was stated, 19 not told apart, 3 taken for none, 14 errors seen, and one false fit: noise of
+6e-10 of the force, six steps of RK4 to a frame, which has the size of a 64-bit fixed-point force.
 
 Steps are carried out in plain floats from the stages, without the matrices that `identify` matches.
 
