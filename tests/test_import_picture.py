@@ -17,7 +17,7 @@ HOME = Path(springcheck.__file__).parent
 ROWS = [
     "interrupts", "errors", "slips", "workers", "arrays", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
-    "doors", "figures", "studies", "inspect", "plot", "listing", "api", "cli", "__main__",
+    "doors", "figures", "studies", "inspect", "plot", "page", "listing", "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
@@ -29,6 +29,8 @@ HOMES = {
     "ase": ("engines/ase/simulation.py", "formats/molecular.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
+    "jinja2": ("page/writing.py",),
+    "markupsafe": ("page/writing.py",),
     "rich": ("text.py", "studies/run/text.py", "cli.py"),
     "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
 }
@@ -88,9 +90,9 @@ FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
 @pytest.mark.parametrize(
     ("code", "absent"),
     [
-        ("import springcheck", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
-        ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec"}),
-        ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich"}),
+        ("import springcheck", FOREIGN | {"h5py", "numpy", "rich", "msgspec", "jinja2"}),
+        ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec", "jinja2"}),
+        ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich", "jinja2"}),
         ("import springcheck; springcheck.simulate(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
     ],
 )

@@ -162,6 +162,12 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
     plot.set_defaults(command=_plot)
 
+    report = commands.add_parser("report", help="a store as one HTML page that checks itself in a browser")
+    report.add_argument("file", metavar="FILE")
+    report.add_argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html")
+    report.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    report.set_defaults(command=_report)
+
     identify = commands.add_parser("identify", help="which scheme made a trajectory, ours or anyone's")
     identify.add_argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities")
     identify.add_argument(
@@ -379,6 +385,19 @@ def _plot(options: argparse.Namespace) -> int:
         for line in (*notes, *written):
             print(plain(line))
     return int(bool(doubts))
+
+
+def _report(options: argparse.Namespace) -> int:
+    from springcheck import page
+
+    path = Path(options.file)
+    into = Path(options.output or f"{path.stem}.html")
+    content = page.gather(path)
+    size = page.write(content, into)
+    _warn(options.file, [{"place": one.place, "what": one.what} for one in content.not_trusted])
+    if not options.quiet:
+        print(plain(f"{into}: {size / 1e3:.0f} kB"))
+    return int(bool(content.not_trusted))
 
 
 def _check(options: argparse.Namespace) -> int:

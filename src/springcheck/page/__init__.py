@@ -1,0 +1,11 @@
+"""`springcheck report`: a store as one HTML file that needs no server and asks nothing of any network.
+
+`content` gathers what it shows, `writing` puts it into the template.  The page holds its numbers as text
+that reads back as the stored doubles, and where a scene is one particle on one wall spring it runs the
+loops of three methods again in the reader's browser and compares (`loops.js`).
+"""
+
+from springcheck.page.content import Content, gather
+from springcheck.page.writing import html, write
+
+__all__ = ["Content", "gather", "html", "write"]

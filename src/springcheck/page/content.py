@@ -1,0 +1,165 @@
+"""What a report shows of a store, as plain data, in bounded memory however long its runs are."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springcheck import compare, schemes, store
+from springcheck.arrays import Floats
+from springcheck.compare import EXACT, Same
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
+from springcheck.store import Finding, Summary
+from springcheck.trajectory import Comparison, Trajectory, Verdict
+
+NUMBERS = 15_000
+"""Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
+FEWEST = 50
+"""Frames that are kept of each trajectory however many there are."""
+LONGEST = 2_000_000
+"""Steps up to which a browser runs the loops again: about a second."""
+TAIL = 1 << 20
+"""Frames at the end of a run by which it is told whether two of them are one motion, as `run` does."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passed:
+    """The verdicts of one method."""
+
+    method: str
+    scheme: str
+    verdicts: tuple[Verdict, ...]
+
+    def count(self, passed: bool | None) -> int:
+        """How many passed, failed, or did not apply."""
+        return sum(1 for verdict in self.verdicts if verdict.passed is passed)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """What the template is given."""
+
+    scene: Scene
+    scene_text: str
+    summary: Summary
+    not_trusted: tuple[Finding, ...]
+    methods: tuple[Passed, ...]
+    same: tuple[Same, ...] | None
+    """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
+    comparison: Comparison | None
+    sha256: str
+    """Of the file; empty where the run has not ended."""
+    stride: int
+    """Every how many stored frames one stands in the page."""
+    data: Mapping[str, Any]
+    """For the scripts; numbers that are none are the words that JavaScript has for them."""
+
+    @property
+    def name(self) -> str:
+        """Of the store, as a shell takes it."""
+        return shlex.quote(self.summary.path.name)
+
+
+def gather(path: Path) -> Content:
+    """Read what a report shows.  SpringcheckError where the store holds no trajectories."""
+    summary = store.summary(path)
+    if not summary.runs:
+        raise SpringcheckError(f"{path}: holds no trajectory to report; a report is of `springcheck run`")
+    text = store.scene_text(path)
+    scene = scenefile.parse(text, name=str(summary.root.get("scene_name") or path.stem), where=str(path))
+    labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
+    most = max(FEWEST, NUMBERS // (4 * max(1, len(labels))))
+    pieces = {label: store.strided(path, label, most) for label in labels}
+    verdicts = store.verdicts(path) if path.is_file() else ()
+    comparison = store.comparison(path) if path.is_file() else None
+    return Content(
+        scene=scene,
+        scene_text=text,
+        summary=summary,
+        not_trusted=tuple(store.doubts(path)),
+        methods=tuple(_methods(summary, verdicts)),
+        same=_same(path, scene, comparison),
+        comparison=comparison,
+        sha256=_digest(path) if path.is_file() else "",
+        stride=max((stride for _, stride in pieces.values()), default=1),
+        data={
+            "runs": [drawn(piece) for piece, _ in pieces.values()],
+            "spring": spring(scene),
+            "steps": scene.steps,
+        },
+    )
+
+
+def spring(scene: Scene) -> dict[str, Any] | None:
+    """The numbers of one particle on one wall spring; None for any other scene, or one too long."""
+    if scene.n != 1 or len(scene.terms) != 1 or scene.steps > LONGEST:
+        return None
+    wall = scene.terms[0]
+    if not isinstance(wall, WallSpring) or len(wall) != 1:
+        return None
+    numbers = {"k": wall.k, "at": wall.at, "m": scene.m, "q": scene.q, "p": scene.p}
+    found: dict[str, Any] = {name: float(values[0]) for name, values in numbers.items()}
+    # ASE calculates in units of its own
+    return {**found, "h": scene.step, "converted": ["ase"] if scene.units == "md" else []}
+
+
+def drawn(piece: Trajectory) -> dict[str, Any]:
+    """The first particle of a trajectory, and the energy of all."""
+    return {
+        "label": piece.label,
+        "scheme": piece.scheme,
+        "title": _title(piece.scheme),
+        "every": piece.every,
+        "step": piece.step,
+        "t": _numbers(piece.t),
+        "q": _numbers(piece.q[:, 0]),
+        "p": _numbers(piece.p[:, 0]),
+        "energy": None if piece.energy is None else _numbers(piece.energy),
+    }
+
+
+def _numbers(values: Floats) -> list[float | str]:
+    """Doubles as JSON reads them back bit for bit, and words for those that JSON has not."""
+    words = {math.inf: "Infinity", -math.inf: "-Infinity"}
+    return [x if math.isfinite(x) else words.get(x, "NaN") for x in values.tolist()]
+
+
+def _title(scheme: str) -> str:
+    try:
+        return schemes.title(scheme)
+    except (SpringcheckError, KeyError):
+        # of a plug-in that is not here
+        return scheme
+
+
+def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:
+    titles = {run.label: _title(str(run.parameters.get("scheme", ""))) for run in summary.runs}
+    for label in dict.fromkeys((*titles, *(verdict.method for verdict in verdicts))):
+        mine = tuple(verdict for verdict in verdicts if verdict.method == label)
+        yield Passed(method=label, scheme=titles.get(label, ""), verdicts=mine)
+
+
+def _same(path: Path, scene: Scene, comparison: Comparison | None) -> tuple[Same, ...] | None:
+    """Which of them are one motion, as `run` says it."""
+    if comparison is None:
+        return None
+    ends = {label: store.end(path, label, TAIL) for label in comparison.labels if label != EXACT}
+    if any(not len(run.q) or not len(run.p) for run in ends.values()):
+        return None
+    try:
+        return tuple(compare.same_motions(scene, ends, comparison))
+    except (SpringcheckError, KeyError):
+        return None
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,97 @@
+"""A report as HTML: the template with autoescape, the data as JSON that cannot end its own script."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from springcheck.errors import StoreError, plain
+from springcheck.page.content import Content
+from springcheck.store import files
+from springcheck.trajectory import Verdict
+
+HERE = Path(__file__).parent
+MARK = '<meta name="generator" content="springcheck report">'
+"""In the first lines of every report: no other file is replaced."""
+HEAD = 1024
+"""Bytes in which the mark stands."""
+
+
+def html(content: Content) -> str:
+    """The page.  Scripts and styles run by their digest alone; nothing else is loaded from anywhere."""
+    around = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        # what a file says is text without control characters
+        finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
+    )
+    around.filters |= {"short": short, "fraction": fraction}
+    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in ("loops.js", "page.js"))
+    style = (HERE / "page.css").read_text(encoding="utf-8")
+    return around.get_template("page.html").render(
+        content=content,
+        scene=content.scene,
+        known=dict(content.summary.runs[0].parameters),
+        # of the file alone, its lines kept
+        scene_lines=[plain(line) for line in content.scene_text.splitlines()],
+        mark=Markup(MARK),
+        style=Markup(style),
+        style_digest=_digest(style),
+        script=Markup(script),
+        script_digest=_digest(script),
+        data=_json(content.data),
+    )
+
+
+def write(content: Content, path: Path) -> int:
+    """Write the page; returns its size [B].  StoreError where any other file stands there."""
+    try:
+        if path.is_dir():
+            raise StoreError(f"{path} is a folder: a file's name is needed after -o")
+        if path.is_symlink() or path.exists():
+            with path.open("rb") as file:
+                if MARK.encode() not in file.read(HEAD):
+                    raise StoreError(
+                        f"{path} is no report of ours: move it away, or name another file with -o"
+                    )
+        page = html(content).encode()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.put_bytes(page, path)
+    except OSError as error:
+        raise StoreError(f"{path}: the report cannot be written: {error.strerror or error}") from error
+    return len(page)
+
+
+def _json(data: Any) -> Markup:
+    """JSON inside HTML: no character of it can end the script or begin a tag."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return Markup(text)
+
+
+def _digest(text: str) -> str:
+    """As a Content-Security-Policy names what may run."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def short(x: float) -> str:
+    """Three digits."""
+    return f"{x:.3g}"
+
+
+def fraction(verdict: Verdict) -> str:
+    """The value as a fraction of its bound; below 1 passes, and a bound of 0 admits 0 alone."""
+    if verdict.passed is None:
+        return "-"
+    if verdict.bound == 0:
+        return "exact" if verdict.value == 0 else "not exact"
+    return f"{verdict.value / verdict.bound:.2g}"
