@@ -156,6 +156,6 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     assert cli.main(["plot", path, "-o", "f"]) == 0
     assert {one.name for one in Path("f").iterdir()} == {
         f"ensemble-{name}.{end}" for name in ("max_error", "energy_drift") for end in ("png", "svg")
-    }
+    } | {"springcheck-figures.json"}
     assert cli.main(["run", "spring-uneven", "--workers", "2"]) == 2
     assert "go with --vary" in capsys.readouterr().err

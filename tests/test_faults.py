@@ -145,6 +145,6 @@ def test_a_thorough_run_reports_its_experiments(tmp_path: Path, capsys: pytest.C
     assert cli.main([*arguments, "--thorough"]) == 0
     out = capsys.readouterr().out
     assert "Experiments with laws" in out
-    assert max(map(len, out.splitlines())) <= 100
+    assert "…" not in out
     assert cli.main([*arguments, "--force"]) == 0
     assert "Experiments" not in capsys.readouterr().out
