@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.store import Table
 
@@ -118,7 +119,8 @@ class _Field:
 
     @property
     def is_array(self) -> bool:
-        return get_origin(self.hint) in (tuple, np.ndarray) or self.hint is np.ndarray
+        # from NumPy 2.5 on an array's hint is an alias with an origin of its own
+        return get_origin(self.hint) in (tuple, np.ndarray, NDArray) or self.hint is np.ndarray
 
 
 def _fields(kind: Any) -> tuple[_Field, ...]:
