@@ -57,8 +57,9 @@ def style() -> Iterator[None]:
 
 
 def look(i: int) -> dict[str, Any]:
-    """Colour and line style of the i-th line."""
-    return {"color": COLOURS[i % len(COLOURS)], "linestyle": LINES[i % len(LINES)]}
+    """Colour and line style of the i-th line; where the colours begin again the lines are others."""
+    again, colour = divmod(i, len(COLOURS))
+    return {"color": COLOURS[colour], "linestyle": LINES[(colour + 3 * again) % len(LINES)]}
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:

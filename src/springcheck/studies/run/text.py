@@ -55,7 +55,7 @@ def _report(report: Report) -> Lines:
     if report.judged_frames < report.scene.frames:
         share = f"{report.judged_frames} of {report.scene.frames} frames"
         out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
-    out += [plain(), _summary(report)]
+    out += [plain(), *_summary(report)]
     return out
 
 
@@ -208,17 +208,17 @@ def _repeat(one: Repeat) -> Text:
     )
 
 
-def _summary(report: Report) -> Text:
+def _summary(report: Report) -> Lines:
     """How many verdicts passed, and where the store is."""
     passed = sum(1 for v in report.verdicts if v.passed)
     failed = sum(1 for v in report.verdicts if v.passed is False)
     skipped = len(report.verdicts) - passed - failed
     taken = f"; taken up from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
-    return plain(
-        f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}\n"
-        f"Stored in {report.path}",
-        "bold red" if failed else "bold yellow" if report.not_judged else "bold green",
-    )
+    look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
+    return [
+        plain(f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}", look),
+        plain(f"Stored in {report.path}", look),
+    ]
 
 
 def _comparison(comparison: Comparison) -> Table:
