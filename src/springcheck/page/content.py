@@ -116,7 +116,7 @@ def drawn(piece: Trajectory) -> dict[str, Any]:
     return {
         "label": piece.label,
         "scheme": piece.scheme,
-        "title": _title(piece.scheme),
+        "title": schemes.title(piece.scheme),
         "every": piece.every,
         "step": piece.step,
         "t": _numbers(piece.t),
@@ -132,16 +132,8 @@ def _numbers(values: Floats) -> list[float | str]:
     return [x if math.isfinite(x) else words.get(x, "NaN") for x in values.tolist()]
 
 
-def _title(scheme: str) -> str:
-    try:
-        return schemes.title(scheme)
-    except (SpringcheckError, KeyError):
-        # of a plug-in that is not here
-        return scheme
-
-
 def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:
-    titles = {run.label: _title(str(run.parameters.get("scheme", ""))) for run in summary.runs}
+    titles = {run.label: schemes.title(str(run.parameters.get("scheme", ""))) for run in summary.runs}
     for label in dict.fromkeys((*titles, *(verdict.method for verdict in verdicts))):
         mine = tuple(verdict for verdict in verdicts if verdict.method == label)
         yield Passed(method=label, scheme=titles.get(label, ""), verdicts=mine)

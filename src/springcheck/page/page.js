@@ -87,8 +87,7 @@ function plot(place, curves, xs, ys, xName, yName, said) {
       if (!Number.isFinite(curve.x[i]) || !Number.isFinite(curve.y[i])) break;
       path += `${i ? "L" : "M"}${kept(x(curve.x[i]))} ${kept(y(curve.y[i]))}`;
     }
-    const drawn = element("path", { class: "curve", d: path, "stroke-dasharray": curve.dash });
-    drawn.style.stroke = curve.colour;
+    const drawn = stroked(path, curve);
     drawn.append(element("title", {}, curve.name));
     inside.append(drawn);
   }
@@ -124,9 +123,16 @@ function colourOf(scheme) {
   return COLOURS[SCHEMES.indexOf(scheme) % COLOURS.length];
 }
 
-function sample(colour, dash) {
-  const line = element("path", { class: "curve", d: "M0 5H30", "stroke-dasharray": dash });
+// A line in its colour; on paper, where all are black, by another dash for each scheme.
+function stroked(d, { colour, dash, printed }) {
+  const line = element("path", { class: "curve", d, "stroke-dasharray": dash });
   line.style.stroke = colour;
+  line.style.setProperty("--printed", printed || "none");
+  return line;
+}
+
+function sample(look) {
+  const line = stroked("M0 5H30", look);
   return element("svg", { width: 30, height: 10, "aria-hidden": "true" }, line);
 }
 
@@ -139,6 +145,7 @@ function legend() {
     const which = SCHEMES.indexOf(run.scheme);
     run.colour = colourOf(run.scheme);
     run.dash = DASHES[(count + Math.floor(which / COLOURS.length)) % DASHES.length];
+    run.printed = DASHES[(which + count) % DASHES.length];
     run.on = count === 0;
     const label = html("label"), box = html("input");
     box.type = "checkbox";
@@ -148,7 +155,7 @@ function legend() {
       draw();
     });
     label.title = run.title;
-    label.append(box, sample(run.colour, run.dash), run.label);
+    label.append(box, sample(run), run.label);
     place.append(label);
   });
 }
@@ -156,7 +163,7 @@ function legend() {
 function draw() {
   const runs = DATA.runs.filter((run) => run.on);
   const names = runs.map((run) => run.label).join(", ") || "nothing";
-  const curve = (run, x, y) => ({ x, y, colour: run.colour, dash: run.dash, name: `${run.label}: ${run.title}` });
+  const curve = (run, x, y) => ({ x, y, colour: run.colour, dash: run.dash, printed: run.printed, name: `${run.label}: ${run.title}` });
   const fits = shown(runs.map((run) => Math.max(largest(run.q), largest(run.p))));
   const base = runs.filter((_, i) => fits[i]);
   plot(
@@ -253,9 +260,9 @@ function live() {
     Object.keys(sliders).forEach(put);
     orbit(now, inputs);
   });
-  for (const [name, , colour, dash] of [...TRIED, ["true motion", null, "var(--soft)", ""]]) {
+  for (const [name, , colour, dash] of [...TRIED, ["true motion", null, "var(--soft)", "1 5"]]) {
     const one = html("span");
-    one.append(sample(colour, dash), name);
+    one.append(sample({ colour, dash, printed: dash }), name);
     document.getElementById("orbit-legend").append(one);
   }
   orbit(now, inputs);
@@ -272,7 +279,7 @@ function orbit(s, inputs) {
   const angles = Array.from({ length: 181 }, (_, i) => (i * Math.PI) / 90);
   const curves = bound ? [{
     x: angles.map((u) => s.at + a * Math.cos(u)), y: angles.map((u) => b * Math.sin(u)),
-    colour: "var(--soft)", dash: "", name: "true motion",
+    colour: "var(--soft)", dash: "1 5", printed: "1 5", name: "true motion",
   }] : [];
   const far = [];
   for (const [name, loop, colour, dash] of TRIED) {
@@ -284,7 +291,7 @@ function orbit(s, inputs) {
       y.push(p);
     }
     if (!(Math.abs(q - s.at) <= 4 * a) || !(Math.abs(p) <= 4 * b)) far.push(name);
-    curves.push({ x, y, colour, dash, name });
+    curves.push({ x, y, colour, dash, printed: dash, name });
   }
   const range = (at, size) => [at - 4 * size, at + 4 * size];
   plot(document.getElementById("orbit"), curves, range(s.at, a), range(0, b), "q", "p",
