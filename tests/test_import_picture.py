@@ -17,7 +17,7 @@ HOME = Path(springcheck.__file__).parent
 ROWS = [
     "interrupts", "errors", "slips", "workers", "arrays", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
-    "doors", "figures", "studies", "inspect", "plot", "page", "listing", "api", "cli", "__main__",
+    "doors", "figures", "studies", "inspect", "plot", "page", "explain", "listing", "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
@@ -93,6 +93,8 @@ FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
         ("import springcheck", FOREIGN | {"h5py", "numpy", "rich", "msgspec", "jinja2"}),
         ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec", "jinja2"}),
         ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich", "jinja2"}),
+        ("from springcheck.cli import main; main(['show', 'spring'])", FOREIGN | {"h5py", "rich", "jinja2"}),
+        ("from springcheck.cli import main; main(['explain', 'step'])", FOREIGN | {"h5py", "rich", "jinja2"}),
         ("import springcheck; springcheck.simulate(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
     ],
 )

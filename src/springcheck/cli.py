@@ -168,6 +168,16 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
     report.set_defaults(command=_report)
 
+    show = commands.add_parser("show", help="a shipped scene as a file to start from")
+    show.add_argument("scene", metavar="SCENE")
+    show.add_argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet")
+    show.set_defaults(command=_show_scene)
+
+    explain = commands.add_parser("explain", help="what a check looks at, what a scheme does")
+    explain.add_argument("word", metavar="NAME", help="a check, a scheme, or a method as engine:method")
+    engine_option(explain)
+    explain.set_defaults(command=_explain)
+
     identify = commands.add_parser("identify", help="which scheme made a trajectory, ours or anyone's")
     identify.add_argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities")
     identify.add_argument(
@@ -398,6 +408,30 @@ def _report(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(plain(f"{into}: {size / 1e3:.0f} kB"))
     return int(bool(content.not_trusted))
+
+
+def _show_scene(options: argparse.Namespace) -> int:
+    from springcheck.physics import scenefile
+
+    text = scenefile.text_of(options.scene)
+    if options.output is None:
+        sys.stdout.write(text)
+        return 0
+    try:
+        with open(options.output, "x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise SpringcheckError(f"cannot write {options.output}: {error.strerror}") from error
+    print(plain(f"{options.output}: run it with springcheck run {options.output}"))
+    return 0
+
+
+def _explain(options: argparse.Namespace) -> int:
+    from springcheck import explain
+
+    for line in explain.lines(options.word):
+        print(line)
+    return 0
 
 
 def _check(options: argparse.Namespace) -> int:

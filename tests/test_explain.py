@@ -1,0 +1,65 @@
+"""`springcheck explain` and `show`: every name has words, and a shown scene is the scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from springcheck import checks, engines, explain, schemes
+from springcheck.cli import main
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+
+
+@pytest.mark.parametrize("check", checks.ALL, ids=lambda check: check.name)
+def test_a_check_says_its_sentence_and_what_it_needs(check: checks.Check) -> None:  # type: ignore[type-arg]
+    said = " ".join(explain.lines(check.name))
+    assert " ".join(check.sentence.split()) in said
+    assert check.needs in said
+
+
+@pytest.mark.parametrize("name", schemes.SCHEMES)
+def test_a_scheme_says_its_step_and_source(name: str) -> None:
+    scheme, said = schemes.SCHEMES[name], list(explain.lines(name))
+    assert sum(line.startswith("  ") for line in said) >= max(1, len(scheme.stages), len(scheme.b))
+    assert scheme.source in " ".join(said)
+
+
+def test_the_steps_are_the_formulas() -> None:
+    verlet = ["  p = p + 1/2 h F", "  q = q + h p/m", "  p = p + 1/2 h F"]
+    assert list(explain.lines("velocity-verlet"))[1:4] == verlet
+    assert "  y = y + h (1/6 f(Y1) + 1/3 f(Y2) + 1/3 f(Y3) + 1/6 f(Y4))" in explain.lines("rk4")
+    assert "Order 1; not symplectic; bounded on a spring: no step" in explain.lines("own:euler")
+
+
+def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:
+    for engine in engines.names():
+        for method in engines.engine(engine).methods:
+            assert next(explain.lines(f"{engine}:{method}")).startswith(f"{engine}:{method}: ")
+
+
+@pytest.mark.parametrize("name", ["rk5", "own:rk5", "nothing:euler", ""])
+def test_a_name_of_nothing_is_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SpringcheckError):
+        list(explain.lines(name))
+    assert main(["explain", name]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_shown_scene_is_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in scenefile.names():
+        assert main(["show", name]) == 0
+        (tmp_path / "my.toml").write_text(capsys.readouterr().out)
+        assert scenefile.load_scene(tmp_path / "my.toml").digest == scenefile.load_scene(name).digest
+
+
+def test_show_replaces_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "my.toml"
+    assert main(["show", "spring", "-o", str(mine)]) == 0
+    assert scenefile.load_scene(mine).digest == scenefile.load_scene("spring").digest
+    mine.write_text("mine")
+    assert main(["show", "spring", "-o", str(mine)]) == 2
+    assert mine.read_text() == "mine"
+    assert main(["show", "sprin"]) == 2
+    assert "spring" in capsys.readouterr().err
