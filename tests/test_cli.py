@@ -327,4 +327,6 @@ def test_a_run_s_report_ends_with_the_place_of_the_store_on_a_line_of_its_own(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["run", "spring", "--method", "own:euler"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "Stored in spring.h5"
+    *_, stored, ahead = capsys.readouterr().out.splitlines()
+    assert stored == "Stored in spring.h5"
+    assert ahead == "next: springcheck plot spring.h5, or springcheck report spring.h5"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -208,8 +209,14 @@ def _repeat(one: Repeat) -> Text:
     )
 
 
+def _next(report: Report) -> Text:
+    """What to do with it now, to be copied into a shell."""
+    name = shlex.quote(str(report.path))
+    return plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim")
+
+
 def _summary(report: Report) -> Lines:
-    """How many verdicts passed, and where the store is."""
+    """How many verdicts passed, where the store is, and what to do with it."""
     passed = sum(1 for v in report.verdicts if v.passed)
     failed = sum(1 for v in report.verdicts if v.passed is False)
     skipped = len(report.verdicts) - passed - failed
@@ -218,6 +225,7 @@ def _summary(report: Report) -> Lines:
     return [
         plain(f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}", look),
         plain(f"Stored in {report.path}", look),
+        _next(report),
     ]
 
 
