@@ -322,7 +322,7 @@ def test_of_a_long_run_some_pieces_are_judged_and_it_is_said(
     assert found["judged_frames"] == judged
 
 
-def test_a_run_s_report_ends_with_the_place_of_the_store_on_a_line_of_its_own(
+def test_a_run_s_report_has_the_place_of_the_store_on_a_line_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
