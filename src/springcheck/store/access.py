@@ -15,8 +15,8 @@ from springcheck.errors import StoreError
 
 Scalar: TypeAlias = str | float | int | bool
 
-MOST_MEMBERS = 20_000
-"""Members of a group."""
+MOST_MEMBERS = 2_000
+"""Members of a group: runs or tables of one file.  Ours have tens; every command slows down with them."""
 MOST_ATTRIBUTES = 2_000
 LONGEST_NAME = 200
 """Characters of a name."""
