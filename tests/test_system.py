@@ -154,14 +154,16 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def test_a_chain_of_many_masses_is_judged_in_memory_that_grows_with_it() -> None:
-    """20,000 masses: n x n doubles take 3.2 GB, compiling about 0.5 GB; ru_maxrss is in kB."""
+    """20,000 masses: n x n doubles would take 3.2 GB; ru_maxrss is in kB."""
     labels = ["own:semi-implicit-euler", "own:implicit-euler"]
+    # on Linux a child begins with the peak of its parent: a small process stands between
+    between = "import subprocess, sys; raise SystemExit(subprocess.call([sys.executable, '-c', sys.argv[1]]))"
     done = subprocess.run(
-        [sys.executable, "-c", LARGE.format(n=20_000, labels=labels)],
+        [sys.executable, "-c", between, LARGE.format(n=20_000, labels=labels)],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
     unit = 1 if sys.platform == "darwin" else 1024
-    assert int(done.stdout) * unit < 1.2e9
+    assert int(done.stdout) * unit < 600e6
