@@ -21,7 +21,8 @@ from springcheck.studies import cluster
 from springcheck.studies.cluster import Cluster
 from springcheck.studies.extremes import measure as extremes
 
-pytest.importorskip("distributed")
+if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
+    pytest.importorskip("distributed")
 
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 
