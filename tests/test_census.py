@@ -23,7 +23,7 @@ OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.chdir(tmp_path)
     yield
-    engines._brought.clear()
+    engines.registry._brought.clear()
 
 
 def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) -> None:

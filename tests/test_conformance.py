@@ -22,7 +22,7 @@ CODE = re.search(r"```python\n(\"\"\"my_engine.*?)```", README.read_text(), re.D
 @pytest.fixture(autouse=True)
 def _nothing_left_over() -> Iterator[None]:
     yield
-    engines._brought.clear()
+    engines.registry._brought.clear()
 
 
 def made(code: str) -> Engine:

@@ -20,7 +20,7 @@ EXAMPLES = Path(__file__).parent / "command-examples"
 def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.chdir(tmp_path)
     yield
-    engines._brought.clear()
+    engines.registry._brought.clear()
 
 
 VERLET = """

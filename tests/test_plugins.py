@@ -24,9 +24,9 @@ EXAMPLE = Path(__file__).parent / "plugin-example"
 @pytest.fixture(autouse=True)
 def _nothing_left_over() -> Iterator[None]:
     yield
-    engines._brought.clear()
-    engines._points.cache_clear()
-    engines._loaded.cache_clear()
+    engines.registry._brought.clear()
+    engines.registry._points.cache_clear()
+    engines.registry._loaded.cache_clear()
 
 
 def springcheck(folder: Path, *arguments: str, path: str = "") -> subprocess.CompletedProcess[str]:
@@ -176,7 +176,7 @@ class Point:
     """An entry point of a package that is not there."""
 
     def __init__(self, name: str, found: object) -> None:
-        self.name, self.value, self.group, self._found = name, f"somewhere:{name}", engines.GROUP, found
+        self.name, self.value, self.group, self._found = name, f"somewhere:{name}", engines.registry.GROUP, found
         self.dist = importlib.metadata.Distribution.from_name("numpy")
 
     def load(self) -> object:
@@ -188,7 +188,7 @@ class Point:
 def test_a_broken_plug_in_is_named_and_takes_no_other_down(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    real = importlib.metadata.entry_points(group=engines.GROUP)
+    real = importlib.metadata.entry_points(group=engines.registry.GROUP)
     broken = [
         Point("gone", ModuleNotFoundError("No module named 'gone'")),
         Point("raises", RuntimeError("no licence\nfound")),
@@ -197,7 +197,7 @@ def test_a_broken_plug_in_is_named_and_takes_no_other_down(
         Point("own", 8),
     ]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [*broken, *real])
-    engines._points.cache_clear()
+    engines.registry._points.cache_clear()
     assert engines.names()[0] == "own"
     assert not {"gone", "raises", "leaves", "number"} & set(engines.names())
     assert set(engines.unusable()) == {"gone", "raises", "leaves", "number", "own (numpy)"}

@@ -67,11 +67,19 @@ def test_the_exact_solution_of_the_unit_spring_is_the_sine() -> None:
     assert same.max_difference[0, 1] > 0.1
 
 
-def test_what_is_shown_is_short() -> None:
+def test_what_is_shown_is_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     run = springcheck.simulate("spring", "own:euler")
     assert repr(run) == "Trajectory('own:euler', 201 frames, 1 particle, t = 0 to 20, complete)"
     shown = Comparison(labels=("a", "<b>"), max_difference=np.array([[0, 0.5], [0.5, 0]]))
     assert repr(shown) == "Comparison of a, <b>: differences up to 0.5"
+    spring = springcheck.load_scene("spring")
+    assert repr(spring) == "Scene('spring', 1 particle, 1 wall-spring, 200 steps of 0.1)"
+    start = springcheck.judge(spring, run)[0]
+    assert repr(start) == "Verdict(own:euler start: passed, 0 of 0)"
+    report = springcheck.run(spring, "own:euler", path="shown.h5")
+    assert repr(report).startswith("Report('spring', 1 method: ")
+    assert len(repr(report)) < 100
     for one in (run, shown):
         html = one._repr_html_()
         assert html.count("<tr>") == html.count("</tr>") == 3

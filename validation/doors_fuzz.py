@@ -118,7 +118,7 @@ def one(number: int) -> str:
         except BaseException as error:
             return f"{' '.join(words)}: {type(error).__name__}: {error}"
         finally:
-            engines._brought.clear()
+            engines.registry._brought.clear()
         lines = said.getvalue().splitlines()
         if status == 2 and len(lines) == 1 and lines[0].startswith("springcheck: "):
             return ""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from importlib import import_module
 from typing import Any, Literal
 
@@ -68,8 +67,7 @@ class Trajectory:
         rows = [("frame", "t", "q", "p")]
         shown = sorted({0, len(self.t) - 1}) if len(self.t) else []
         rows += [(str(i), f"{self.t[i]:g}", _few(self.q[i]), _few(self.p[i])) for i in shown]
-        body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-        return f"<p>{escape(repr(self))}</p><table>{body}</table>"
+        return _table(repr(self), rows)
 
     def to_dataframe(self) -> Any:
         """A pandas DataFrame: a row a frame, columns q0, p0, q1 ... and energy where it was kept; index t."""
@@ -90,6 +88,13 @@ class Trajectory:
         about = {"method": self.label, "scheme": self.scheme, "step": self.step}
         coordinates = {"t": self.t, "particle": range(self.q.shape[1])}
         return xarray.Dataset(kept, coords=coordinates, attrs=about)
+
+
+def _table(title: str, rows: Iterable[Sequence[str]]) -> str:
+    from html import escape
+
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<p>{escape(title)}</p><table>{body}</table>"
 
 
 def _few(values: Floats) -> str:
@@ -121,12 +126,9 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """The differences as a table for notebooks."""
-        head = "".join(f"<th>{escape(label)}</th>" for label in ("", *self.labels))
-        rows = [
-            f"<tr><th>{escape(label)}</th>" + "".join(f"<td>{x:.1e}</td>" for x in row) + "</tr>"
-            for label, row in zip(self.labels, self.max_difference, strict=True)
-        ]
-        return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
+        rows = zip(self.labels, self.max_difference, strict=True)
+        cells = [(label, *(f"{x:.1e}" for x in row)) for label, row in rows]
+        return _table(repr(self), [("", *self.labels), *cells])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,3 +143,10 @@ class Verdict:
     passed: bool | None
     why: str
     """The bound's reason, or why the check does not apply."""
+
+    def __repr__(self) -> str:
+        if self.passed is None:
+            return f"Verdict({self.method} {self.check}: not applicable, {self.why})"
+        outcome = "passed" if self.passed else "FAILED"
+        size = f"{self.value:.3g} of {self.bound:.3g} {self.unit}".rstrip()
+        return f"Verdict({self.method} {self.check}: {outcome}, {size})"

@@ -63,6 +63,11 @@ class Scene:
         for field, value in _checked(self):
             object.__setattr__(self, field, value)
 
+    def __repr__(self) -> str:
+        size = f"{self.n} particle{'s' if self.n != 1 else ''}"
+        terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
+        return f"Scene({self.name!r}, {size}, {terms}, {self.steps} steps of {self.step:g})"
+
     @property
     def n(self) -> int:
         """Number of particles."""

@@ -12,9 +12,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from springcheck.studies.cluster import Cluster
-from springcheck.workers import carried_out
-
 T = TypeVar("T")
 
 
@@ -39,6 +36,8 @@ class Processes:
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
         """Numbers and results of the parts, as they finish."""
+        from springcheck.workers import carried_out
+
         return carried_out([partial(_numbered, i, part) for i, part in enumerate(parts)], self.workers)
 
 
@@ -73,4 +72,8 @@ def _count(text: str) -> int:
 
 def of(options: Namespace) -> Team:
     """Those that the command line asks for."""
-    return Cluster(options.cluster) if options.cluster else Processes(options.workers)
+    if not options.cluster:
+        return Processes(options.workers)
+    from springcheck.studies.cluster import Cluster
+
+    return Cluster(options.cluster)

@@ -10,6 +10,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import zip_longest
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,10 +22,12 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose
-from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.study import Progress
 from springcheck.trajectory import Comparison, Trajectory, Verdict
+
+if TYPE_CHECKING:
+    from springcheck.studies.ensemble.result import Ensemble
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""

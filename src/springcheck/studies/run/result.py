@@ -50,6 +50,18 @@ class Report:
     """Frames of each run that were judged: all of them, unless the run is very long."""
     resumed: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        methods = f"{len(self.runs)} method{'s' if len(self.runs) != 1 else ''}"
+        return f"Report({self.scene.name!r}, {methods}: {self.counts}; {str(self.path)!r})"
+
+    @property
+    def counts(self) -> str:
+        """How many verdicts passed and failed, in words."""
+        passed = sum(verdict.passed is True for verdict in self.verdicts)
+        failed = sum(verdict.passed is False for verdict in self.verdicts)
+        rest = len(self.verdicts) - passed - failed
+        return f"{passed} verdicts passed, {failed} failed, {rest} not applicable"
+
     @property
     def status(self) -> Literal[0, 1, 2]:
         """Exit status: 0 all passed, 1 some verdict failed, 2 nothing measured, or a method not judged."""

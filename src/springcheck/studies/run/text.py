@@ -217,13 +217,11 @@ def _next(report: Report) -> Text:
 
 def _summary(report: Report) -> Lines:
     """How many verdicts passed, where the store is, and what to do with it."""
-    passed = sum(1 for v in report.verdicts if v.passed)
-    failed = sum(1 for v in report.verdicts if v.passed is False)
-    skipped = len(report.verdicts) - passed - failed
+    failed = any(v.passed is False for v in report.verdicts)
     taken = f"; taken up from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
     look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
     return [
-        plain(f"{passed} verdicts passed, {failed} failed, {skipped} not applicable{taken}", look),
+        plain(f"{report.counts}{taken}", look),
         plain(f"Stored in {report.path}", look),
         _next(report),
     ]

@@ -1,0 +1,216 @@
+"""Where engines come from: entry points of installed packages, ours among them, and what a call brings."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+
+from springcheck import schemes
+from springcheck.engines.contract import Engine, Method
+from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.physics import terms
+
+GROUP = "springcheck.engines"
+"""The group of entry points by which engines are found."""
+
+OURS = "springcheck"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Where an engine comes from: a package with its version, or a file."""
+
+    package: str
+    version: str
+
+    def __str__(self) -> str:
+        return f"{self.package} {self.version}".strip()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """An engine that is known by name: loaded where `engine` is there, unusable where `reason` is."""
+
+    origin: Origin
+    point: importlib.metadata.EntryPoint | None = None
+    engine: Engine | None = None
+    reason: str = ""
+
+
+# engines that a call brings: a file's, a function, a command.  They live as long as the process, as an
+# imported module does
+_brought: dict[str, _Found] = {}
+
+
+@cache
+def _points() -> dict[str, _Found]:
+    """Entry points by name, ours first; of two with one name the first counts."""
+    origins: dict[int, Origin] = {}
+    points: list[tuple[bool, bool, str, importlib.metadata.EntryPoint, Origin]] = []
+    for point in importlib.metadata.entry_points(group=GROUP):
+        dist = point.dist
+        # a package's metadata are parsed anew at every look, its README with them
+        if id(dist) not in origins:
+            about = dist.metadata if dist else {"Name": "?", "Version": ""}
+            origins[id(dist)] = Origin(package=about["Name"], version=about["Version"])
+        origin = origins[id(dist)]
+        points.append((origin.package != OURS, point.name != "own", point.name, point, origin))
+    found: dict[str, _Found] = {}
+    for *_, point, origin in sorted(points, key=lambda one: one[:3]):
+        if point.name not in found:
+            found[point.name] = _Found(origin=origin, point=point)
+        elif found[point.name].origin != origin:
+            reason = f"its name is taken by the engine of {found[point.name].origin}"
+            found[f"{point.name} ({origin.package})"] = _Found(origin=origin, reason=reason)
+    return found
+
+
+def _known() -> dict[str, _Found]:
+    return _points() | _brought
+
+
+@cache
+def _loaded(point: importlib.metadata.EntryPoint) -> Engine | str:
+    """The engine behind an entry point, or why there is none, whatever the code of others raises."""
+    try:
+        found = point.load()
+        return _checked(found, point.name)
+    except SpringcheckError as error:
+        return str(error)
+    except (Exception, SystemExit) as error:
+        return f"{point.value} cannot be loaded: {told(error)}"
+
+
+def _checked(found: object, name: str = "") -> Engine:
+    """What claims to be an engine, if it keeps the contract.  Its schemes are then known."""
+    if not isinstance(found, Engine):
+        raise MethodError(f"it is of type {type(found).__name__}, not a springcheck.engines.Engine")
+    if not isinstance(found.name, str) or not found.name.replace("-", "").replace("_", "").isalnum():
+        raise MethodError(f"its name {found.name!r} must be of letters, digits, - and _")
+    if name and found.name != name:
+        raise MethodError(f"it calls itself {found.name!r}, and its entry point {name!r}")
+    for what in ("start", "version", "arithmetic", "convention"):
+        if not callable(getattr(found, what)):
+            raise MethodError(f"its {what} is of type {type(getattr(found, what)).__name__}, not a function")
+    if not found.methods:
+        raise MethodError("it has no methods")
+    for scheme in found.schemes:
+        schemes.bring(scheme)
+    for key, one in found.methods.items():
+        if not isinstance(one, Method) or one.name != key:
+            raise MethodError(f"its method {key!r} must be a springcheck.engines.Method of this name")
+        scheme = schemes.scheme(one.scheme)
+        if one.adaptive and scheme.one_step:
+            raise MethodError(f"its method {key!r} is adaptive, but {scheme.title} has a fixed step")
+    return found
+
+
+def names() -> tuple[str, ...]:
+    """Names of all engines that can be loaded, our own first."""
+    return tuple(name for name in _known() if isinstance(_find(name), Engine))
+
+
+def unusable() -> dict[str, str]:
+    """Why each engine that is registered but cannot be used cannot, by name."""
+    found = {name: (_find(name), one.origin) for name, one in _known().items()}
+    return {
+        name: f"engine {name} of {where} cannot be used: {what}"
+        for name, (what, where) in found.items()
+        if isinstance(what, str)
+    }
+
+
+def _find(name: str) -> Engine | str | None:
+    """An engine, why it cannot be used, or None where there is none of this name."""
+    found = _known().get(name)
+    if found is None:
+        return None
+    if found.point is not None:
+        return _loaded(found.point)
+    return found.engine or found.reason
+
+
+def engine(name: str) -> Engine:
+    """What an engine says of itself; imports no library."""
+    found = _find(name)
+    if isinstance(found, Engine):
+        return found
+    if isinstance(found, str):
+        raise MethodError(f"engine {name} of {origin(name)} cannot be used: {found}")
+    if not _known():
+        raise MethodError("no engine is registered, not even ours: install springcheck again, by pip install")
+    known = names()
+    raise MethodError(f"unknown engine {name!r}{nearest(name, known)}; known are {', '.join(known)}")
+
+
+def origin(name: str) -> Origin:
+    """The package or file that an engine comes from."""
+    return _known()[name].origin
+
+
+def bring(found: Engine, where: str, version: str = "") -> Engine:
+    """Make an engine known for the rest of this process.  MethodError where it does not keep the contract."""
+    found = _checked(found)
+    taken = _points().get(found.name)
+    if taken is not None:
+        raise MethodError(f"{where}: the name {found.name!r} is taken by the engine of {taken.origin}")
+    _brought[found.name] = _Found(origin=Origin(package=where, version=version), engine=found)
+    return found
+
+
+def is_brought(name: str) -> bool:
+    """Whether a call has brought it, rather than a package."""
+    return name in _brought
+
+
+@contextmanager
+def brought(found: Engine, where: str) -> Iterator[Engine]:
+    """An engine that is known within this context only."""
+    bring(found, where)
+    try:
+        yield found
+    finally:
+        del _brought[found.name]
+
+
+def from_file(path: Path) -> Engine | None:
+    """Bring the engine of a Python file: its one `Engine`, or the one that it calls ENGINE.
+
+    None for a file that only registers terms.
+    """
+    before = terms.known()
+    module = module_of(path)
+    there = {id(x): x for x in vars(module).values() if isinstance(x, Engine)}
+    found = getattr(module, "ENGINE", None) or next(iter(there.values()), None)
+    if found is None and terms.known() != before:
+        return None
+    if found is None:
+        raise MethodError(f"{path} has no engine: a springcheck.engines.Engine named ENGINE")
+    try:
+        # the file's digest stands for its version: runs of an older one are not taken up
+        return bring(found, str(path), sha256(path.read_bytes()).hexdigest()[:12])
+    except MethodError as error:
+        text = str(error)
+        raise MethodError(text if text.startswith(str(path)) else f"engine of {path}: {text}") from error
+
+
+def module_of(path: Path) -> ModuleType:
+    """A Python file as a module.  MethodError, with the line, where it cannot be run."""
+    if not path.is_file():
+        raise MethodError(f"{path}: there is no such file")
+    spec = importlib.util.spec_from_file_location(f"springcheck_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise MethodError(f"{path} is not a Python file: its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise MethodError(f"{path} cannot be imported: {told(error, path)}") from error
+    return module
