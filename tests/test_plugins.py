@@ -176,7 +176,8 @@ class Point:
     """An entry point of a package that is not there."""
 
     def __init__(self, name: str, found: object) -> None:
-        self.name, self.value, self.group, self._found = name, f"somewhere:{name}", engines.registry.GROUP, found
+        self.name, self.value, self._found = name, f"somewhere:{name}", found
+        self.group = engines.registry.GROUP
         self.dist = importlib.metadata.Distribution.from_name("numpy")
 
     def load(self) -> object:
