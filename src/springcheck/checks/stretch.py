@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 JOINED = 32
 """Joined particles up to which tangent maps are carried as matrices (2n, 2n)."""
 
-NUMBERS = 1 << 21
-"""Entries of tangent maps that are kept at a time: 32 MB."""
+NUMBERS = 1 << 20
+"""Numbers of states and tangent maps that are kept at a time: 16 MB, and a few times that on the way."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,8 +62,8 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
             turns=np.zeros(len(q), dtype=np.longdouble),
         )  # fmt: skip
     size = 2 if case.judged.system.is_separate else 2 * q.shape[1]
-    each = steps * size * 2 * q.shape[1]
-    rows = len(q) if case.straight else max(1, NUMBERS // each)
+    each = steps * q.shape[1] * (8 if case.straight else 2 * size)
+    rows = max(1, NUMBERS // each)
     parts = [_many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
     return Stretch(**{name: np.concatenate([getattr(x, name) for x in parts]) for name in Stretch.__slots__})
 
@@ -81,37 +81,35 @@ def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> 
 
 def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     separate = case.judged.system.is_separate
-    maps: list[Extended] = []
-    bounds: list[Extended] = []
-    reach_q, reach_p = np.abs(q), np.abs(p)
-    turns = np.zeros(len(q), dtype=np.longdouble)
-    bends = case.scheme.implicit and not case.straight
+    on_q, on_p = np.empty((2, steps + 1, *q.shape), dtype=np.longdouble)
+    on_q[0], on_p[0] = q, p
     with np.errstate(all="ignore"):
-        one = tangent(case, q[:1], p[:1]) if case.straight else None
-        for _ in range(steps):
-            if one is None:
-                maps.append(tangent(case, q, p))
-            end, bound = _one(case, q, p)
-            if bends:
-                turns = np.maximum(turns, _turn(case, end[0]))
-            bounds.append(_pack(*bound, separate))
-            q, p = end
-            reach_q, reach_p = np.maximum(reach_q, np.abs(q)), np.maximum(reach_p, np.abs(p))
+        for i in range(steps):
+            on_q[i + 1], on_p[i + 1] = case.step(on_q[i], on_p[i])
+        # what belongs to each step alone is worked out for all steps at once
+        at_q, at_p = (x[:-1].reshape(-1, q.shape[1]) for x in (on_q, on_p))
+        _, bound = _one(case, at_q, at_p)
+        bounds = _pack(*(x.reshape(steps, *q.shape) for x in bound), separate)
+        if case.straight:
+            one = tangent(case, q[:1], p[:1])
+            maps = np.broadcast_to(one, (steps, *one.shape))
+        else:
+            maps = tangent(case, at_q, at_p)
+            maps = maps.reshape(steps, len(q), *maps.shape[1:])
+        turns = np.zeros(len(q), dtype=np.longdouble)
+        if case.scheme.implicit and not case.straight:
+            turns = np.max([_turn(case, at) for at in on_q[1:]], axis=0)
         carried = np.zeros_like(bounds[0])
-        power: Extended = np.broadcast_to(
-            np.eye(carried.shape[-1], dtype=np.longdouble), (*carried.shape[:-1], *2 * carried.shape[-1:])
-        )
-        if one is not None:
-            power = power[:1]
+        power: Extended = np.broadcast_to(np.eye(maps.shape[-1], dtype=np.longdouble), maps.shape[1:])
         for i in reversed(range(steps)):
             carried = carried + _apply(np.abs(power), bounds[i])
             if i:
-                power = power @ (maps[i] if one is None else one)
+                power = power @ maps[i]
     of_q, of_p = _unpack(carried, separate)
     last_q, last_p = _unpack(bounds[-1], separate)
     return Stretch(
-        q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach_q, reach_p=reach_p, last_q=last_q, last_p=last_p,
-        turns=turns,
+        q=on_q[-1], p=on_p[-1], of_q=of_q, of_p=of_p, last_q=last_q, last_p=last_p, turns=turns,
+        reach_q=np.max(np.abs(on_q), axis=0), reach_p=np.max(np.abs(on_p), axis=0),
     )  # fmt: skip
 
 

@@ -112,7 +112,7 @@ class Term:
         """Its numbers by the names of their fields, (s,) each: the ends of each row, then the columns."""
         return {name: getattr(self, name) for name in (*self.ends, *(c.field for c in self.columns))}
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Floats, ...]:
         """What the functions of the law take after u, each (s,)."""
         return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)

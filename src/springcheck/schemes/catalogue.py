@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -317,6 +318,7 @@ _ALL = (
 SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
 
 
+@lru_cache(maxsize=4096)
 def number(c: Coefficient, width: type[Any]) -> Any:
     """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
     return width(c.numerator) / width(c.denominator) if isinstance(c, Fraction) else width(c)
