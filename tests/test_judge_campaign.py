@@ -6,7 +6,6 @@ import importlib.util
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -21,15 +20,15 @@ _spec.loader.exec_module(judge_campaign)
 
 def test_the_campaign_has_more_than_a_hundred_kinds_of_faults() -> None:
     assert len(judge_campaign.FAULTS) >= 100
-    assert len(judge_campaign.LEGAL) == 7
+    assert len(judge_campaign.LEGAL) == 9
 
 
-@pytest.mark.parametrize("first", [0, 10])
+@pytest.mark.parametrize("first", [0, 100])
 def test_no_legal_engine_is_rejected_and_no_large_fault_is_missed(first: int) -> None:
-    found = judge_campaign.campaign(first, 10)
-    assert found.sets >= 20
+    found = judge_campaign.campaign(first, 20)
+    assert found.sets >= 60
     assert found.alarms == []
     assert found.missed == []
     assert found.numbers == []
-    assert found.seen >= 5
-    assert np.median(found.noise) < 1
+    assert found.seen >= 20
+    assert max(found.noise.values()) < 0.5

@@ -1,32 +1,32 @@
 """Random scenes, legal engines and faulty ones: false alarms and misses of the judge, counted.
 
-    python validation/judge_campaign.py [FIRST COUNT]
+    python validation/judge_campaign.py [FIRST COUNT [FILE]]
 
 Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
-ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; seven
-legal orders of operation (as written, in extended precision and rounded once a step, velocities instead
-of momenta, terms in another order, row by row, fused products, the one-step matrix); and faults of more
-than a hundred kinds: every parameter of every term and of the grid, coefficients of the schemes, every
-other scheme, and what happens to states on their way.
+ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; nine
+legal orders of operation (as written, in extended precision and rounded once a step or never, velocities
+instead of momenta, terms in another order, row by row, fused products, the one-step matrix, velocities
+rebuilt from positions); and faults of more than a hundred kinds: every parameter of every term and of the
+grid, coefficients of the schemes, every other scheme, and what happens to states on their way.
 
-A set is all verdicts on one trajectory.  A false alarm is a failed verdict on a legal engine.  A fault
-counts where its effect on a recorded frame exceeds 20 allowances, or what the scheme rounds along a step
-if that is more: the frame is that far from the scheme's own steps, in extended precision, from the frame
-before.  It is missed where no verdict fails and the step defect does not say that it cannot tell.
-Allowances are the judge's own; the noise of the legal engines, printed beside, says how far they are from
-what rounding really does.
+A set is all verdicts on one trajectory; a scene has two of legal engines and two of faulty ones.  A false
+alarm is a failed verdict on a legal engine.  A fault counts where its effect on a recorded frame exceeds 20
+allowances, or what the scheme rounds along a step if that is more: the frame is that far from the scheme's
+own steps, in extended precision, from the frame before.  It is missed where no verdict fails and the step
+defect does not say that it cannot tell.  Allowances are the judge's own; the noise of the legal engines,
+printed beside, says how far they are from what rounding really does.
 
-Measured on two shared cores: 265 sets, 1662 verdicts, seeds 0 to 59 and 100000 to 100039; no false
-alarm, legal engines 0.04 of the bound of a step in the middle and 0.13 at most; 165 faults, 141 of them
-above 20 allowances, all of these seen.
+With FILE every block of 250 scenes is kept in it, a line of JSON each: blocks that are there are not run
+again, and what is printed is the sum of all blocks of the file.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -41,8 +41,6 @@ from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
 
 FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow)
-STEPS = 2500
-"""Steps of a run at most."""
 COUNTED = 20.0
 """Allowances from which a fault counts."""
 
@@ -102,10 +100,20 @@ def random_scene(rng: np.random.Generator, scheme: schemes.Scheme) -> Scene:
     hw = float(rng.choice([rng.uniform(0.02, 1.2), 10 ** rng.uniform(-3, -0.5)]))
     if scheme.implicit and made.system.is_linear and rng.random() < 0.5:
         hw = float(10 ** rng.uniform(0, 4))
-    every = int(rng.choice([1, 1, 1, 2, 7, 10, 50, int(10 ** rng.uniform(0, 3.3))]))
-    frames = int(max(2, min(120, STEPS // every)))
+    every, frames = grid(rng)
     sign = -1 if rng.random() < 0.15 and not damped else 1
     return replace(made, step=sign * hw / w, every=every, steps=every * frames, quantities=("q", "p"))
+
+
+def grid(rng: np.random.Generator) -> tuple[int, int]:
+    """Steps between frames and frames after the start: one run in 60 goes up to 2000 steps a frame."""
+    x = rng.random()
+    if x < 0.6:
+        return 1, int(10 ** rng.uniform(0.3, 1.9))
+    if x < 0.98:
+        every = int(10 ** rng.uniform(0.3, 1.6))
+        return every, max(1, int(10 ** rng.uniform(0.3, 1.9)) // every)
+    return int(10 ** rng.uniform(1.6, 3.302)), int(rng.integers(1, 4))
 
 
 # legal engines
@@ -123,6 +131,31 @@ def wide(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step
     def step(i: int, q: Floats, p: Floats) -> State:
         a, b = right(q, p)
         return a.astype(np.float64), b.astype(np.float64)
+
+    return step
+
+
+def compensated(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """In extended precision throughout, as compensated sums are: recorded states alone are rounded."""
+    right = extended(scene, scheme)
+    kept: list[Any] = [scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)]
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        kept[:] = right(*kept)
+        return kept[0].astype(np.float64), kept[1].astype(np.float64)
+
+    return step
+
+
+def rebuilt(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """Velocities rebuilt from the way of a step, times the rounded reciprocal of the step."""
+    h, m = scene.step, scene.m
+    inverse = 1 / h
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        v = p / m + h * (scene.system.force(q, p) / m)
+        new = q + h * v
+        return new, np.asarray(m * ((new - q) * inverse), np.float64)
 
     return step
 
@@ -219,19 +252,24 @@ LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] =
     "row by row": row_by_row,
     "fused": fused,
     "matrix": matrix,
+    "compensated": compensated,
+    "rebuilt": rebuilt,
 }
 
 
 def extended(scene: Scene, scheme: schemes.Scheme) -> Callable[[Any, Any], tuple[Any, Any]]:
     """The scheme's own step in extended precision."""
     system = scene.system
-    stiff = (lambda q: (system.hessian(q), True)) if scheme.implicit else None
     rate = system.friction_rates if system.is_damped else None
+
+    def stiff(q: Any) -> tuple[Any, bool]:
+        rows = [system.hessian(row) for row in np.atleast_2d(q)]
+        return np.stack(rows).reshape(*q.shape, scene.n), True
 
     def step(q: Any, p: Any) -> tuple[Any, Any]:
         return schemes.step(
             scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=scene.step, m=scene.m,
-            force=system.force, stiffness=stiff, parts=system.parts, rate=rate,
+            force=system.force, stiffness=stiff if scheme.implicit else None, parts=system.parts, rate=rate,
         )  # fmt: skip
 
     return step
@@ -477,6 +515,7 @@ class Counts:
 
     sets: int = 0
     verdicts: int = 0
+    legal: int = 0
     alarms: list[str] = field(default_factory=list)
     faults: int = 0
     large: int = 0
@@ -486,15 +525,27 @@ class Counts:
     missed: list[str] = field(default_factory=list)
     numbers: list[str] = field(default_factory=list)
     """Verdicts whose value or bound is no finite number."""
-    kinds: Counter[str] = field(default_factory=Counter)
-    noise: list[float] = field(default_factory=list)
+    kinds: dict[str, int] = field(default_factory=dict)
+    """Faults above `COUNTED` allowances of each kind."""
+    noise: dict[str, float] = field(default_factory=dict)
+    """The largest part of its bound that each check has seen in a legal engine."""
+
+    def add(self, other: Counts) -> None:
+        """Another block's counts to these."""
+        for one in fields(self):
+            mine, more = getattr(self, one.name), getattr(other, one.name)
+            if one.name == "kinds":
+                more = {key: mine.get(key, 0) + value for key, value in more.items()}
+            elif one.name == "noise":
+                more = {key: max(mine.get(key, 0.0), value) for key, value in more.items()}
+            setattr(self, one.name, {**mine, **more} if isinstance(mine, dict) else mine + more)
 
     def __str__(self) -> str:
-        noise = np.array(self.noise or [0.0])
+        noise = ", ".join(f"{name} {x:.2g}" for name, x in sorted(self.noise.items()))
         return (
-            f"{self.sets} sets, {self.verdicts} verdicts; legal engines: {len(self.alarms)} false alarms, "
-            f"noise {np.median(noise):.2g} of the bound in the middle and {np.max(noise):.2g} at most; "
-            f"{self.faults} faults of {len(self.kinds)} kinds, {self.large} above {COUNTED:g} allowances: "
+            f"{self.sets} sets, {self.verdicts} verdicts; {self.legal} runs of legal engines: "
+            f"{len(self.alarms)} false alarms, at most of the bound: {noise}; "
+            f"{self.faults} faults, {self.large} of {len(self.kinds)} kinds above {COUNTED:g} allowances: "
             f"{self.seen} seen, {self.untold} not told, {len(self.missed)} missed; {self.seen_below} smaller "
             f"ones seen; {len(self.numbers)} verdicts without a number"
         )
@@ -514,52 +565,53 @@ def judged(counts: Counts, scene: Scene, made: Trajectory, what: str) -> list[An
 
 
 def one(seed: int, counts: Counts) -> None:
-    """One scene: a legal engine, and two faults."""
+    """One scene: two legal engines, and two faults."""
     rng = np.random.default_rng([12, seed])
     scheme = schemes.SCHEMES[str(rng.choice(FIXED))]
     scene = random_scene(rng, scheme)
-    order = str(rng.choice(list(LEGAL)))
     with np.errstate(all="ignore"):
-        right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
-        what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
-        verdicts = judged(counts, scene, right, what)
-        failed = [v for v in verdicts if v.passed is False]
-        counts.alarms += [f"{what}: {v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}" for v in failed]
-        steps = [v for v in verdicts if v.check == "step-defect" and v.passed is not None]
-        counts.noise += [v.value / v.bound for v in steps]
+        for order in map(str, rng.choice(list(LEGAL), 2, replace=False)):
+            if order == "rebuilt" and scheme.name != "semi-implicit-euler":
+                continue
+            right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
+            right = replace(right, rebuilds_velocity=order == "rebuilt")
+            what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
+            verdicts = judged(counts, scene, right, what)
+            counts.legal += 1
+            failed = [v for v in verdicts if v.passed is False]
+            counts.alarms += [f"{what}: {v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}" for v in failed]
+            for v in verdicts:
+                if v.passed is not None and v.bound > 0:
+                    counts.noise[v.check] = max(counts.noise.get(v.check, 0.0), v.value / v.bound)
         for name in rng.choice(list(FAULTS), 2, replace=False):
             eps = float(10 ** rng.uniform(-16, -0.3))
             wrong = FAULTS[str(name)](scene, scheme, eps, rng)
             if wrong is None or len(wrong.t) < 2:
                 continue
             what = f"seed {seed}, {scheme.name}, {name} by {eps:.2g}, every {scene.every}"
-            _fault(counts, scene, wrong, what)
-            counts.kinds[str(name)] += 1
+            _fault(counts, scene, wrong, str(name), what)
 
 
-def _fault(counts: Counts, scene: Scene, wrong: Trajectory, what: str) -> None:
+def _fault(counts: Counts, scene: Scene, wrong: Trajectory, kind: str, what: str) -> None:
     counts.faults += 1
     case = checks.Case(trajectory=wrong, scene=scene)
     effect = 0.0
     if case.ahead is not None:
         right = extended(scene, case.scheme)
         q, p = wrong.q[:-1].astype(np.longdouble), wrong.p[:-1].astype(np.longdouble)
-        for row in range(len(q)):
-            a, b = q[row], p[row]
-            for _ in range(scene.every):
-                a, b = right(a, b)
-            off = np.abs(a - wrong.q[row + 1]), np.abs(b - wrong.p[row + 1])
-            allowed = case.ahead.of_q[row], case.ahead.of_p[row]
-            ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, allowed, strict=True)]
-            effect = max(effect, float(np.nanmax(np.append(ratios, 0.0))))
-            if effect > 1e3 * COUNTED:
-                break
+        for _ in range(scene.every):
+            q, p = right(q, p)
+        off = np.abs(q - wrong.q[1:]), np.abs(p - wrong.p[1:])
+        allowed = case.ahead.of_q, case.ahead.of_p
+        ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, allowed, strict=True)]
+        effect = float(np.nanmax([0.0, *np.ravel(ratios)]))
     verdicts = judged(counts, scene, wrong, what)
     seen = any(v.passed is False for v in verdicts)
     if effect <= max(COUNTED, case.roundings):
         counts.seen_below += seen
         return
     counts.large += 1
+    counts.kinds[kind] = counts.kinds.get(kind, 0) + 1
     defect = next(v for v in verdicts if v.check == "step-defect")
     if seen:
         counts.seen += 1
@@ -569,20 +621,39 @@ def _fault(counts: Counts, scene: Scene, wrong: Trajectory, what: str) -> None:
         counts.missed.append(f"{what}: effect {effect:.3g}")
 
 
-def campaign(first: int, count: int, *, said: Callable[[str], None] | None = None) -> Counts:
-    """So many scenes, three verdict sets each."""
+BLOCK = 250
+"""Scenes of one line of the file."""
+
+
+def campaign(first: int, count: int) -> Counts:
+    """So many scenes, two legal engines and two faults of each."""
     counts = Counts()
     for seed in range(first, first + count):
         one(seed, counts)
-        if said and (seed - first) % 500 == 499:
-            said(str(counts))
     return counts
 
 
+def kept(file: Path) -> dict[int, Counts]:
+    """The blocks of a file by their first scene."""
+    lines = file.read_text().splitlines() if file.is_file() else []
+    return {found.pop("first"): Counts(**found) for found in map(json.loads, lines)}
+
+
 if __name__ == "__main__":
-    asked = arguments(__doc__, first=0, count=2000)
-    found = campaign(asked.first, asked.count, said=lambda text: print(text, flush=True))
-    print(found)
-    for line in (*found.alarms, *found.missed, *found.numbers):
+    asked = arguments(__doc__, first=0, count=500, file="")
+    total = Counts()
+    blocks = kept(Path(asked.file)) if asked.file else {}
+    for block in blocks.values():
+        total.add(block)
+    for start in range(asked.first, asked.first + asked.count, BLOCK):
+        if start in blocks:
+            continue
+        found = campaign(start, min(BLOCK, asked.first + asked.count - start))
+        total.add(found)
+        if asked.file:
+            with Path(asked.file).open("a") as out:
+                out.write(json.dumps({"first": start, **asdict(found)}) + "\n")
+        print(total, flush=True)
+    for line in (*total.alarms, *total.missed, *total.numbers):
         print(" ", line)
-    sys.exit(bool(found.alarms or found.missed or found.numbers))
+    sys.exit(bool(total.alarms or total.missed or total.numbers))
