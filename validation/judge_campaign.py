@@ -382,6 +382,8 @@ def bit(number: int, momentum: bool) -> Fault:
 
     def change(scene: Scene, eps: float, q: Floats, p: Floats, rng: np.random.Generator) -> State:
         x = p if momentum else q
+        if len(x) < 2:
+            return q, p
         bits = x.view(np.uint64)
         bits[int(rng.integers(1, len(x))), int(rng.integers(scene.n))] ^= np.uint64(1 << number)
         return q, p

@@ -36,8 +36,8 @@ def propagator(bench: Bench) -> Verdict:
     if why_not:
         return bench.not_applicable("propagator", why_not)
     case, _ = bench.copies
-    if len(case.trajectory.t) < 2:
-        return bench.verdict("propagator", float("inf"), float(case.roundings), "roundings", ENDED)
+    if why_no_step := _no_step(case):
+        return bench.verdict("propagator", float("inf"), float(case.roundings), "roundings", why_no_step)
     q, p = case.next_states
     of_q, of_p = case.allowance
     off = np.maximum(np.abs(q - case.trajectory.q[1:]) / of_q, np.abs(p - case.trajectory.p[1:]) / of_p)
@@ -51,6 +51,15 @@ def propagator(bench: Bench) -> Verdict:
 
 
 ENDED = "the engine made no step that ends in finite numbers"
+
+
+def _no_step(case: Case) -> str | None:
+    """Why an engine's single steps of all pushes cannot be looked at, or None."""
+    run, scene = case.trajectory, case.scene
+    if len(run.t) < 2 or not np.isfinite([run.q, run.p]).all():
+        return ENDED
+    started = np.array_equal(run.q[0], scene.q) and np.array_equal(run.p[0], scene.p)
+    return None if started else "its first frame is not the start"
 
 
 def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
@@ -87,8 +96,8 @@ def determinant(bench: Bench) -> Verdict:
     why_not = _no_matrix(bench)
     if why_not:
         return bench.not_applicable("determinant", why_not)
-    if len(bench.copies[0].trajectory.t) < 2:
-        return bench.verdict("determinant", float("inf"), 0.0, "relative", ENDED)
+    if why_no_step := _no_step(bench.copies[0]):
+        return bench.verdict("determinant", float("inf"), 0.0, "relative", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
     inverse = np.linalg.inv(ideal)
     relative = inverse @ departure
@@ -121,8 +130,8 @@ def symplecticity(bench: Bench) -> Verdict:
         return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
     if bench.scene.system.is_damped:
         return bench.not_applicable("symplecticity", "friction contracts area")
-    if len(bench.copies[0].trajectory.t) < 2:
-        return bench.verdict("symplecticity", float("inf"), 0.0, "of an action", ENDED)
+    if why_no_step := _no_step(bench.copies[0]):
+        return bench.verdict("symplecticity", float("inf"), 0.0, "of an action", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
     n = bench.scene.n
     form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
@@ -186,6 +195,8 @@ def reversibility(bench: Bench) -> Verdict:
     if out.outcome.status != "complete" or not steps:
         return bench.not_applicable("reversibility", "the run did not come to its end")
     state = out.q[-1], -out.p[-1]
+    if not np.isfinite(state).all():
+        return bench.verdict("reversibility", float("inf"), float(case.roundings), "roundings", ENDED)
     # kick-drift and drift-kick undo each other; they differ by the first stage, at start and end
     if two_stage:
         state = _shifted(case.judged, scheme, state, -1)

@@ -226,17 +226,11 @@ def arithmetic(case: Case) -> Verdict:
     # at rest the only rounding is underflow, which is the same in both
     if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
-    return Verdict(
-        method=seen.method,
-        check="arithmetic",
-        value=seen.value,
-        bound=seen.bound,
-        unit=seen.unit,
-        passed=bool(alone >= FLOOR and seen.value <= seen.bound),
-        why=seen.why
-        if seen.passed is False
-        else f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better",
-    )
+    if seen.passed is False:
+        why = seen.why
+    else:
+        why = f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better"
+    return replace(seen, check="arithmetic", passed=bool(alone >= FLOOR and seen.passed), why=why)
 
 
 FLOOR = 2.0**-8

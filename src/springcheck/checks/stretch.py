@@ -89,7 +89,8 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
         # what belongs to each step alone is worked out for all steps at once
         at_q, at_p = (x[:-1].reshape(-1, q.shape[1]) for x in (on_q, on_p))
         _, bound = _one(case, at_q, at_p)
-        bounds = _pack(*(x.reshape(steps, *q.shape) for x in bound), separate)
+        each_q, each_p = (x.reshape(steps, *q.shape) for x in bound)
+        bounds = _pack(each_q, each_p, separate)
         if case.straight:
             one = tangent(case, q[:1], p[:1])
             maps = np.broadcast_to(one, (steps, *one.shape))

@@ -6,18 +6,31 @@ import numpy as np
 
 from springcheck.trajectory import Verdict
 
+BEYOND = 2.0**511
+"""Stands for every value that fails and is no number or larger: a verdict and its ratio are numbers."""
+
 
 def within(method: str, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
-    """Passed only if the value is a number within the bound.  A bound that is infinite says nothing."""
-    if bound == np.inf and not np.isnan(value):
+    """Passed only if the value is a number within the bound.  A bound that is infinite says nothing.
+
+    The verdict's value and bound are finite numbers: `BEYOND` stands for a value that is none, and fails.
+    """
+    if np.isposinf(bound) and not np.isnan(value):
         return not_applicable(method, check, "what rounding or the tolerance allows is beyond all numbers")
+    passed = bool(-np.inf < value <= bound < np.inf)
+    if not passed and not (np.isfinite(bound) and bound >= 0):
+        value, bound, why = BEYOND, 0.0, f"what is allowed is no number; {why}"
+    elif not passed and not np.isfinite(value):
+        why = f"what was found is no finite number; {why}"
+    if not passed and not abs(value) <= BEYOND:
+        value, bound = BEYOND, min(bound, BEYOND / 2)
     return Verdict(
         method=method,
         check=check,
-        value=value,
-        bound=bound,
+        value=float(value),
+        bound=float(bound),
         unit=unit,
-        passed=bool(value <= bound),
+        passed=passed,
         why=why,
     )
 

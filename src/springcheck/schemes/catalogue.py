@@ -318,7 +318,11 @@ _ALL = (
 SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
 
 
-@lru_cache(maxsize=4096)
-def number(c: Coefficient, width: type[Any]) -> Any:
+def number(c: Coefficient, width: Any) -> Any:
     """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
+    return _rounded(c, width)
+
+
+@lru_cache(maxsize=4096)
+def _rounded(c: Coefficient, width: Any) -> Any:
     return width(c.numerator) / width(c.denominator) if isinstance(c, Fraction) else width(c)
