@@ -3,11 +3,11 @@
     python validation/judge_campaign.py [FIRST COUNT [FILE]]
 
 Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
-ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; nine
-legal orders of operation (as written, in extended precision and rounded once a step or never, velocities
-instead of momenta, terms in another order, row by row, fused products, the one-step matrix, velocities
-rebuilt from positions); and faults of more than a hundred kinds: every parameter of every term and of the
-grid, coefficients of the schemes, every other scheme, and what happens to states on their way.
+ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; ten legal
+orders of operation (as written, in extended precision and rounded once a step or never, velocities instead
+of momenta, terms in another order, row by row, fused products, the one-step matrix less 1 and whole,
+velocities rebuilt from positions); and faults of more than a hundred kinds: every parameter of every term
+and of the grid, coefficients of the schemes, every other scheme, and what happens to states on their way.
 
 A set is all verdicts on one trajectory; a scene has two of legal engines and two of faulty ones.  A false
 alarm is a failed verdict on a legal engine.  A fault counts where its effect on a recorded frame exceeds 20
@@ -224,22 +224,42 @@ def fused(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Ste
     return step
 
 
+def affine(scene: Scene, scheme: schemes.Scheme) -> tuple[Any, Any]:
+    """The one-step matrix (2n, 2n) of a linear scene and what the origin becomes (2n,), extended."""
+    right = extended(scene, scheme)
+    none = np.zeros(scene.n, dtype=np.longdouble)
+    o = np.concatenate(right(none, none))
+    rows = np.eye(2 * scene.n).astype(np.longdouble)
+    return np.stack([np.concatenate(right(*np.split(row, 2))) - o for row in rows], axis=1), o
+
+
 def matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
     """The one-step matrix less 1 and what the origin becomes, for linear scenes."""
     if not scene.system.is_linear or scheme.implicit:
         return written(scene, scheme, rng)
-    n = scene.n
-    right = extended(scene, scheme)
-    none = np.zeros(n, dtype=np.longdouble)
-    o = np.concatenate(right(none, none))
-    columns = [np.concatenate(right(*np.split(row, 2))) - o for row in np.eye(2 * n).astype(np.longdouble)]
-    less = (np.stack(columns, axis=1) - np.eye(2 * n)).astype(np.float64)
-    constant = o.astype(np.float64)
+    right, origin = affine(scene, scheme)
+    less, constant = (right - np.eye(2 * scene.n)).astype(np.float64), origin.astype(np.float64)
 
     def step(i: int, q: Floats, p: Floats) -> State:
         z = np.concatenate([q, p])
         z = z + (less @ z + constant)
-        return z[:n], z[n:]
+        return z[: scene.n], z[scene.n :]
+
+    return step
+
+
+def whole_matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """The one-step matrix as it is, its elements near 1 rounded: of scenes without constant forces."""
+    if not scene.system.is_linear or scheme.implicit:
+        return written(scene, scheme, rng)
+    right, origin = affine(scene, scheme)
+    if np.any(origin != 0):
+        return written(scene, scheme, rng)
+    rounded = right.astype(np.float64)
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        z = rounded @ np.concatenate([q, p])
+        return z[: scene.n], z[scene.n :]
 
     return step
 
@@ -254,6 +274,7 @@ LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] =
     "matrix": matrix,
     "compensated": compensated,
     "rebuilt": rebuilt,
+    "whole matrix": whole_matrix,
 }
 
 

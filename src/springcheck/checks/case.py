@@ -209,8 +209,8 @@ class Case:
     def growth(self) -> tuple[Floats, Extended]:
         """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
 
-        One rounding a step, enlarged by the map from the step where it arises, and all of one sign.  The
-        unit is a root of an energy: see `Norm.size`.
+        One rounding a step, enlarged by the map from the step where it arises, and all of one sign; of a
+        splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.size`.
         """
         total, grown = schemes.amplification(self.matrices, self.w, self.steps)
         size = self.norm.size(*self.allowance)
@@ -221,7 +221,28 @@ class Case:
             # a piece of a long run: what came before it is bounded by the envelope of the motion
             before = self.envelope, (self.scene.q, self.scene.p)
             first = np.max([self.norm.size(*self.allowance_at(*x)) for x in before])
-        return np.asarray(self.roundings * total), np.asarray(np.maximum(size, first * grown))
+        bound = np.asarray(self.roundings * total)
+        condition = float(np.max(schemes.condition(self.matrices, self.w)))
+        if np.isfinite(condition):
+            bound = np.minimum(bound, condition * self.walk(self.steps))
+        return bound, np.asarray(np.maximum(size, first * grown))
+
+    def walk(self, steps: Integers) -> Floats:
+        """What the roundings of so many steps add up to in the coordinates in which a step is a rotation, in
+        allowances of a step (f,); infinite but for kicks and drifts in double precision without friction.
+
+        Roundings of states are as good as random: they walk, 5 standard deviations of one unit each.  A
+        coefficient is rounded once, and so acts at every step: a kick and a drift turn the phase by h w, as
+        far as an engine makes them, and the factor of the whole state, near 1, where it has one.
+        """
+        kinds, how = {kind for kind, _ in self.scheme.stages}, self.trajectory.arithmetic
+        double = how.state == how.force == 2.0**-53 and not how.quantum
+        if not kinds or kinds - {"kick", "drift"} or not double or self.scene.system.is_damped:
+            return np.full(len(steps), np.inf)
+        n = steps.astype(np.float64)
+        turn = min(abs(self.trajectory.step) * float(np.max(self.w)), 2.0)
+        added = max(1, int(np.max(self.scene.system.pulls)))
+        return np.asarray(5 * np.sqrt(n) + (2 * turn * added + 1.5) * n)
 
     @cached_property
     def strongest(self) -> Reals:

@@ -45,9 +45,16 @@ def closed_form(case: Case) -> Verdict:
         float(distance[worst] / unit[worst]),
         float(bound[worst]),
         "roundings",
-        f"one rounding of each of {case.steps[worst]} steps, carried on by the map, all of one sign"
+        f"roundings of {case.steps[worst]} steps, carried on by the map: {_how(case)}"
         + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
     )
+
+
+def _how(case: Case) -> str:
+    """How the roundings of many steps add up."""
+    if np.all(np.isfinite(case.walk(case.steps))):
+        return "5 standard deviations of a walk, and those of the coefficients, at every step alike"
+    return "all of one sign"
 
 
 def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
@@ -86,7 +93,7 @@ def shadow_energy(case: Case) -> Verdict:
     late = case.steps > 0
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.where(late & (off != 0), off / scale, 0)
-    limit = np.where(late, case.roundings * np.maximum(case.steps, 1), 1)
+    limit = np.where(late, np.minimum(case.roundings * case.steps, case.walk(case.steps)), 1)
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
     energy = np.max(np.abs(expected), axis=1)
     if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & (energy > limit * scale)):
@@ -96,7 +103,7 @@ def shadow_energy(case: Case) -> Verdict:
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"{case.steps[worst]} steps, each rounded {case.roundings} times, all of one sign"
+        f"roundings of {case.steps[worst]} steps: {_how(case)}"
         + _untold(case, energy <= limit * scale, "energy"),
     )
 
