@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -59,6 +60,9 @@ FAULTS = [
     ("frames apart", "for _ in range(every)", "for _ in range(min(every, 9))"),
     ("scene untouched", COUNT, COUNT + MOVED),
     ("negative step", "self.h = step", "self.h = abs(step)"),
+    # of two springs of one particle the second is lost; a root of a stiffness below 0 crashes
+    ("refusals", "in self.springs:", "in {x[0]: x for x in self.springs}.values():"),
+    ("refusals", "out[i] -= k *", "out[i] -= k**0.5 * k**0.5 *"),
     ("versions", '{"mine": "1.0"}', '{"mine": 1.0}'),
 ]  # fmt: skip
 
@@ -68,6 +72,42 @@ def test_each_check_rejects_a_broken_engine(name: str, old: str, new: str) -> No
     assert old in CODE
     check = next(x for x in conformance.checks_of(made(CODE.replace(old, new, 1))) if x.name == name)
     with pytest.raises(AssertionError):
+        check()
+
+
+def test_every_check_has_a_broken_engine_that_it_rejects() -> None:
+    assert {name for name, *_ in FAULTS} == set(conformance.TESTS)
+
+
+def test_what_is_refused_in_words_is_no_fault() -> None:
+    refusing = CODE.replace(
+        "        self.force_calls = 0\n",
+        "        self.force_calls = 0\n"
+        "        if any(k < 0 for term in scene.terms for k in term.k):\n"
+        "            from springcheck.errors import MethodError\n"
+        "            raise MethodError('a stiffness of 0 or more is needed')\n",
+        1,
+    )
+    next(x for x in conformance.checks_of(made(refusing)) if x.name == "refusals")()
+
+
+@pytest.mark.parametrize("eager", [False, True])
+def test_an_engine_that_imports_its_library_as_it_is_declared_is_rejected(
+    eager: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = f"declared_{'eagerly' if eager else 'lazily'}"
+    (tmp_path / "library_of_mine.py").write_text("")
+    code = CODE.replace('    name="mine",', '    name="mine",\n    distribution="library-of-mine",')
+    (tmp_path / f"{name}.py").write_text(("import library_of_mine\n" if eager else "") + code)
+    monkeypatch.syspath_prepend(tmp_path)
+    check = conformance.checks_of(importlib.import_module(name).ENGINE)[0]
+    if not eager:
+        check()
+        (tmp_path / f"{name}.py").write_text("1 / 0")
+        with pytest.raises(AssertionError, match="cannot be imported by itself"):
+            check()
+        return
+    with pytest.raises(AssertionError, match="importing declared_eagerly imports library_of_mine"):
         check()
 
 

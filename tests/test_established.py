@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, simulate
+from springcheck.engines import lammps
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
+from springcheck.physics.terms import Spring, WallSpring
 from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 
-NAMES = ("mujoco", "pymunk", "rebound", "dart")
+NAMES = ("mujoco", "pymunk", "rebound", "dart", "lammps")
 LABELS = [f"{name}:{method}" for name in NAMES for method in engines.engine(name).methods]
 
 
@@ -90,6 +92,42 @@ def test_a_held_force_gains_area_by_its_number_of_substeps(need: Need) -> None:
         step = z[:, 1:] @ np.linalg.pinv(z[:, :-1])
         gain = (1 - 1 / n) / 2
         assert np.linalg.det(step) == pytest.approx(1 + a * gain, abs=1e-12)
+
+
+def test_the_fixes_and_bonds_of_lammps_are_velocity_verlet_bit_for_bit(need: Need) -> None:
+    need("lammps:bond")
+    scene = load_scene("spring-uneven")
+    m, k, h = float(scene.m[0]), float(scene.terms[0].k[0]), scene.step  # type: ignore[attr-defined]
+    q, v = float(scene.q[0]), float(scene.p[0] / scene.m[0])
+    states = [(q, v * m)]
+    for _ in range(scene.steps):
+        v += 0.5 * h / m * (-k * q)
+        q += h * v
+        v += 0.5 * h / m * (-k * q)
+        states.append((q, v * m))
+    for name in ("spring-self", "bond", "external"):
+        made = run(scene, f"lammps:{name}")
+        assert np.array_equal(np.stack([made.q[:, 0], made.p[:, 0]], axis=1), states)
+
+
+def test_r_respa_of_lammps_holds_slow_springs_of_every_kind_once_a_step(need: Need) -> None:
+    need("lammps:respa")
+    scene = load_scene("multiple-time-steps")
+    slow = (
+        WallSpring(i=np.array([1, 1]), k=[0.4, 0.9], at=[0.0, 0.0]),
+        Spring(a=np.array([0]), b=np.array([1]), k=[1.1], rest=[0.0]),
+    )
+    for terms in (scene.terms, (*scene.terms, *slow)):
+        made = run(replace(scene, terms=terms, step=0.1), "lammps:respa")
+        assert failed(replace(scene, terms=terms, step=0.1), made) == []
+
+
+def test_lammps_without_its_mpi_is_said_with_the_command(need: Need, monkeypatch: pytest.MonkeyPatch) -> None:
+    need("lammps:bond")
+    monkeypatch.setattr(lammps.importlib.metadata, "files", lambda name: [])
+    monkeypatch.setattr(lammps, "MPI", "libmpi.so.of-nobody")
+    with pytest.raises(MethodError, match=r"install it with: python -m pip install 'springcheck\[lammps\]'"):
+        lammps.version()
 
 
 @pytest.mark.parametrize("label", ["mujoco:joint-spring", "rebound:leapfrog", "dart:force", "pymunk:force"])

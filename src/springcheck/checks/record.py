@@ -70,7 +70,7 @@ def _explodes(case: Case) -> bool:
     numbers."""
     run, scene = case.trajectory, case.judged
     q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
-    limit = SINGLE_RANGE if run.arithmetic.force > np.finfo(np.float64).eps else HALF_RANGE
+    limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE
     limit = min(limit, run.arithmetic.overflow)
     with np.errstate(all="ignore"):
         if not case.scheme.one_step:

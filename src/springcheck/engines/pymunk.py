@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation, named
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
@@ -34,6 +34,11 @@ def far(scene: Scene) -> float:
     q, _ = scene.system.amplitudes
     reach = float(np.max(np.abs(scene.q)) + np.max(q))
     return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """Double precision; a spring's length, up to 8 times the motion's reach, is rounded at both ends."""
+    return Arithmetic(force=16 * 2.0**-53) if label.method == "damped-spring" else Arithmetic()
 
 
 class _Space:
@@ -111,5 +116,6 @@ ENGINE = Engine(
     ),
     start=start,
     version=version,
+    arithmetic=arithmetic,
     step_seconds=5e-6,
 )

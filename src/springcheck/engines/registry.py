@@ -155,6 +155,12 @@ def origin(name: str) -> Origin:
     return _known()[name].origin
 
 
+def module_name(name: str) -> str:
+    """The module that an engine's entry point names; "" where a call or a test has brought it."""
+    point = _known()[name].point
+    return point.module if point else ""
+
+
 def bring(found: Engine, where: str, version: str = "") -> Engine:
     """Make an engine known for the rest of this process.  MethodError where it does not keep the contract."""
     found = _checked(found)

@@ -27,12 +27,11 @@ import numpy as np
 import openmm as mm
 
 from springcheck.arrays import Floats, Force
-from springcheck.engines import quiet
+from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
-from springcheck.schemes import scheme
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
@@ -118,7 +117,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     if arithmetic(label).parameters == "single":
         # the half kicks below must be those of the springs that OpenMM feels
         scene = scene.system.in_single
-    origins = _origins(scene, method)
+    origins = bonds.origins(scene, method.scheme)
     system, positions = _system(scene, origins)
     integrator = _integrator(scene, method.name, step)
     context = _context(system, integrator, label)
@@ -141,40 +140,6 @@ def _pull(scene: Scene) -> Force:
     return scene.system.potential_force
 
 
-def _origins(scene: Scene, method: Method) -> Floats:
-    """Where each particle's OpenMM coordinate is counted from, (n,) [L].
-
-    OpenMM's bonds know their length, not its sign, so a bond of a rest length is the scene's spring
-    only while it does not turn over.  Where the energy that the scheme can reach rules that out,
-    real positions are used (origins 0).  Elsewhere each particle is counted
-    from its own rest position, so that every bond has rest length 0 and the two laws are one.
-    """
-    origins = np.zeros(scene.n)
-    pairs = [term for term in scene.terms if isinstance(term, Spring)]
-    springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
-    with np.errstate(over="ignore"):
-        # Gershgorin's bound of the squared frequencies
-        w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
-    hw = abs(scene.step) * float(np.sqrt(w2))
-    bounded = scheme(method.scheme).symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
-    # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
-    energy = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-
-    def safe(term: Spring) -> bool:
-        u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
-        return bool(np.all((term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy))))
-
-    if all(safe(term) for term in pairs):
-        return origins
-    rest = scene.system.rest_positions
-    if rest is None:
-        raise MethodError(
-            f"{scene.name}: springs in a ring have no common rest, and OpenMM's HarmonicBondForce knows only "
-            "the length of a bond that may turn over"
-        )
-    return rest
-
-
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     """Particles along x, then one fixed anchor for each rest point; positions (N, 3)."""
     system = mm.System()
@@ -184,7 +149,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
     for term in scene.terms:
-        bonds = fast if term.fast else slow
+        group = fast if term.fast else slow
         if isinstance(term, WallSpring):
             anchors: dict[float, int] = {}
             for i, k, at in zip(
@@ -193,16 +158,16 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 if at not in anchors:
                     anchors[at] = system.addParticle(0.0)
                     x.append(at)
-                bonds.addBond(anchors[at], i, 0.0, k)
+                group.addBond(anchors[at], i, 0.0, k)
         elif isinstance(term, Spring):
             lengths = np.abs(term.rest - (origins[term.b] - origins[term.a]))
             for a, b, k, length in zip(
                 term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
             ):
-                bonds.addBond(a, b, length, k)
-    for bonds in (slow, fast):
-        if bonds.getNumBonds():
-            system.addForce(bonds)
+                group.addBond(a, b, length, k)
+    for group in (slow, fast):
+        if group.getNumBonds():
+            system.addForce(group)
     for term in scene.terms:
         if term.key in EXTERNAL:
             system.addForce(_external(term, origins))

@@ -1,0 +1,46 @@
+"""Springs as the bonds of molecular programs, which know their length but not its sign."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
+from springcheck.schemes import scheme
+
+
+def origins(scene: Scene, scheme_name: str) -> Floats:
+    """Where each particle's coordinate in such a program is counted from, (n,) [L].
+
+    A bond of a rest length is the scene's spring only while it does not turn over.  Where the energy that the
+    scheme can reach rules that out, real positions are used (origins 0).  Elsewhere each particle is counted
+    from its own rest position, so that every bond has rest length 0 and the two laws are one.
+
+    Raises MethodError where springs in a ring have no common rest.
+    """
+    zero = np.zeros(scene.n)
+    pairs = [term for term in scene.terms if isinstance(term, Spring)]
+    springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
+    with np.errstate(over="ignore"):
+        # Gershgorin's bound of the squared frequencies
+        w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
+    hw = abs(scene.step) * float(np.sqrt(w2))
+    bounded = scheme(scheme_name).symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
+    # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
+    energy = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
+
+    def safe(term: Spring) -> bool:
+        u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
+        return bool(np.all((term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy))))
+
+    if all(safe(term) for term in pairs):
+        return zero
+    rest = scene.system.rest_positions
+    if rest is None:
+        raise MethodError(
+            f"{scene.name}: springs in a ring have no common rest, and a bond that may turn over is known by "
+            "its length alone"
+        )
+    return rest
