@@ -1,4 +1,4 @@
-"""A study is a folder and a line in the list: the command line, inspect and plot then know it, unedited."""
+"""A study is a folder and a line in the list: commands, inspect, plot and report then know it, unedited."""
 
 from __future__ import annotations
 
@@ -95,5 +95,7 @@ def test_a_folder_and_a_line_make_a_study(
     assert json.loads(capsys.readouterr().out)["studies"] == {"squares": {"largest": 9.0, "nothing": None}}
     assert cli.main(["plot", "squares.h5", "-o", "pictures"]) == 0
     assert (tmp_path / "pictures" / "squares.png").stat().st_size > 1000
+    assert cli.main(["report", "squares.h5"]) == 0
+    assert "9.0</td>" in (tmp_path / "squares.html").read_text()
     for name in [name for name in sys.modules if name.startswith("squares_study")]:
         del sys.modules[name]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,11 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import page, store
+import browser
+from browser import Browser
+from springcheck import page, schemes, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.page.content import drawn
+from springcheck.page.sections import Piece, Section, Sheet
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.studies import STUDIES, charts
+from springcheck.studies.charts import Bank, Chart, Curve, Scale, Tiles
+from springcheck.studies.extremes import measure as atlas
 from springcheck.studies.run import measure
 
 HOSTILE = (
@@ -33,6 +38,11 @@ def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "spring.h5"
     measure.run(scenes.load_scene("spring"), path, methods=OWN)
     return path
+
+
+@pytest.fixture(scope="module")
+def content(spring: Path) -> page.Content:
+    return page.gather(spring)
 
 
 class Tags(HTMLParser):
@@ -54,8 +64,8 @@ def _data(text: str) -> Any:
     return json.loads(found[1])
 
 
-def test_numbers_read_back_bit_for_bit(spring: Path) -> None:
-    data = _data(page.html(page.gather(spring)))
+def test_numbers_read_back_bit_for_bit(spring: Path, content: page.Content) -> None:
+    data = _data(page.html(content))
     stored = store.read(spring)
     assert [run["label"] for run in data["runs"]] == list(stored)
     for run in data["runs"]:
@@ -69,17 +79,16 @@ def test_numbers_read_back_bit_for_bit(spring: Path) -> None:
             assert np.array(run[name], np.float64).tobytes() == np.ascontiguousarray(values).tobytes()
 
 
-def test_numbers_that_are_none_are_words(spring: Path) -> None:
-    content = page.gather(spring)
+def test_numbers_that_are_none_are_words(spring: Path, content: page.Content) -> None:
     run = replace(store.read(spring)["own:euler"], t=np.array([np.inf, -np.inf, np.nan, -0.0]))
-    data = _data(page.html(replace(content, data={"spring": None, "runs": [drawn(run)]})))
+    data = _data(page.html(replace(content, data={"spring": None, "banks": {}, "runs": [drawn(run)]})))
     found = data["runs"][0]["t"]
     assert found[:3] == ["Infinity", "-Infinity", "NaN"]
     assert np.signbit(found[3])
 
 
-def test_it_asks_for_nothing_and_is_small(spring: Path) -> None:
-    text = page.html(page.gather(spring))
+def test_it_asks_for_nothing_and_is_small(content: page.Content) -> None:
+    text = page.html(content)
     assert len(text.encode()) < 500_000
     for tag, attributes in Tags(text).tags:
         assert tag not in {"link", "img", "iframe", "object", "embed", "base", "form"}
@@ -90,8 +99,8 @@ def test_it_asks_for_nothing_and_is_small(spring: Path) -> None:
     assert "default-src 'none'" in text
 
 
-def test_tables_have_headers_and_every_verdict_its_reason(spring: Path) -> None:
-    text = page.html(page.gather(spring))
+def test_tables_have_headers_and_every_verdict_its_reason(spring: Path, content: page.Content) -> None:
+    text = page.html(content)
     tags = Tags(text)
     assert tags.count("table") == len(OWN) + 2
     assert all(attributes.get("scope") in {"row", "col"} for tag, attributes in tags.tags if tag == "th")
@@ -100,8 +109,7 @@ def test_tables_have_headers_and_every_verdict_its_reason(spring: Path) -> None:
     assert "equal bit for bit" in text or "differ by at most" in text
 
 
-def test_a_failed_verdict_is_open_and_named(spring: Path) -> None:
-    content = page.gather(spring)
+def test_a_failed_verdict_is_open_and_named(content: page.Content) -> None:
     first = content.methods[0]
     wrong = replace(first.verdicts[0], passed=False, value=2.0, bound=1.0)
     text = page.html(replace(content, methods=(replace(first, verdicts=(wrong,)), *content.methods[1:])))
@@ -119,8 +127,26 @@ def _hostile(content: page.Content) -> page.Content:
     mine = replace(content.summary.runs[0], label=HOSTILE, parameters=known)
     assert content.comparison is not None
     assert content.same
+    assert content.scene is not None
+    piece = Piece(text=HOSTILE)
+    section = Section(
+        name="hostile", title=HOSTILE, banks=("hostile-0", "hostile-1"),
+        blocks=(piece, Sheet(titles=(piece, piece), rows=((piece,), (piece, piece)))),
+    )  # fmt: skip
+    scale = Scale(name=HOSTILE)
+    curve = Curve(name=HOSTILE, group=HOSTILE, x=[0.0, 1.0], y=[0.0, 1.0], notes=[HOSTILE] * 2)
+    tiles = Tiles(kinds=[(HOSTILE, "good")], rows=[[0, 0]], notes=[[HOSTILE] * 2])
+    values = Scale(name=HOSTILE, values=[1.0, 2.0])
+    lines = Chart(title=HOSTILE, x=scale, y=scale, curves=[curve])
+    mosaic = Chart(title=HOSTILE + "2", x=values, y=Scale(name=HOSTILE, values=[1.0]), tiles=tiles)
+    banks = {
+        f"hostile-{i}": charts.plain(Bank(title=HOSTILE, charts=[x])) for i, x in enumerate((lines, mosaic))
+    }
     return replace(
         content,
+        title=HOSTILE,
+        known=known,
+        sections=(section,),
         scene=replace(content.scene, title=HOSTILE, source=HOSTILE),
         scene_text=HOSTILE,
         not_trusted=(store.Finding(place=HOSTILE, what=HOSTILE),),
@@ -130,12 +156,12 @@ def _hostile(content: page.Content) -> page.Content:
         summary=replace(
             content.summary, path=Path("a" + HOSTILE.replace("/", "")), runs=(mine,), root={"run": HOSTILE}
         ),
-        data={**content.data, "runs": runs},
+        data={**content.data, "runs": runs, "banks": banks},
     )
 
 
-def test_a_hostile_store_adds_no_element(spring: Path) -> None:
-    text = page.html(_hostile(page.gather(spring)))
+def test_a_hostile_store_adds_no_element(content: page.Content) -> None:
+    text = page.html(_hostile(content))
     tags = Tags(text)
     assert tags.count("script") == 2
     assert tags.count("img") == 0
@@ -154,8 +180,10 @@ def test_a_hostile_scene_through_the_command(tmp_path: Path, capsys: pytest.Capt
     assert tags.count("img") == 0
 
 
-def test_only_reports_are_replaced(spring: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    content, mine = page.gather(spring), tmp_path / "mine.html"
+def test_only_reports_are_replaced(
+    spring: Path, content: page.Content, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.html"
     mine.write_text("<p>mine</p>")
     with pytest.raises(StoreError, match="no report of ours"):
         page.write(content, mine)
@@ -187,92 +215,291 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
     assert all(run["every"] == content.stride for run in content.data["runs"])
 
 
+# studies
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A small store of each study that a store holds, by its name."""
+    folder = tmp_path_factory.mktemp("studies")
+    methods = ["--method", "own:euler", "--method", "own:semi-implicit-euler"]
+    calls = {
+        "precision": ["precision", "spring", "--budget", "1.5", *methods],
+        "stability": ["stability", "rlc-circuit", *methods[2:]],
+        "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
+        "census": ["census", *methods],
+        "ensemble": ["ensemble", "spring", "--vary", "time.step=0.01:1:5:log", *methods],
+    }
+    for name, call in calls.items():
+        assert main([*call, "-o", str(folder / f"{name}.h5"), "--quiet"]) == 0
+    return {name: folder / f"{name}.h5" for name in calls}
+
+
+NAMES = ("precision", "stability", "extremes", "census", "ensemble")
+
+
+def test_these_are_all_studies_that_a_store_holds() -> None:
+    kept = {study.name for study in STUDIES if not study.trajectories}
+    assert kept - {"faults"} == set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name: str) -> None:
+    content = page.gather(studies[name])
+    text = page.html(content)
+    assert len(text.encode()) < 500_000
+    (section,) = content.sections
+    assert section.name == name
+    assert section.banks
+    assert all(f'<div id="{bank}"></div>' in text for bank in section.banks)
+    tables = [block for block in section.blocks if isinstance(block, Sheet)]
+    assert tables
+    tags = Tags(text)
+    assert all(attributes.get("scope") in {"row", "col"} for tag, attributes in tags.tags if tag == "th")
+    assert "own:semi-implicit-euler" in {row[0].text for table in tables for row in table.rows}
+
+
+def test_charts_hold_the_stored_doubles(studies: dict[str, Path]) -> None:
+    data = _data(page.html(page.gather(studies["census"])))["banks"]["census-0"]
+    tables = store.read_tables(studies["census"])
+    curve = next(x for x in data["charts"][0]["curves"] if x["name"] == "own:euler")
+    for name in ("q", "p"):
+        kept = np.asarray(tables["census/own:euler"].columns[name], np.float64)
+        x = {"q": "x", "p": "y"}[name]
+        assert np.array(curve[x], np.float64).tobytes() == kept.tobytes()
+    points = store.read_tables(studies["precision"])["precision/own:euler"].columns["max_error"]
+    data = _data(page.html(page.gather(studies["precision"])))["banks"]["precision-0"]
+    drawn_errors = next(x["y"] for x in data["charts"][0]["curves"] if x["name"] == "own:euler")
+    assert set(drawn_errors) <= set(np.asarray(points, np.float64).tolist())
+    assert len(drawn_errors) >= 2
+
+
+def test_every_cell_of_the_atlas_stands_in_its_map(studies: dict[str, Path]) -> None:
+    (chart,) = _data(page.html(page.gather(studies["extremes"])))["banks"]["extremes-0"]["charts"]
+    tiles = chart["tiles"]
+    rows = [[kind for count, kind in row for _ in range(count)] for row in tiles["rows"]]
+    assert {len(row) for row in rows} == {len(chart["x"]["values"])}
+    assert len(rows) == len(chart["y"]["values"])
+    found = keeper_atlas(studies["extremes"])
+    placed = {(round(float(np.log10(c.parameters["h_w"])), 3), c.outcome) for c in found}
+    seen = {
+        (round(float(np.log10(turn)), 3), tiles["kinds"][kind][0])
+        for turn, row in zip(chart["y"]["values"], rows, strict=True)
+        for kind in row
+        if kind >= 0
+    }
+    assert seen == placed
+
+
+def keeper_atlas(path: Path) -> list[Any]:
+    """The cells of force and h w that are stored."""
+    return [cell for cell in atlas.stored(path).cells if cell.block == "force"]
+
+
 # in a browser
 
 
-def opened(path: Path) -> tuple[str, str]:
-    """The page after its scripts, and what its console said."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
-    if browser is None and not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
-        pytest.skip("chromium is not here")
-    assert browser, "chromium is required here"
-    done = subprocess.run(
-        [
-            browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-            f"--user-data-dir={path.parent / 'profile'}", "--enable-logging=stderr",
-            "--virtual-time-budget=20000", "--dump-dom", path.as_uri(),
-        ],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    return done.stdout, "\n".join(line for line in done.stderr.splitlines() if "CONSOLE" in line)
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    found = browser.start(tmp_path_factory.mktemp("chromium"))
+    yield found
+    found.close()
 
 
-def _result(dom: str) -> str:
-    found = re.search(r'id="selfcheck" data-result="(\w+)"', dom)
-    assert found
-    return found[1]
+@pytest.fixture
+def opened(chromium: Browser, tmp_path: Path) -> Any:
+    def open_page(content: page.Content, **look: Any) -> Browser:
+        page.write(content, tmp_path / "a.html")
+        chromium.open(tmp_path / "a.html", **look)
+        assert chromium.said == []
+        assert chromium.asked == [(tmp_path / "a.html").as_uri()]
+        return chromium
+
+    return open_page
 
 
-def test_a_browser_gets_the_same_doubles(spring: Path, tmp_path: Path) -> None:
-    page.write(page.gather(spring), tmp_path / "a.html")
-    dom, said = opened(tmp_path / "a.html")
-    assert said == ""
-    assert _result(dom) == "equal"
-    assert "Your browser = this file, to the last bit" in dom
-    assert all(f"{label}: 201 frames, each q and p the same double" in dom for label in OWN)
-    assert dom.count('<path class="curve"') > 8
+def _checked(chromium: Browser) -> tuple[str, str]:
+    """What the page found, and its words."""
+    place = 'document.getElementById("selfcheck")'
+    return chromium.run(f"{place}.dataset.result"), chromium.run(f"{place}.textContent")
 
 
-def test_a_browser_gets_the_same_doubles_of_another_spring(tmp_path: Path) -> None:
+def test_a_browser_gets_the_same_doubles(content: page.Content, opened: Any) -> None:
+    found, said = _checked(opened(content))
+    assert found == "equal"
+    assert "Your browser = this file, to the last bit" in said
+    assert all(f"{label}: 201 frames, each q and p the same double" in said for label in OWN)
+
+
+def test_a_browser_gets_the_same_doubles_of_another_spring(tmp_path: Path, opened: Any) -> None:
     base = scenes.load_scene("spring")
     wall = replace(base.terms[0], k=np.array([1.7]), at=np.array([0.3]))  # type: ignore[type-var]
     scene = replace(
         base, terms=(wall,), m=np.array([0.37]), q=np.array([-0.2]), step=0.07, steps=1_500, every=3
     )
     measure.run(scene, tmp_path / "a.h5", methods=OWN[1:])
-    page.write(page.gather(tmp_path / "a.h5"), tmp_path / "a.html")
-    dom, said = opened(tmp_path / "a.html")
-    assert said == ""
-    assert _result(dom) == "equal"
+    found, _ = _checked(opened(page.gather(tmp_path / "a.h5")))
+    assert found == "equal"
 
 
-def test_a_browser_sees_one_changed_bit(spring: Path, tmp_path: Path) -> None:
-    content = page.gather(spring)
+def test_a_browser_sees_one_changed_bit(content: page.Content, opened: Any) -> None:
     runs = json.loads(json.dumps(content.data["runs"]))
     runs[1]["p"][150] = float(np.nextafter(runs[1]["p"][150], 9.0))
-    page.write(replace(content, data={**content.data, "runs": runs}), tmp_path / "a.html")
-    dom, _ = opened(tmp_path / "a.html")
-    assert _result(dom) == "differs"
-    assert "own:semi-implicit-euler differs first in frame 150, t = 15" in dom
-    assert "own:euler: 201 frames" in dom
+    found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
+    assert found == "differs"
+    assert "own:semi-implicit-euler differs first in frame 150, t = 15" in said
+    assert "own:euler: 201 frames" in said
 
 
-def test_a_browser_runs_nothing_of_a_hostile_store(spring: Path, tmp_path: Path) -> None:
-    page.write(_hostile(page.gather(spring)), tmp_path / "a.html")
-    dom, said = opened(tmp_path / "a.html")
-    assert said == ""
-    tags = Tags(dom)
-    assert tags.tags[0] == ("html", {"lang": "en"})
-    assert tags.count("script") == 2
-    assert tags.count("img") == 0
+def test_a_browser_runs_nothing_of_a_hostile_store(content: page.Content, opened: Any) -> None:
+    chromium = opened(_hostile(content))
+    assert chromium.run("Object.keys(document.documentElement.dataset).length") == 0
+    assert chromium.run('document.querySelectorAll("script").length') == 2
+    assert chromium.run('document.querySelectorAll("img").length') == 0
+    # and it was there to be run
+    assert chromium.run('document.querySelector("#hostile-0 figcaption").textContent').startswith(HOSTILE)
 
 
-def test_the_sliders_change_the_orbit(spring: Path, tmp_path: Path) -> None:
-    text = page.html(page.gather(spring))
-    drive = """<script>
-        const before = document.getElementById("orbit").innerHTML, h = document.getElementById("slide-h");
-        h.value = h.max; h.dispatchEvent(new Event("input"));
-        document.body.dataset.changed = before !== document.getElementById("orbit").innerHTML;
-        document.body.dataset.said = document.getElementById("live-said").textContent;
-        document.getElementById("reset").click();
-        document.body.dataset.back = document.getElementById("live-said").textContent;
-    </script></body>"""
-    # what drives it may not run in the page as it is
-    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", text).replace("</body>", drive)
-    (tmp_path / "a.html").write_text(text)
-    dom, said = opened(tmp_path / "a.html")
-    assert said == ""
-    body = dict(next(attributes for tag, attributes in Tags(dom).tags if tag == "body"))
-    assert body["data-changed"] == "true"
-    assert body["data-said"] == "h ω = 3: beyond 2, all three explode"
-    assert body["data-back"] == "h ω = 0.1: explicit Euler spirals out, the two others stay"
+@pytest.mark.parametrize("width", [1100, 390])
+def test_nothing_is_wider_than_the_window(content: page.Content, opened: Any, width: int) -> None:
+    chromium = opened(content, width=width)
+    assert chromium.run("document.documentElement.scrollWidth") <= width
+
+
+def test_the_sliders_change_the_orbit(content: page.Content, opened: Any) -> None:
+    chromium = opened(content)
+    orbits = 'document.getElementById("orbits").innerHTML'
+    said = 'document.getElementById("live-said").textContent'
+    before = chromium.run(orbits)
+    for name in "hkmpc":
+        slide = f'document.getElementById("slide-{name}")'
+        chromium.run(f'{slide}.value = {slide}.max; {slide}.dispatchEvent(new Event("input")); 0')
+        after = chromium.run(orbits)
+        assert after != before, name
+        if name == "h":
+            assert chromium.run(said) == "h ω = 3: beyond 2, all three explode"
+        before = after
+    assert "damping ratio" in chromium.run(said)
+    chromium.run('document.getElementById("reset").click()')
+    assert chromium.run(said) == "h ω = 0.1: explicit Euler spirals out, the two others stay"
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.3, 1.0, 1.7])
+def test_factors_and_exact_motion_in_the_page_are_those_of_the_library(
+    spring: Path, content: page.Content, opened: Any, zeta: float
+) -> None:
+    chromium = opened(content)
+    scene = scenes.parse(DAMPED.format(c=2 * zeta), name="damped")
+    times = chromium.run(f"exactMotion({{q: 0, p: 1, at: 0, m: 1, k: 1, c: {2 * zeta}}}, [0.5, 7])")
+    q, p = exact.true_motion(scene, np.array([1, 14]), 0.5)
+    np.testing.assert_allclose(np.array(times).T, [q[:, 0], p[:, 0]], rtol=1e-12, atol=1e-15)
+    for loop, name in LOOPS.items():
+        one = stepped(name, 0.5, 2 * zeta)
+        largest = float(np.max(np.abs(np.linalg.eigvals(one))))
+        assert chromium.run(f"radius({loop}, 0.5, {zeta})") == pytest.approx(largest, rel=1e-7)
+
+
+LOOPS = {
+    "euler": "explicit-euler",
+    "semiImplicitEuler": "semi-implicit-euler",
+    "velocityVerlet": "velocity-verlet",
+}
+
+DAMPED = """
+title = "damped"
+units = "reduced"
+[[particle]]
+mass = 1.0
+position = 0.0
+momentum = 1.0
+[[spring]]
+ends = ["wall", 0]
+stiffness = 1.0
+[[damping]]
+particle = 0
+coefficient = {c}
+[time]
+step = 0.5
+steps = 20
+"""
+
+
+def stepped(name: str, h: float, c: float) -> np.ndarray:
+    """The one-step matrix of a scheme with friction in its force, by its stages or its tableau."""
+
+    def force(q: float, p: float) -> float:
+        return -q - c * p
+
+    scheme = schemes.SCHEMES[name]
+    columns = []
+    for start in ((1.0, 0.0), (0.0, 1.0)):
+        q, p = start
+        for kind, share in scheme.stages:
+            if kind == "kick":
+                p += float(share) * h * force(q, p)
+            else:
+                q += float(share) * h * p
+        if scheme.b:
+            q, p = q + h * p, p + h * force(q, p)
+        columns.append((q, p))
+    return np.array(columns).T
+
+
+def _middle(chromium: Browser, of: str) -> tuple[float, float, float, float]:
+    """Left, top, width and height of an element, scrolled into view [pixels]."""
+    chromium.run(f"document.querySelector('{of}').scrollIntoView()")
+    box = chromium.run(f"document.querySelector('{of}').getBoundingClientRect().toJSON()")
+    return box["x"], box["y"], box["width"], box["height"]
+
+
+def test_a_pointer_reads_a_point_and_a_drag_zooms(spring: Path, content: page.Content, opened: Any) -> None:
+    chromium = opened(content)
+    x, y, w, h = _middle(chromium, "#motion .plot")
+    read = "document.querySelector('#motion .reading').textContent"
+    curves = "document.querySelectorAll('#motion .plot')[0].innerHTML"
+    chromium.mouse("mouseMoved", x + w / 2, y + h / 3)
+    found = re.fullmatch(r"(own:\S+): q (\S+), p (\S+); t (\S+)", chromium.run(read))
+    assert found
+    run = store.read(spring)[found[1]]
+    row = int(np.flatnonzero(run.t == float(found[4]))[0])
+    assert (run.q[row, 0], run.p[row, 0]) == (float(found[2]), float(found[3]))
+    whole = chromium.run(curves)
+    chromium.drag((x + w / 3, y + h / 3), (x + w / 2, y + h / 2))
+    zoomed = chromium.run(curves)
+    assert _shape(zoomed) != _shape(whole)
+    chromium.run("document.querySelector('#motion .plot').focus()")
+    chromium.key("0", "0")
+    assert _shape(chromium.run(curves)) == _shape(whole)
+    chromium.key("ArrowRight")
+    before = chromium.run(read)
+    chromium.key("ArrowRight")
+    assert chromium.run(read) != before
+
+
+def _shape(svg: str) -> str:
+    """A picture without the numbers of its clips and the ring around what was read."""
+    return re.sub(r'clip\d+|<circle class="ring"[^>]*>', "", svg)
+
+
+def test_methods_are_switched_on_and_off(content: page.Content, opened: Any) -> None:
+    chromium = opened(content)
+    lines = "document.querySelectorAll('#motion .plot')[0].querySelectorAll('.curve').length"
+    assert chromium.run(lines) == 3
+    chromium.run("document.querySelectorAll('#motion input')[0].click()")
+    assert chromium.run(lines) == 2
+    chromium.run(
+        "[...document.querySelectorAll('#motion button')].find((b) => b.textContent === 'all').click()"
+    )
+    assert chromium.run(lines) == 4
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_study_is_drawn(studies: dict[str, Path], opened: Any, name: str) -> None:
+    chromium = opened(page.gather(studies[name]))
+    drawn_paths = chromium.run(f"document.querySelectorAll('#{name}-0 .plot path').length")
+    assert drawn_paths > 0
+    chromium.run(f"document.querySelector('#{name}-0 .plot').focus()")
+    chromium.key("ArrowRight")
+    said = chromium.run(f"document.querySelector('#{name}-0 .reading').textContent").strip()
+    assert said
+    assert chromium.said == []

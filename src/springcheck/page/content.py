@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import compare, schemes, store
-from springcheck.arrays import Floats
 from springcheck.compare import EXACT, Same
 from springcheck.errors import SpringcheckError
+from springcheck.page.sections import Section, sections
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.store import Finding, Summary
+from springcheck.studies.charts import numbers
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 NUMBERS = 15_000
@@ -47,8 +47,14 @@ class Passed:
 class Content:
     """What the template is given."""
 
-    scene: Scene
+    title: str
+    scene: Scene | None
+    """None where a study has scenes of its own."""
     scene_text: str
+    known: Mapping[str, Any]
+    """Versions and machine, by name."""
+    sections: tuple[Section, ...]
+    """Of the studies."""
     summary: Summary
     not_trusted: tuple[Finding, ...]
     methods: tuple[Passed, ...]
@@ -69,33 +75,54 @@ class Content:
 
 
 def gather(path: Path) -> Content:
-    """Read what a report shows.  SpringcheckError where the store holds no trajectories."""
+    """Read what a report shows.  SpringcheckError where the store holds neither trajectory nor study."""
     summary = store.summary(path)
-    if not summary.runs:
-        raise SpringcheckError(f"{path}: holds no trajectory to report; a report is of `springcheck run`")
-    text = store.scene_text(path)
-    scene = scenefile.parse(text, name=str(summary.root.get("scene_name") or path.stem), where=str(path))
+    studies, banks = sections(summary)
+    if not summary.runs and not studies:
+        raise SpringcheckError(f"{path}: holds no trajectory and no study to report")
+    text = store.scene_text(path) if "scene" in summary.root else ""
+    name = str(summary.root.get("scene_name") or path.stem)
+    scene = scenefile.parse(text, name=name, where=str(path)) if text else None
     labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
     most = max(FEWEST, NUMBERS // (4 * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
-    verdicts = store.verdicts(path) if path.is_file() else ()
-    comparison = store.comparison(path) if path.is_file() else None
+    kept = bool(summary.runs) and path.is_file()
+    verdicts = store.verdicts(path) if kept else ()
+    comparison = store.comparison(path) if kept else None
+    title = (scene.title or scene.name) if scene else path.name
     return Content(
+        title=title,
         scene=scene,
         scene_text=text,
+        known=_known(summary),
+        sections=tuple(studies),
         summary=summary,
         not_trusted=tuple(store.doubts(path)),
         methods=tuple(_methods(summary, verdicts)),
-        same=_same(path, scene, comparison),
+        same=_same(path, scene, comparison) if scene else None,
         comparison=comparison,
         sha256=_digest(path) if path.is_file() else "",
         stride=max((stride for _, stride in pieces.values()), default=1),
         data={
             "runs": [drawn(piece) for piece, _ in pieces.values()],
-            "spring": spring(scene),
-            "steps": scene.steps,
+            "spring": spring(scene) if scene and labels else None,
+            "steps": scene.steps if scene else 0,
+            "particles": scene.n if scene else 0,
+            "equal": scene is not None and scene.units == "reduced",
+            "banks": banks,
         },
     )
+
+
+def _known(summary: Summary) -> dict[str, Any]:
+    """What the trajectories, or the first study that tells it, say of versions and machine."""
+    if summary.runs:
+        return dict(summary.runs[0].parameters)
+    for name in summary.documents:
+        document = store.decoded(summary.path, name)
+        if isinstance(document, dict) and isinstance(machine := document.get("machine"), dict):
+            return machine
+    return {}
 
 
 def spring(scene: Scene) -> dict[str, Any] | None:
@@ -105,8 +132,8 @@ def spring(scene: Scene) -> dict[str, Any] | None:
     wall = scene.terms[0]
     if not isinstance(wall, WallSpring) or len(wall) != 1:
         return None
-    numbers = {"k": wall.k, "at": wall.at, "m": scene.m, "q": scene.q, "p": scene.p}
-    found: dict[str, Any] = {name: float(values[0]) for name, values in numbers.items()}
+    given = {"k": wall.k, "at": wall.at, "m": scene.m, "q": scene.q, "p": scene.p}
+    found: dict[str, Any] = {name: float(values[0]) for name, values in given.items()}
     # ASE calculates in units of its own
     return {**found, "h": scene.step, "converted": ["ase"] if scene.units == "md" else []}
 
@@ -119,17 +146,11 @@ def drawn(piece: Trajectory) -> dict[str, Any]:
         "title": schemes.title(piece.scheme),
         "every": piece.every,
         "step": piece.step,
-        "t": _numbers(piece.t),
-        "q": _numbers(piece.q[:, 0]),
-        "p": _numbers(piece.p[:, 0]),
-        "energy": None if piece.energy is None else _numbers(piece.energy),
+        "t": numbers(piece.t),
+        "q": numbers(piece.q[:, 0]),
+        "p": numbers(piece.p[:, 0]),
+        "energy": None if piece.energy is None else numbers(piece.energy),
     }
-
-
-def _numbers(values: Floats) -> list[float | str]:
-    """Doubles as JSON reads them back bit for bit, and words for those that JSON has not."""
-    words = {math.inf: "Infinity", -math.inf: "-Infinity"}
-    return [x if math.isfinite(x) else words.get(x, "NaN") for x in values.tolist()]
 
 
 def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:

@@ -1,5 +1,5 @@
 "use strict";
-// Draws the stored numbers, and runs the loops of loops.js on opening and by the sliders.
+// The stored motion, the loops of loops.js on opening and by the sliders, and the charts of the studies.
 
 const DATA = JSON.parse(document.getElementById("data").textContent);
 for (const run of DATA.runs) {
@@ -8,185 +8,52 @@ for (const run of DATA.runs) {
     if (run[name]) run[name] = run[name].map(Number);
   }
 }
-const SVG = "http://www.w3.org/2000/svg";
-// Okabe & Ito (2008), told apart by people with any colour vision; lightened where they vanish on black
-const DARK = matchMedia("(prefers-color-scheme: dark)");
-const COLOURS = DARK.matches
-  ? ["#56B4E9", "#E69F00", "#2FC79A", "#E79FC8", "#F0E442", "#FF7A33", "#c8c8c8"]
-  : ["#0072B2", "#D55E00", "#00805C", "#B0508C", "#8A6100", "#2A7FB0", "#000000"];
-const DASHES = ["", "7 4", "2 3", "9 3 2 3", "14 4", "4 2"];
-const TICKS = 4;
+const PLAIN = { log: false, values: [], shown: null };
 
-function element(name, attributes, ...children) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
-  return made;
+// A chart of curves on linear axes.
+function plain(title, x, y, curves, more) {
+  return { title, x: { ...PLAIN, name: x }, y: { ...PLAIN, name: y }, curves, tiles: null, rules: [], ...more };
 }
 
-function html(name, text) {
-  const made = document.createElement(name);
-  if (text !== undefined) made.textContent = text;
-  return made;
+function curveOf(name, group, x, y, more) {
+  return { name, group, x, y, line: true, marks: false, notes: null, title: "", ...more };
 }
 
-function number(x) {
-  return String(Number(x.toPrecision(3)));
-}
-
-// Round numbers within [low, high].
-function ticks(low, high) {
-  const rough = (high - low) / TICKS, power = 10 ** Math.floor(Math.log10(rough));
-  const size = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= rough) || 10 * power;
-  const found = [];
-  for (let i = Math.ceil(low / size); i * size <= high && found.length < 50; i++) found.push(i * size);
-  return found;
-}
-
-function extent(values, symmetric) {
-  let low = Infinity, high = -Infinity;
-  for (const x of values) {
-    if (Number.isFinite(x)) {
-      low = Math.min(low, x);
-      high = Math.max(high, x);
-    }
+function motion() {
+  const place = document.getElementById("motion");
+  if (!place) return;
+  const seen = new Set(), on = [], first = DATA.runs.map((run) => run.scheme);
+  const runs = [...DATA.runs].sort((a, b) => first.indexOf(a.scheme) - first.indexOf(b.scheme));
+  for (const run of runs) {
+    if (!seen.has(run.scheme)) on.push(run.label);
+    seen.add(run.scheme);
   }
-  if (!(low <= high)) [low, high] = [-1, 1];
-  if (symmetric) [low, high] = [-Math.max(-low, high), Math.max(-low, high)];
-  const room = (high - low) * 0.05 || Math.abs(high) * 0.05 || 1;
-  return [low - room, high + room];
-}
-
-let clips = 0;
-
-// Curves {x, y, colour, dash, name} in a box; xs and ys are the ranges shown.
-function plot(place, curves, xs, ys, xName, yName, said) {
-  const W = 440, H = 360, L = 62, R = 10, T = 12, B = 44;
-  const x = (v) => L + ((v - xs[0]) / (xs[1] - xs[0])) * (W - L - R);
-  const y = (v) => H - B - ((v - ys[0]) / (ys[1] - ys[0])) * (H - T - B);
-  const root = element("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": said });
-  for (const v of ticks(...xs)) {
-    root.append(element("line", { class: "grid", x1: x(v), x2: x(v), y1: T, y2: H - B }));
-    root.append(element("text", { x: x(v), y: H - B + 17, "text-anchor": "middle" }, number(v)));
-  }
-  for (const v of ticks(...ys)) {
-    root.append(element("line", { class: "grid", x1: L, x2: W - R, y1: y(v), y2: y(v) }));
-    root.append(element("text", { x: L - 6, y: y(v) + 4, "text-anchor": "end" }, number(v)));
-  }
-  const clip = `clip${clips++}`, box = { x: L, y: T, width: W - L - R, height: H - T - B };
-  root.append(element("clipPath", { id: clip }, element("rect", box)), element("rect", { class: "frame", ...box }));
-  root.append(element("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, xName));
-  const side = { transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, "text-anchor": "middle" };
-  root.append(element("text", side, yName));
-  const inside = element("g", { "clip-path": `url(#${clip})` });
-  // beyond this an SVG's numbers are none; the clip hides it
-  const kept = (v) => Math.max(-1e5, Math.min(1e5, v)).toFixed(2);
-  for (const curve of curves) {
-    let path = "";
-    for (let i = 0; i < curve.x.length; i++) {
-      if (!Number.isFinite(curve.x[i]) || !Number.isFinite(curve.y[i])) break;
-      path += `${i ? "L" : "M"}${kept(x(curve.x[i]))} ${kept(y(curve.y[i]))}`;
-    }
-    const drawn = stroked(path, curve);
-    drawn.append(element("title", {}, curve.name));
-    inside.append(drawn);
-  }
-  root.append(inside);
-  place.replaceChildren(root);
-}
-
-// Of curves' largest numbers those that set the scale: an explosion does not.
-function shown(sizes) {
-  const sorted = sizes.filter(Number.isFinite).sort((a, b) => a - b);
-  const most = 8 * (sorted[Math.floor((sorted.length - 1) / 2)] || 0);
-  return sizes.map((size) => size <= most);
-}
-
-function largest(values) {
-  return values.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
-}
-
-function flat(lists) {
-  return [].concat(...lists);
-}
-
-function beyond(names) {
-  return names.length ? ` Beyond the picture: ${names.join(", ")}.` : "";
-}
-
-// One colour for one scheme everywhere in the page.
-const SCHEMES = [...new Set(
-  ["explicit-euler", "semi-implicit-euler", "implicit-euler", "velocity-verlet"].concat(DATA.runs.map((run) => run.scheme)),
-)];
-
-function colourOf(scheme) {
-  return COLOURS[SCHEMES.indexOf(scheme) % COLOURS.length];
-}
-
-// A line in its colour; on paper, where all are black, by another dash for each scheme.
-function stroked(d, { colour, dash, printed }) {
-  const line = element("path", { class: "curve", d, "stroke-dasharray": dash });
-  line.style.stroke = colour;
-  line.style.setProperty("--printed", printed || "none");
-  return line;
-}
-
-function sample(look) {
-  const line = stroked("M0 5H30", look);
-  return element("svg", { width: 30, height: 10, "aria-hidden": "true" }, line);
-}
-
-function legend() {
-  const place = document.getElementById("methods");
-  const seen = new Map();
-  DATA.runs.forEach((run) => {
-    const count = seen.get(run.scheme) || 0;
-    seen.set(run.scheme, count + 1);
-    const which = SCHEMES.indexOf(run.scheme);
-    run.colour = colourOf(run.scheme);
-    run.dash = DASHES[(count + Math.floor(which / COLOURS.length)) % DASHES.length];
-    run.printed = DASHES[(which + count) % DASHES.length];
-    run.on = count === 0;
-    const label = html("label"), box = html("input");
-    box.type = "checkbox";
-    box.checked = run.on;
-    box.addEventListener("change", () => {
-      run.on = box.checked;
-      draw();
-    });
-    label.title = run.title;
-    label.append(box, sample(run), run.label);
-    place.append(label);
-  });
-}
-
-function draw() {
-  const runs = DATA.runs.filter((run) => run.on);
-  const names = runs.map((run) => run.label).join(", ") || "nothing";
-  const curve = (run, x, y) => ({ x, y, colour: run.colour, dash: run.dash, printed: run.printed, name: `${run.label}: ${run.title}` });
-  const fits = shown(runs.map((run) => Math.max(largest(run.q), largest(run.p))));
-  const base = runs.filter((_, i) => fits[i]);
-  plot(
-    document.getElementById("phase"), runs.map((run) => curve(run, run.q, run.p)),
-    extent(flat(base.map((run) => run.q))), extent(flat(base.map((run) => run.p))),
-    "q", "p", `Phase portrait of ${names}`,
-  );
-  const far = (flags, list) => beyond(list.filter((_, i) => !flags[i]).map((run) => run.label));
-  document.getElementById("phase-note").textContent = far(fits, runs);
+  const curve = (run, x, y, notes) => curveOf(run.label, run.scheme, x, y, { notes, title: run.title });
+  const change = (run) => run.energy.map((e) => (e - run.energy[0]) / (Math.abs(run.energy[0]) || 1));
+  const of = DATA.particles > 1 ? " of particle 0" : "", all = DATA.particles > 1 ? ", all particles" : "";
+  const charts = [
+    plain(`Phase portrait: momentum over position${of}.`, "q", "p",
+      runs.map((run) => curve(run, run.q, run.p, run.t.map((t) => `t ${t}`))), { times: 8, equal: DATA.equal }),
+  ];
   const kept = runs.filter((run) => run.energy);
-  for (const run of kept) {
-    const start = run.energy[0];
-    run.change = run.energy.map((e) => (e - start) / (Math.abs(start) || 1));
+  if (kept.length) {
+    // of energies the one that grows is what is to be seen: only what has left all the others is cut off
+    charts.push(plain(`Energy: change over time, as a fraction of that of the start${all}.`, "t", "(H - H\u2080) / |H\u2080|",
+      kept.map((run) => curve(run, run.t, change(run))), { most: 20 }));
   }
-  // of energies the one that grows is what is to be seen: only what has left all the others is cut off
-  const fine = kept.map((run) => largest(run.change) < 20);
-  const scale = kept.filter((_, i) => fine[i]);
-  plot(
-    document.getElementById("energy"), kept.map((run) => curve(run, run.t, run.change)),
-    extent(flat(kept.map((run) => run.t))), extent(flat(scale.map((run) => run.change))),
-    "t", "(H - H\u2080) / |H\u2080|", `Change of energy over time of ${names}`,
-  );
-  document.getElementById("energy-note").textContent = far(fine, kept);
+  new Bank(place, { title: "Methods drawn", on, charts });
+}
+
+// Of the studies, as they come.
+function banks() {
+  const numbers = (values) => values.map(Number);
+  for (const [name, bank] of Object.entries(DATA.banks)) {
+    for (const chart of bank.charts) {
+      for (const curve of chart.curves) Object.assign(curve, { x: numbers(curve.x), y: numbers(curve.y), title: curve.group });
+      if (chart.tiles) for (const scale of [chart.x, chart.y]) scale.values = numbers(scale.values);
+    }
+    new Bank(document.getElementById(name), bank);
+  }
 }
 
 function selfCheck() {
@@ -215,15 +82,16 @@ function selfCheck() {
 }
 
 const TRIED = [
-  ["explicit Euler", euler, colourOf("explicit-euler"), ""],
-  ["semi-implicit Euler", semiImplicitEuler, colourOf("semi-implicit-euler"), "7 4"],
-  ["velocity Verlet", velocityVerlet, colourOf("velocity-verlet"), "2 3"],
+  ["explicit Euler", euler, "explicit-euler"],
+  ["semi-implicit Euler", semiImplicitEuler, "semi-implicit-euler"],
+  ["velocity Verlet", velocityVerlet, "velocity-verlet"],
 ];
+const EXACT = "exact";
 const RANGE = 200;
 
 function live() {
   if (!DATA.spring) return;
-  const own = DATA.spring, now = { ...own };
+  const own = { ...DATA.spring, c: 0 }, now = { ...own };
   document.getElementById("live").hidden = false;
   const omega = Math.sqrt(Math.abs(own.k) / own.m) || 1;
   const sign = Math.sign(own.h);
@@ -235,6 +103,7 @@ function live() {
     k: log(Math.abs(own.k) / 10 || 0.1, Math.abs(own.k) * 10 || 10, Math.sign(own.k) || 1),
     m: log(own.m / 10, own.m * 10, 1),
     p: (u) => (2 * u - 1) * 3 * start,
+    c: (u) => u * 3 * own.m * omega,
   };
   const inputs = {};
   const put = (name) => {
@@ -253,72 +122,81 @@ function live() {
     put(name);
     input.addEventListener("input", () => {
       now[name] = sliders[name](Number(input.value) / RANGE);
-      orbit(now, inputs);
+      show();
     });
   }
   document.getElementById("reset").addEventListener("click", () => {
     Object.keys(sliders).forEach(put);
-    orbit(now, inputs);
+    show();
   });
-  for (const [name, , colour, dash] of [...TRIED, ["true motion", null, "var(--soft)", "1 5"]]) {
-    const one = html("span");
-    one.append(sample({ colour, dash, printed: dash }), name);
-    document.getElementById("orbit-legend").append(one);
-  }
-  orbit(now, inputs);
+  const names = [...TRIED.map(([name]) => name), EXACT];
+  const bank = new Bank(document.getElementById("orbits"), { title: "Drawn", on: names, charts: tried(now) });
+  const show = () => {
+    tried(now).forEach((chart, i) => bank.charts[i].show(chart));
+    said(now, inputs);
+  };
+  said(now, inputs);
 }
 
-function orbit(s, inputs) {
-  for (const [name, input] of Object.entries(inputs)) {
-    document.getElementById(`show-${name}`).textContent = number(s[name]);
-    input.setAttribute("aria-valuetext", number(s[name]));
-  }
-  const energy = (s.p * s.p) / (2 * s.m) + (s.k * (s.q - s.at) ** 2) / 2;
+// The orbits by these numbers, and by what factor a step multiplies the motion at any h omega.
+function tried(s) {
+  const steps = Math.min(DATA.steps, 1000);
+  const omega2 = s.k / s.m, energy = (s.p * s.p) / (2 * s.m) + (s.k * (s.q - s.at) ** 2) / 2;
   const bound = s.k > 0 && energy > 0;
   const a = bound ? Math.sqrt((2 * energy) / s.k) : 1, b = bound ? Math.sqrt(2 * energy * s.m) : 1;
-  const angles = Array.from({ length: 181 }, (_, i) => (i * Math.PI) / 90);
-  const curves = bound ? [{
-    x: angles.map((u) => s.at + a * Math.cos(u)), y: angles.map((u) => b * Math.sin(u)),
-    colour: "var(--soft)", dash: "1 5", printed: "1 5", name: "true motion",
-  }] : [];
+  const times = Array.from({ length: 1001 }, (_, i) => (i / 1000) * Math.min(steps * Math.abs(s.h), 40 / Math.sqrt(omega2 || 1)));
+  const exact = bound ? exactMotion(s, times) : [];
+  const orbits = [curveOf(EXACT, EXACT, exact.map(([q]) => q), exact.map(([, p]) => p), { notes: times.map((t) => `t ${t}`) })];
   const far = [];
-  for (const [name, loop, colour, dash] of TRIED) {
+  for (const [name, loop, group] of TRIED) {
     const step = loop(), x = [s.q], y = [s.p];
     let q = s.q, p = s.p;
-    for (let i = 0; i < Math.min(DATA.steps, 1000); i++) {
+    for (let i = 0; i < steps; i++) {
       [q, p] = step(s, q, p);
       x.push(q);
       y.push(p);
     }
     if (!(Math.abs(q - s.at) <= 4 * a) || !(Math.abs(p) <= 4 * b)) far.push(name);
-    curves.push({ x, y, colour, dash, printed: dash, name });
+    orbits.push(curveOf(name, group, x, y, { notes: x.map((_, i) => `step ${i}`) }));
   }
-  const range = (at, size) => [at - 4 * size, at + 4 * size];
-  plot(document.getElementById("orbit"), curves, range(s.at, a), range(0, b), "q", "p",
-    "Orbits of explicit Euler, semi-implicit Euler and velocity Verlet beside the true one");
-  document.getElementById("orbit-note").textContent = beyond(far);
+  const range = (at, size) => ({ ...PLAIN, shown: [at - 4 * size, at + 4 * size] });
+  const zeta = s.k > 0 ? Math.sign(s.h) * s.c / (2 * Math.sqrt(s.k * s.m)) : 0;
+  const ws = Array.from({ length: 301 }, (_, i) => i / 100);
+  const radii = TRIED.map(([name, loop, group]) => curveOf(name, group, ws, ws.map((w) => radius(loop, w, zeta))));
+  const here = s.k > 0 ? [{ axis: "x", at: Math.abs(s.h) * Math.sqrt(omega2), name: "here", look: "here" }] : [];
+  return [
+    plain(`Momentum over position, ${steps} steps.${beyond(far)}`, "q", "p", orbits, {
+      x: { ...range(s.at, a), name: "q" }, y: { ...range(0, b), name: "p" },
+    }),
+    plain("Factor by which one step multiplies the motion; above 1 it explodes.", "h \u03c9", "factor a step", radii, {
+      x: { ...PLAIN, name: "h \u03c9", shown: [0, 3] }, y: { ...PLAIN, name: "factor a step", shown: [0, 3] },
+      rules: [{ axis: "x", at: 2, name: "limit h \u03c9 = 2" }, { axis: "y", at: 1, name: "", look: "one" }, ...here],
+    }),
+  ];
+}
+
+function said(s, inputs) {
+  for (const [name, input] of Object.entries(inputs)) {
+    document.getElementById(`show-${name}`).textContent = number(s[name]);
+    input.setAttribute("aria-valuetext", number(s[name]));
+  }
   const size = s.k > 0 ? Math.abs(s.h) * Math.sqrt(s.k / s.m) : NaN;
-  document.getElementById("live-said").textContent = Number.isNaN(size)
-    ? "No restoring force: the true motion leaves as well."
-    : `h \u03c9 = ${number(size)}: ` + (size < 2 ? "explicit Euler spirals out, the two others stay"
+  const place = document.getElementById("live-said");
+  if (Number.isNaN(size)) place.textContent = "No restoring force: the exact motion leaves as well.";
+  else if (!s.c) {
+    place.textContent = `h \u03c9 = ${number(size)}: ` + (size < 2 ? "explicit Euler spirals out, the two others stay"
       : size > 2 ? "beyond 2, all three explode" : "the limit itself");
-  gauge(size);
-}
-
-// h omega on a line from 0 to 3, with the limit at 2.
-function gauge(size) {
-  const W = 440, at = (v) => 10 + (Math.min(v, 3) / 3) * (W - 20);
-  const root = element("svg", { viewBox: `0 0 ${W} 44`, role: "img", "aria-label": `h omega = ${number(size)}, limit 2` });
-  root.append(element("rect", { class: "bar", x: at(0), y: 8, width: W - 20, height: 12 }));
-  root.append(element("line", { class: "limit", x1: at(2), x2: at(2), y1: 2, y2: 26 }));
-  for (const v of [0, 1, 2, 3]) {
-    root.append(element("text", { x: at(v), y: 40, "text-anchor": "middle" }, v === 2 ? "limit h \u03c9 = 2" : String(v)));
+  } else {
+    const zeta = s.c / (2 * Math.sqrt(s.k * s.m));
+    const each = TRIED.map(([name, loop]) => {
+      const factor = radius(loop, size, Math.sign(s.h) * zeta);
+      return `${name} ${factor > 1 ? "explodes" : "decays"} by a factor ${number(factor, 4)} a step`;
+    });
+    place.textContent = `h \u03c9 = ${number(size)}, damping ratio ${number(zeta)}: ${each.join(", ")}`;
   }
-  if (Number.isFinite(size)) root.append(element("circle", { class: "here", cx: at(size), cy: 14, r: 7 }));
-  document.getElementById("gauge").replaceChildren(root);
 }
 
-legend();
-draw();
+motion();
 selfCheck();
 live();
+banks();

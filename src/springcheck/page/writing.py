@@ -19,6 +19,8 @@ from springcheck.trajectory import Verdict
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
 """In the first lines of every report: no other file is replaced."""
+SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
+"""In the order in which they need one another."""
 HEAD = 1024
 """Bytes in which the mark stands."""
 
@@ -34,12 +36,11 @@ def html(content: Content) -> str:
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
     around.filters |= {"short": short, "fraction": fraction}
-    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in ("loops.js", "page.js"))
+    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
     style = (HERE / "page.css").read_text(encoding="utf-8")
     return around.get_template("page.html").render(
         content=content,
         scene=content.scene,
-        known=dict(content.summary.runs[0].parameters),
         # of the file alone, its lines kept
         scene_lines=[plain(line) for line in content.scene_text.splitlines()],
         mark=Markup(MARK),

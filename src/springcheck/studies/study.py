@@ -1,7 +1,8 @@
 """What a study is: a folder with its measure, result, text and figure, and its line in the list of studies.
 
 The folder's `__init__` declares the study and imports nothing heavy; its parts are imported when they are
-used: `measure.perform` and `measure.stored`, `text.lines`, `figure.draw`.
+used: `measure.perform` and `measure.stored`, `text.lines`, `figure.draw`, and `page.banks` where there are
+charts for the report page.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from springcheck.store import Summary
+    from springcheck.studies.charts import Bank
     from springcheck.text import Lines
 
 
@@ -77,8 +80,19 @@ class Study:
         written: list[Path] = self._part("figure").draw(found, folder)
         return written
 
+    def banks(self, found: Result) -> list[Bank]:
+        """Its charts in the report page; none where it has no such part."""
+        if find_spec(f"{self._package}.page") is None:
+            return []
+        banks: list[Bank] = self._part("page").banks(found)
+        return banks
+
     def _part(self, name: str) -> Any:
-        return import_module(f"{self.package or f'springcheck.studies.{self.name}'}.{name}")
+        return import_module(f"{self._package}.{name}")
+
+    @property
+    def _package(self) -> str:
+        return self.package or f"springcheck.studies.{self.name}"
 
 
 def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:

@@ -1,0 +1,40 @@
+"""The census in the report page: the orbits of the blog's spring."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.studies.census.result import Census, Entry
+from springcheck.studies.charts import Bank, Chart, Curve, Scale
+
+MOST_NAMES = 2
+
+
+def banks(census: Census) -> list[Bank]:
+    """One phase portrait; methods whose orbits are equal bit for bit are one curve."""
+    curves, on = [], []
+    for scheme, members in census.grouped.items():
+        same: dict[str, list[Entry]] = {}
+        for x in members:
+            same.setdefault(x.digest, []).append(x)
+        for i, equal in enumerate(same.values()):
+            names = [x.method for x in equal]
+            more = len(names) - MOST_NAMES
+            name = " = ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+            x = equal[0]
+            notes = [f"step {step}; bit for bit {', '.join(names)}" for step in range(len(x.q))]
+            curves.append(Curve(name=name, group=scheme, x=x.q, y=x.p, notes=notes))
+            if i == 0:
+                on.append(name)
+    if not curves:
+        return []
+    turn = np.linspace(0, 2 * np.pi, 201)
+    exact = Curve(name="exact", group="exact", x=np.cos(turn), y=np.sin(turn))
+    chart = Chart(
+        title="The blog's spring, m = k = 1, 200 steps of 0.1, by every method; a colour for each scheme.",
+        x=Scale(name="q"),
+        y=Scale(name="p"),
+        curves=[exact, *curves],
+        equal=True,
+    )
+    return [Bank(title="Orbits drawn", charts=[chart], on=["exact", *on])]

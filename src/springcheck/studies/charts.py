@@ -1,0 +1,131 @@
+"""What a study shows in the report page beside its text: charts as plain data, which the page draws.
+
+A study's folder may hold `page.banks(result)`.  Numbers are the stored doubles; `plain` makes of a bank
+what JSON can hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from typing import Any, Literal
+
+import numpy as np
+
+from springcheck import engines
+from springcheck.arrays import Floats
+from springcheck.errors import SpringcheckError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """One axis: its name with the unit."""
+
+    name: str
+    log: bool = False
+    values: Sequence[float] = ()
+    """Of tiles: what stands at 0, 1, 2 ..."""
+    shown: tuple[float, float] | None = None
+    """From and to at first; left out: what the curves fill."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """Points of one name; curves of one name are switched on and off together."""
+
+    name: str
+    group: str
+    """The scheme: it has one colour in the whole page."""
+    x: Sequence[float] | Floats
+    y: Sequence[float] | Floats
+    line: bool = True
+    marks: bool = False
+    notes: Sequence[str] = ()
+    """What is said of each point beside its numbers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tiles:
+    """A map of kinds over two axes of values: a row of numbers of kinds for each y; -1 is none."""
+
+    kinds: Sequence[tuple[str, str]]
+    """Name and shade of each: good, wild, limit, refused, wrong."""
+    rows: Sequence[Sequence[int]]
+    notes: Sequence[Sequence[str]] = ()
+    """What is said of each tile beside its kind; left out: nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """A line across a chart."""
+
+    axis: Literal["x", "y"]
+    at: float
+    name: str = ""
+    look: Literal["limit", "one"] = "limit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """Curves or tiles over two axes."""
+
+    title: str
+    x: Scale
+    y: Scale
+    curves: Sequence[Curve] = ()
+    tiles: Tiles | None = None
+    rules: Sequence[Rule] = ()
+    equal: bool = False
+    """Whether a unit is of one length on both axes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bank:
+    """Charts with one legend: of their curves, or of themselves where they are tiles."""
+
+    title: str
+    charts: Sequence[Chart]
+    on: Sequence[str] | None = None
+    """What is drawn at first; left out: everything."""
+
+
+def plain(bank: Bank) -> dict[str, Any]:
+    """For JSON: numbers that are none are words, rows of tiles are runs of one kind, [count, kind]."""
+    names = [x.name for chart in bank.charts for x in chart.curves]
+    titles = [chart.title for chart in bank.charts if chart.tiles]
+    on = [*names, *titles] if bank.on is None else bank.on
+    charts = [_chart(chart) for chart in bank.charts]
+    return {"title": bank.title, "charts": charts, "on": list(dict.fromkeys(on))}
+
+
+def numbers(values: Sequence[float] | Floats) -> list[float | str]:
+    """Doubles as JSON reads them back bit for bit, and words for those that JSON has not."""
+    words = {math.inf: "Infinity", -math.inf: "-Infinity"}
+    return [x if math.isfinite(x) else words.get(x, "NaN") for x in np.asarray(values, np.float64).tolist()]
+
+
+def _chart(chart: Chart) -> dict[str, Any]:
+    found = asdict(chart)
+    for name in ("x", "y"):
+        found[name]["values"] = numbers(found[name]["values"])
+    for curve in found["curves"]:
+        curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
+    if chart.tiles:
+        texts = list(dict.fromkeys(note for row in chart.tiles.notes for note in row if note))
+        at = {"": -1} | {text: i for i, text in enumerate(texts)}
+        found["tiles"] |= {
+            "rows": [[[len(list(run)), kind] for kind, run in groupby(row)] for row in chart.tiles.rows],
+            "texts": texts,
+            "notes": [[at[note] for note in row] for row in chart.tiles.notes],
+        }
+    return found
+
+
+def scheme_of(method: str) -> str:
+    """The scheme that colours a method; its own name where its engine is not here."""
+    try:
+        return engines.method(engines.parse(method)).scheme
+    except (SpringcheckError, KeyError):
+        return method

@@ -1,0 +1,130 @@
+"""Limits, regions, resonances and costs in the report page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from springcheck.studies.charts import Bank, Chart, Curve, Rule, Scale, Tiles, scheme_of
+from springcheck.studies.stability.costs import Cost
+from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.regions import Region
+from springcheck.studies.stability.resonance import Resonance
+from springcheck.studies.stability.result import Stability
+
+TURN = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
+MOST_ERROR = 30.0
+"""Errors above this say nothing."""
+
+
+def banks(study: Stability) -> list[Bank]:
+    """What was measured."""
+    found = []
+    if study.limits:
+        found.append(Bank(title="Schemes (lines) and methods (marks)", charts=[_limits(study.limits)]))
+    if study.regions:
+        charts = [_region(x) for x in study.regions]
+        found.append(Bank(title="Damped springs: where a method is stable", charts=charts))
+    if study.resonances:
+        charts = [_resonance(x) for x in study.resonances]
+        found.append(Bank(title="Multiple time steps: where they resonate", charts=charts))
+    if study.costs:
+        found.append(Bank(title="Methods drawn", charts=_costs(study.costs)))
+    return found
+
+
+def _limits(limits: Sequence[Limit]) -> Chart:
+    theories: dict[str, Curve] = {}
+    measured = []
+    for x in limits:
+        group = scheme_of(x.method)
+        theories.setdefault(
+            x.scheme, Curve(name=x.scheme.partition(":")[0], group=group, x=x.turn, y=x.radius_predicted)
+        )
+        note = f"limit {x.limit:.9g}, theory {x.theory:.9g}"
+        notes = [f"theory {y!r}; {note}" for y in x.radius_predicted.tolist()]
+        measured.append(
+            Curve(name=x.method, group=group, x=x.turn, y=x.radius, line=False, marks=True, notes=notes)
+        )
+    edges = sorted({x.theory for x in limits if 0 < x.theory < np.inf})
+    return Chart(
+        title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
+        x=Scale(name=TURN, log=True),
+        y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
+        curves=[*theories.values(), *measured],
+        rules=[Rule(axis="y", at=1.0, look="one"), *(Rule(axis="x", at=x, name=f"{x:.4g}") for x in edges)],
+    )
+
+
+KINDS = (
+    ("stable, as theory says", "good"),
+    ("unstable, as theory says", "refused"),
+    ("stable, where theory is not", "limit"),
+    ("unstable, where theory is not", "wrong"),
+)
+
+
+def _region(x: Region) -> Chart:
+    kinds = np.where(x.stable, np.where(x.stable_predicted, 0, 2), np.where(x.stable_predicted, 3, 1))
+    return Chart(
+        title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",
+        x=Scale(name=TURN, values=x.turn.tolist()),
+        y=Scale(
+            name="damping ratio, c / 2\N{SQUARE ROOT}(k m)",
+            values=x.ratio.tolist(),
+        ),
+        tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
+    )
+
+
+def _resonance(x: Resonance) -> Chart:
+    group = scheme_of(x.method)
+    bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in x.bands)
+    return Chart(
+        title=f"{x.scene}: one step of {x.method} grows at h \N{GREEK SMALL LETTER OMEGA} from {bands}.",
+        x=Scale(name="outer step times fast frequency"),
+        y=Scale(name="growth of one step"),
+        curves=[
+            Curve(name="the exact map", group="exact", x=x.turn, y=x.radius_predicted - 1),
+            Curve(name=x.method, group=group, x=x.turn, y=x.radius - 1, line=False, marks=True),
+        ],
+        rules=[Rule(axis="x", at=float(np.pi), name="\N{GREEK SMALL LETTER PI}")],
+    )
+
+
+def _costs(costs: Sequence[Cost]) -> list[Chart]:
+    ratio = "stiffness ratio" if costs[0].family == "two-scales" else "damping ratio"
+    what = {
+        "steps": "steps; those of unfinished runs are estimates",
+        "force_calls": "force calls of finished runs",
+        "error": "error of the slow motion",
+    }
+    charts = []
+    for name, title in what.items():
+        curves = []
+        for method in dict.fromkeys(x.method for x in costs):
+            mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0]
+            if name == "force_calls":
+                mine = [x for x in mine if x.outcome == "complete"]
+            if name == "error":
+                mine = [x for x in mine if x.error < MOST_ERROR]
+            curves.append(
+                Curve(
+                    name=method,
+                    group=scheme_of(method),
+                    x=[x.ratio for x in mine],
+                    y=[float(getattr(x, name)) for x in mine],
+                    marks=True,
+                    notes=[x.outcome for x in mine],
+                )
+            )
+        charts.append(
+            Chart(
+                title=f"What stiffness costs: {title}.",
+                x=Scale(name=ratio, log=True),
+                y=Scale(name=title.partition(";")[0], log=True),
+                curves=curves,
+            )
+        )
+    return charts
