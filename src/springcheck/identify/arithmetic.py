@@ -11,9 +11,9 @@ from springcheck.identify import coarse
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
+from springcheck.identify.maps import table
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.identify.starts import frame
 
 __all__ = ["QUANTUM", "Defect", "defect", "misses", "predicted"]
 
@@ -39,15 +39,16 @@ def predicted(match: Match, found: Map, slip: float = 0.0) -> Extended:
     """The map between frames that a match predicts, extended precision, in the frame of `found`; for steps
     longer by the share `slip`."""
     one = np.ones(1, dtype=np.longdouble)
-    out = frame(
-        FAMILIES[match.family],
+    family = FAMILIES[match.family]
+    out = table((family,)).frame(
+        np.zeros(1, dtype=np.int64),
         match.a * one * (1 + slip) ** 2,
-        match.g * one * (1 if FAMILIES[match.family].held else 1 + slip),
+        match.g * one * (1 if family.held else 1 + slip),
         match.log_mass * one - np.log1p(slip),
         np.array([float(match.stride)]),
-        found.size,
+        found.size[1:] / found.size[0],
     )
-    return np.asarray(out[0])
+    return np.asarray(out.reshape(2, 2))
 
 
 def misses(match: Match, found: Map) -> Extended:

@@ -15,9 +15,9 @@ from scipy.special import chdtri
 from springcheck.arrays import Extended, Floats, Reals
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
+from springcheck.identify.maps import power, unit
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.identify.starts import power
 from springcheck.schemes import SCHEMES, magnitude_step
 
 QUANTUM = 2.0**-32
@@ -109,10 +109,12 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
         stiffness=np.diag(a), rate=rate if match.friction else None,
     )  # fmt: skip
     numbers = np.arange(match.stride, dtype=np.float64)
-    unit = np.broadcast_to(FAMILIES[match.family].unit(match.a * one, match.g * one), (match.stride, 2, 2))
+    one_step = np.broadcast_to(
+        unit(FAMILIES[match.family], match.a * one, match.g * one), (match.stride, 2, 2)
+    )
     # q in units of its size, v of the interval's: v h grows by the stride and the ratio of the sizes
     up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
-    carried: Extended = np.sum(np.abs(power(unit, numbers)), axis=0)
+    carried: Extended = np.sum(np.abs(power(one_step, numbers)), axis=0)
     kicks = (carried @ np.array([q[0], p[0]])).astype(np.float64) * up
     steps = (carried.astype(np.float64) * up[:, None] / up[None, :]).sum(axis=1)
     return kicks, steps
@@ -186,18 +188,16 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
 
 def cut_off(found: Map, match: Match) -> Floats:
     """What forces that are cut off towards zero, in each of a frame's steps, do to a frame: (f - 1, 2)."""
-    unit = FAMILIES[match.family].unit(
-        np.array([match.a], np.longdouble), np.array([match.g], np.longdouble)
-    )[0]
-    unit = unit.astype(np.float64)
+    one = np.ones(1)
+    step = unit(FAMILIES[match.family], match.a * one, match.g * one)[0]
     up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
     state = found.z[:-1].astype(np.float64) / up
     out = np.zeros_like(state)
     rest = float(found.centre[0] / found.size[0])
     for _ in range(match.stride):
-        out = out @ unit.T
+        out = out @ step.T
         out[:, 1] -= np.sign(state[:, 0] + rest)
-        state = state @ unit.T
+        state = state @ step.T
     return np.asarray(out * up)
 
 

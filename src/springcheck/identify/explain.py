@@ -207,8 +207,8 @@ def _alternation(e: Evidence) -> list[Explanation]:
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
-    joints = search([e.found], [e.terms], range(1, 2))
-    joints += search([e.found], [e.terms], range(1, 2), distinct(damped=True))
+    joints = search([e.found], [e.terms], range(1, 2), far=True)
+    joints += search([e.found], [e.terms], range(1, 2), distinct(damped=True), far=True)
     distances = {x: distance(e.found, x.parts[0]) for x in joints}
     exact = [x for x in joints if x.scheme == "exact"]
     if not exact:

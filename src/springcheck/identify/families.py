@@ -8,16 +8,13 @@ stiffness k/(1 + a).  `search.coincident` finds such identities by matching fami
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Reals
-from springcheck.schemes import SCHEMES, Scheme, number, roundings
+from springcheck.schemes import SCHEMES, Scheme, roundings
 
 Stage: TypeAlias = tuple[str, Fraction | str]
 """kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`
@@ -34,9 +31,11 @@ HELD_SHARES = 64
 """Largest number of substeps that a held force is looked for at; a force held over more is a held force."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Family:
-    """A one-step map with unknowns a and, where `damped`, g; `place` says where the friction acts."""
+    """A one-step map with unknowns a and, where `damped`, g; `place` says where the friction acts.
+
+    `maps` evaluates it."""
 
     name: str
     scheme: str
@@ -51,101 +50,18 @@ class Family:
     path: int = 0
     limit: float = np.inf
     formula: str = ""
-    """A fault's map that stages do not give, by its name in FORMULAS."""
+    """A fault's map that stages do not give, by its name in `maps.FORMULAS`."""
     cause: str = ""
     remedy: str = ""
     """What is wrong, and what to do, where the family is a fault."""
     held: bool = False
     """Whether g is the share of h F/m that enters the position: a force held over substeps."""
 
-    def unit(self, a: Reals, g: Reals) -> Reals:
-        """One-step matrices (c, 2, 2) on (q, v h), a and g (c,), in their width."""
-        a, g = np.broadcast_arrays(a, g)
-        if self.held:
-            one = np.ones_like(a)
-            return _matrices(1 - g * a, one, -a, one)
-        if self.formula:
-            return FORMULAS[self.formula](a)
-        # a tableau's own friction is in its force, unless the velocity is scaled after the step
-        inside = 0 * g if self.stages else g
-        out = _exponential(a, g) if self.flow else _rational(self.stability, a, inside)
-        return _staged(self.stages, out, a, g)
-
     def rate(self, law: str, g: float) -> float:
         """gamma h of a law whose decay within a step is exp(-g)."""
         if law.startswith(IMPLICIT):
             return float(np.expm1(g))
         return float(-np.expm1(-g)) if law.startswith("a factor") else g
-
-
-def _matrices(a: Reals, b: Reals, c: Reals, d: Reals) -> Reals:
-    return np.moveaxis(np.array([[a, b], [c, d]]), -1, 0)
-
-
-@cache
-def _number(x: Fraction | str) -> np.longdouble:
-    return np.longdouble(number(x, np.longdouble))
-
-
-def _staged(stages: tuple[Stage, ...], start: Reals, a: Reals, g: Reals) -> Reals:
-    """The stages applied to maps (c, 2, 2), one row of them the position, the other the velocity."""
-    q, v = start[:, 0, :], start[:, 1, :]
-    a, g = a[:, None], g[:, None]
-    for kind, share in stages:
-        c = a.dtype.type(_number(share))
-        if kind == "drift":
-            q = q + c * v
-        elif kind == "kick":
-            v = v - (c * a) * q
-        elif kind == "friction":
-            v = v * np.exp(-c * g)
-        elif kind == "explicit":
-            v = v - c * (a * q + g * v)
-        elif kind == "implicit":
-            v = (v - c * a * q) / (1 + c * g)
-        elif kind == "centred":
-            v = ((1 - c * g / 2) * v - c * a * q) / (1 + c * g / 2)
-        else:
-            v = v - c * (a * q + g * (v + c * a * q) / (1 - c * g))
-    return np.stack([q, v], axis=1)
-
-
-def _rational(stability: tuple[tuple[Fraction, ...], tuple[Fraction, ...]], a: Reals, g: Reals) -> Reals:
-    """R(L) of L = [[0, 1], [-a, -g]], by Horner's rule."""
-    numerator, denominator = stability
-    if not numerator:
-        zero, one = np.zeros_like(a), np.ones_like(a)
-        return _matrices(one, zero, zero, one)
-
-    width = a.dtype.type
-
-    def horner(row: tuple[Fraction, ...]) -> tuple[Reals, Reals]:
-        # every polynomial of L is x I + y L, because L**2 = -g L - a I
-        x, y = np.full_like(a, width(_number(row[-1]))), np.zeros_like(a)
-        for c in row[-2::-1]:
-            x, y = width(_number(c)) - a * y, x - g * y
-        return x, y
-
-    x, y = horner(numerator)
-    u, w = horner(denominator)
-    # (x + y L) / (u + w L): the adjugate of u + w L is (u - w g) - w L
-    det = u * u - u * w * g + w * w * a
-    p, r = u - w * g, -w
-    x, y = (x * p - a * y * r) / det, (x * r + y * p - g * y * r) / det
-    return _matrices(x, y, -a * y, x - g * y)
-
-
-def _exponential(a: Reals, g: Reals) -> Reals:
-    """exp(L), of any damping: L + g/2 is traceless, and its square a multiple of one."""
-    w2 = a - g * g / 4
-    w = np.sqrt(np.abs(w2))
-    even = np.where(w2 >= 0, np.cos(w), np.cosh(np.minimum(w, 1e3)))
-    safe = np.where(w == 0, 1, w)
-    odd = np.where(w == 0, 1, np.where(w2 >= 0, np.sin(w), np.sinh(np.minimum(w, 1e3))) / safe)
-    decay = np.exp(-g / 2)
-    return _matrices(
-        decay * (even + odd * g / 2), decay * odd, -decay * odd * a, decay * (even - odd * g / 2)
-    )
 
 
 def stability_function(
@@ -296,40 +212,6 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
 )
 """What is written down wrongly in Runge-Kutta methods, as tableaux."""
 
-
-def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
-    q11, q12 = 1 - drift * first * a, drift + 0 * a
-    return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
-
-
-def _lagging(a: Reals, base: str, steps: int) -> Reals:
-    """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
-    m = FAMILIES[base].unit(a, np.zeros_like(a))
-    det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
-    row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
-    turn = np.zeros_like(m)
-    turn[:, 0, 0], turn[:, 1, :] = 1, row
-    back = np.zeros_like(m)
-    back[:, 0, 0], back[:, 1, 0], back[:, 1, 1] = 1, -row[:, 0] / row[:, 1], 1 / row[:, 1]
-    return np.asarray(turn @ m @ back)
-
-
-FORMULAS: dict[str, Callable[[Reals], Reals]] = {
-    "old force": lambda a: _matrices(1 - a / 2, 1 + 0 * a, -a, 1 + 0 * a),
-    "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
-    "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
-    "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
-    "half drift": lambda a: _splitting(a, 0.5, 0.5, 0.5),
-    "double drift": lambda a: _splitting(a, 0.5, 2, 0.5),
-    "full kicks": lambda a: _splitting(a, 1, 1, 1),
-    "no second kick": lambda a: _splitting(a, 0.5, 1, 0),
-    "no first kick": lambda a: _splitting(a, 0, 1, 0.5),
-    **{
-        f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
-        for name in (EULER, VERLET, POSITION, "rk4", "exact")
-        for n in (-1, 1)
-    },
-}
 
 _FAULTS = (
     ("old force", "Velocity Verlet whose second half kick uses the old force, "

@@ -1,32 +1,24 @@
-"""Families held against the entries of a map: one unknown or two, and the other entries are predictions."""
+"""Families held against the entries of maps: one unknown or two, and the other entries are predictions."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
 
-from springcheck.arrays import Extended, Floats
+from springcheck.arrays import Extended, Floats, Reals
 from springcheck.identify.families import FAMILIES, Family
-from springcheck.identify.fit import Map
-from springcheck.identify.starts import (
-    Roots,
-    Terms,
-    flow_starts,
-    frame,
-    inverse,
-    real_starts,
-    roots,
-    starts,
-)
+from springcheck.identify.fit import ROUNDING, Map
+from springcheck.identify.maps import Table, table
+from springcheck.identify.starts import Guesses, Terms, joined, least_squares, real_starts, starts
 from springcheck.schemes import rotation
 
 CHANCE = 1e-7
 """Probability with which a right scheme may be refused: five standard errors."""
-
-STRIDES = 12, 100
-"""Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
 
 WHOLE = 2
 """Roundings of a step that act on a whole state and not on what a step adds to it."""
@@ -36,6 +28,18 @@ FAR = 1e300
 
 HOPELESS = 1e4
 """Chi-squared that is not refined any further after the first few steps: a hundred standard errors."""
+
+ROUNDS = 20
+"""Newton's steps at most; they double the digits of a guess."""
+
+OPERATIONS = 8
+"""Roundings of double precision that a predicted entry may be off by, in units of `Targets.coherent`."""
+
+
+@cache
+def most(freedom: int) -> float:
+    """Largest chi-squared that is accepted."""
+    return float(chdtri(freedom, CHANCE))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +64,7 @@ class Match:
     @property
     def accepted(self) -> bool:
         """Whether the entries agree within their uncertainty."""
-        return self.chi2 <= float(chdtri(self.freedom, CHANCE))
+        return self.chi2 <= most(self.freedom)
 
     @property
     def scheme(self) -> str:
@@ -72,167 +76,214 @@ class Match:
         return 0.0 if FAMILIES[self.family].held else self.g
 
 
-def match(family: Family, found: Map, terms: Terms, strides: range, root: Roots | None = None) -> list[Match]:
-    """The family fitted to a map at these strides; `root` are the map's roots where it turns."""
-    base = FAMILIES[family.scheme] if family.damped and not family.held else family
-    far = False
-    if rotation(found.entries[None]).angle[0] > 0:
-        if family.flow:
-            s, turns, a, g = flow_starts(found, damped=family.damped, growing=terms.growing)
-        else:
-            spread = 100 * float(np.sqrt(found.covariance.max()))
-            s, turns, a, g, far = starts(family, base, root or roots(found, strides), terms, spread)
-    elif family.held:
-        return []
-    else:
-        s, turns, values = real_starts(base, found, strides)
-        a, g = values.astype(np.longdouble), np.zeros(len(s), dtype=np.longdouble)
-        if family.damped and len(s):
-            own = rotation(base.unit(a, g)).determinant
-            total = rotation(found.entries[None]).determinant[0]
-            if not total > 0:
-                return []
-            with np.errstate(all="ignore"):
-                g = np.log(np.abs(own)) - np.log(total) / s
-            good = np.isfinite(g) & ((g > 0) | terms.growing)
-            s, turns, a, g = s[good], turns[good], a[good], g[good]
-    if not len(s):
-        return []
-    unknowns = [a, g, np.zeros_like(a)]
-    free = [0, 1] if family.damped else [0]
-    if terms.mass_unknown and terms.log_stiffness is None:
-        with np.errstate(all="ignore"):
-            guess = frame(family, a, g, unknowns[2], s, found.size)
-            up = np.abs(guess[:, 0, 1] / found.entries[0, 1])
-            down = np.abs(found.entries[1, 0] / guess[:, 1, 0])
-            unknowns[2] = np.nan_to_num(np.log(up * down) / 2)
-        free.append(2)
-    return _refine(family, found, terms, s, turns, unknowns, free, rounds=1 if far else 20)
+class Targets:
+    """Maps that families are held against, and the errors of their entries.
 
+    The covariance of a candidate is that of the fit and the interval, the same for all, and of coefficients
+    rounded once, a multiple of 1: in the eigenvectors of the former it is diagonal.
+    """
 
-def _refine(
-    family: Family,
-    found: Map,
-    terms: Terms,
-    s: Floats,
-    turns: Floats,
-    unknowns: list[Extended],
-    free: list[int],
-    *,
-    rounds: int,
-) -> list[Match]:
-    """Gauss-Newton on the four entries, weighted by their covariance; all first guesses at once."""
-    observed = found.entries.reshape(4)
-
-    def log_masses(values: Extended, strides: Floats) -> Extended:
-        if terms.log_stiffness is None:
-            return values[:, 2]
-        return np.asarray(terms.log_stiffness - 2 * np.log(strides) - np.log(np.abs(values[:, 0])))
-
-    def entries_at(values: Extended, strides: Floats) -> Extended:
-        masses = log_masses(values, strides)
-        return frame(family, values[:, 0], values[:, 1], masses, strides, found.size).reshape(-1, 4)
-
-    values = np.stack(unknowns, axis=1)
-    if rounds == 1:
-        # far off: what it predicts is wanted, and no best fit
-        with np.errstate(all="ignore"):
-            entries = entries_at(values, s)
-        chi2, errors = np.full(len(s), FAR), np.zeros((len(s), 3))
-        return _matches(
-            family, terms, s, turns, values, log_masses(values, s), errors, chi2, entries, len(free)
+    def __init__(self, maps: Sequence[Map], terms: Sequence[Terms]) -> None:
+        self.terms = terms[0]
+        self.observed: Extended = np.stack([found.entries.reshape(4) for found in maps])
+        self.ratio: Extended = np.array([found.size[1] / found.size[0] for found in maps])
+        sizes = np.abs(self.observed.astype(np.float64))
+        self.largest = np.maximum(1.0, sizes.max(axis=1))
+        self.log_stiffness = None
+        if terms[0].log_stiffness is not None:
+            self.log_stiffness = np.array([x.log_stiffness for x in terms], np.float64)
+        covariance = np.stack([found.covariance for found in maps])
+        diagonal = np.stack(
+            [np.repeat(x.bias * found.residual, 2) for found, x in zip(maps, terms, strict=True)]
         )
-    weights = _weights(family, found, terms, s, values[:, 0], values[:, 1])
-    kept, entries = values.copy(), np.zeros((len(s), 4), dtype=np.longdouble)
-    chi2, stalled = np.full(len(s), np.inf), np.zeros(len(s), dtype=int)
-    errors = np.zeros((len(s), 3))
-    alive = np.arange(len(s))
-    # Newton's steps double the digits of a guess, and what has not come close by then will not
-    hopeless = 4 if len(free) == 1 else 8
+        diagonal = diagonal**2 + (terms[0].jitter * sizes * [0, 1, 1, 0]) ** 2
+        values, self.axes = np.linalg.eigh(covariance + diagonal[:, :, None] * np.eye(4))
+        self.variance = np.maximum(values, 1e-15 * values[:, -1:])
+
+    def coherent(self, every: Table, x: Guesses, a: Reals, g: Reals) -> Floats:
+        """What roundings of coefficients do to an entry (c,), the same in every step.
+
+        No number of pairs averages the rounding of h k or h/m away: an entry of the map over s steps is
+        uncertain by the roundings of its path times what s steps add to a state, s h w of it and no more than
+        s, whatever the fit says.  A factor near 1, of friction or of a velocity that is rebuilt over the step,
+        is rounded as well, and acts on the whole state in each of s steps.
+        """
+        added = np.minimum(np.sqrt(np.abs(a)) + np.abs(g), 1).astype(np.float64)
+        return np.asarray((every.path[x.which] * added + WHOLE) * x.s * self.largest[x.of])
+
+    def log_masses(self, x: Guesses, values: Reals) -> Reals:
+        if self.log_stiffness is None:
+            return values[:, 2]
+        return np.asarray(self.log_stiffness[x.of] - 2 * np.log(x.s) - np.log(np.abs(values[:, 0])))
+
+    def entries(self, every: Table, x: Guesses, values: Reals) -> Reals:
+        masses = self.log_masses(x, values)
+        return every.frame(x.which, values[:, 0], values[:, 1], masses, x.s, self.ratio[x.of])
+
+
+def match(
+    families: tuple[Family, ...],
+    maps: Sequence[Map],
+    terms: Sequence[Terms],
+    strides: range,
+    *,
+    keys: set[tuple[str, int]] | None = None,
+    far: bool = False,
+) -> list[dict[tuple[str, int], Match]]:
+    """The best match of each family and stride with each map, of those in `keys` where these are given.
+
+    What cannot be accepted is given only where `far` asks for it.
+    """
+    every = table(families)
     with np.errstate(all="ignore"):
-        for turn in range(rounds):
-            now_s, now_weights, now_values = s[alive], weights[alive], values[alive]
-            predicted = entries_at(now_values, now_s)
-            miss = np.asarray(observed - predicted, dtype=np.float64)
-            now = np.einsum("ci,cij,cj->c", miss, now_weights, miss)
-            better = now < chi2[alive]
-            stalled[alive] = np.where(now < 0.9 * chi2[alive], 0, stalled[alive] + 1)
-            new = alive[better]
-            kept[new], entries[new], chi2[new] = now_values[better], predicted[better], now[better]
-            going = (stalled[alive] < 2) & ((turn < hopeless) | (chi2[alive] < HOPELESS))
-            if not np.any(going):
-                break
-            slopes = np.empty((len(alive), 4, len(free)))
-            for column, i in enumerate(free):
-                # a difference quotient: its error slows the iteration, it does not move the end
-                delta = (
-                    np.abs(now_values[:, 0]) * 1e-5 if i == 0 else np.full(len(alive), np.longdouble(1e-6))
-                )
-                shift = np.zeros_like(now_values)
-                shift[:, i] = delta
-                rise = entries_at(now_values + shift, now_s) - predicted
-                slopes[:, :, column] = (rise / delta[:, None]).astype(np.float64)
-            spread = inverse(np.einsum("cia,cij,cjb->cab", slopes, now_weights, slopes))
-            errors[np.ix_(new, free)] = np.sqrt(np.abs(np.einsum("cii->ci", spread[better])))
-            change = np.nan_to_num(np.einsum("cab,cib,cij,cj->ca", spread, slopes, now_weights, miss))
-            limit = 0.5 * np.abs(now_values[:, 0].astype(np.float64))
-            change[:, 0] = np.clip(change[:, 0], -limit, limit)
-            values[alive[:, None], free] += change
-            going &= np.any(np.abs(change) > 1e-17 * np.maximum(np.abs(now_values[:, free]), 1e-300), axis=1)
-            alive = alive[going]
-            if not len(alive):
-                break
-    masses = log_masses(kept, s)
-    return _matches(family, terms, s, turns, kept, masses, errors, chi2, entries, len(free))
+        parts = []
+        for of, (found, what) in enumerate(zip(maps, terms, strict=True)):
+            turning = bool(rotation(found.entries[None]).angle[0] > 0)
+            if not turning and not rotation(found.entries[None]).determinant[0] > 0 and every.damped:
+                continue
+            parts.append((starts if turning else real_starts)(every, found, of, what, strides))
+        out: list[dict[tuple[str, int], Match]] = [{} for _ in maps]
+        if not parts:
+            return out
+        guesses = joined(parts)
+        if keys is not None:
+            wanted = np.zeros((len(families), strides.stop), dtype=bool)
+            for name, stride in keys:
+                wanted[[f.name for f in families].index(name), stride] = True
+            guesses = guesses[np.flatnonzero(wanted[guesses.which, guesses.s.astype(int)])]
+        target = Targets(maps, terms)
+        _matched(every, target, guesses, out, far=far)
+    return out
 
 
-def _matches(
-    family: Family,
-    terms: Terms,
-    s: Floats,
-    turns: Floats,
-    kept: Extended,
-    masses: Extended,
-    errors: Floats,
+def _matched(
+    every: Table, target: Targets, guesses: Guesses, out: list[dict[tuple[str, int], Match]], *, far: bool
+) -> None:
+    """Candidates in double precision first, and what may be accepted then in extended precision."""
+    free = [0, 1] if every.damped else [0]
+    values = np.stack([guesses.a, guesses.g, np.zeros_like(guesses.a)], axis=1)
+    if target.terms.mass_unknown and target.log_stiffness is None:
+        free.append(2)
+        predicted = target.entries(every, guesses, values)
+        observed = target.observed[guesses.of].astype(np.float64)
+        scale = np.abs(predicted[:, 1] / observed[:, 1]) * np.abs(observed[:, 2] / predicted[:, 2])
+        values[:, 2] = np.nan_to_num(np.log(scale) / 2)
+    freedom = 4 - len(free)
+    if far and not np.all(guesses.near):
+        # what it predicts is wanted, and no best fit
+        at = np.flatnonzero(~guesses.near)
+        entries = target.entries(every, guesses[at], values[at])
+        _best(
+            every, target, guesses[at], values[at], np.full(len(at), FAR), entries, 0 * entries, freedom, out
+        )
+    at = np.flatnonzero(guesses.near)
+    chi2, values[at], entries, errors = _refined(every, target, guesses[at], values[at], free)
+    x, values = guesses[at], values[at]
+    if far:
+        _best(every, target, x, values, chi2, entries, errors, freedom, out)
+    # roundings of double precision, in standard errors of an entry
+    whole = target.coherent(every, x, values[:, 0], values[:, 1])
+    error = np.sqrt((target.terms.rounding * whole) ** 2 + target.variance[x.of, 0])
+    likely = np.flatnonzero(chi2 <= (np.sqrt(most(freedom)) + OPERATIONS * ROUNDING * whole / error) ** 2)
+    x, values = x[likely], values[likely].astype(np.longdouble)
+    if len(likely):
+        chi2, values, entries, errors = _refined(every, target, x, values, free)
+        _best(every, target, x, values, chi2, entries, errors, freedom, out)
+
+
+def _refined(
+    every: Table, target: Targets, x: Guesses, values: Reals, free: list[int]
+) -> tuple[Floats, Reals, Reals, Floats]:
+    """Gauss-Newton on the four entries, weighted by their covariance, in the width of the values; chi-squared,
+    values, entries and errors."""
+    n = len(values)
+    whole = target.terms.rounding * target.coherent(every, x, values[:, 0], values[:, 1])
+    weight = 1 / np.sqrt(target.variance[x.of] + whole[:, None] ** 2)
+    axes, observed = target.axes[x.of], target.observed[x.of].astype(values.dtype)
+    kept, entries = values.copy(), np.zeros((n, 4), dtype=values.dtype)
+    chi2, stalled, errors = np.full(n, np.inf), np.zeros(n, dtype=int), np.zeros((n, 3))
+    alive = np.arange(n)
+    tolerance = np.finfo(values.dtype).eps / 8
+    hopeless = 4 if len(free) == 1 else 8
+    for turn in range(ROUNDS):
+        if not len(alive):
+            break
+        k, now = x[alive], values[alive]
+        shifts = [np.zeros_like(now)]
+        for i in free:
+            # a difference quotient: its error slows the iteration, it does not move the end
+            shifts.append(np.zeros_like(now))
+            shifts[-1][:, i] = np.abs(now[:, 0]) * 1e-5 if i == 0 else 1e-6
+        together = joined([k] * len(shifts))
+        predicted, *shifted = np.split(
+            target.entries(every, together, np.concatenate([now + d for d in shifts])), len(shifts)
+        )
+        rows, turned = weight[alive], axes[alive]
+
+        def whitened(y: Reals, turned: Floats = turned, rows: Floats = rows) -> Floats:
+            return np.asarray(np.matmul(y.astype(np.float64)[:, None, :], turned)[:, 0] * rows)
+
+        miss = whitened(observed[alive] - predicted)
+        size = np.sum(miss**2, axis=1)
+        better = size < chi2[alive]
+        stalled[alive] = np.where(size < 0.9 * chi2[alive], 0, stalled[alive] + 1)
+        new = alive[better]
+        kept[new], entries[new], chi2[new] = now[better], predicted[better], size[better]
+        slopes = np.stack(
+            [
+                whitened((y - predicted) / d[:, [i]])
+                for i, y, d in zip(free, shifted, shifts[1:], strict=True)
+            ],
+            axis=2,
+        )
+        change, variance = least_squares(slopes, miss)
+        errors[np.ix_(new, free)] = np.sqrt(np.abs(variance[better]))
+        limit = 0.5 * np.abs(now[:, 0].astype(np.float64))
+        change[:, 0] = np.clip(change[:, 0], -limit, limit)
+        values[alive[:, None], free] += change
+        going = (stalled[alive] < 2) & ((turn < hopeless) | (chi2[alive] < HOPELESS))
+        going &= np.any(np.abs(change) > tolerance * np.maximum(np.abs(now[:, free]), 1e-300), axis=1)
+        alive = alive[going]
+    return chi2, kept, entries, errors
+
+
+def _best(
+    every: Table,
+    target: Targets,
+    x: Guesses,
+    values: Reals,
     chi2: Floats,
-    entries: Extended,
-    unknowns: int,
-) -> list[Match]:
+    entries: Reals,
+    errors: Floats,
+    freedom: int,
+    out: list[dict[tuple[str, int], Match]],
+) -> None:
+    """Put the best candidate of each map, family and stride into `out`: accepted, of few turns, close."""
     physical = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=1)
-    if family.damped and not family.held and not terms.growing:
-        physical &= kept[:, 1] > 0
-    return [
-        Match(
-            family=family.name,
-            stride=int(s[i]),
-            turns=int(turns[i]),
-            a=float(kept[i, 0]),
+    if every.damped and not target.terms.growing:
+        held = np.array([family.held for family in every.families])
+        physical &= (values[:, 1] > 0) | held[x.which]
+    masses: Any = target.log_masses(x, values)
+    at = np.flatnonzero(physical)
+    order = at[np.lexsort((chi2[at], x.turns[at], chi2[at] > most(freedom), x.s[at], x.which[at], x.of[at]))]
+    seen: set[tuple[int, str, int]] = set()
+    for i in order.tolist():
+        name, stride = every.families[x.which[i]].name, int(x.s[i])
+        key = int(x.of[i]), name, stride
+        if key in seen:
+            continue
+        seen.add(key)
+        out[key[0]][name, stride] = Match(
+            family=name,
+            stride=stride,
+            turns=int(x.turns[i]),
+            a=float(values[i, 0]),
             a_error=float(errors[i, 0]),
-            g=float(kept[i, 1]),
+            g=float(values[i, 1]),
             g_error=float(errors[i, 1]),
             log_mass=float(masses[i]),
             mass_error=float(errors[i, 2]),
             chi2=float(chi2[i]),
-            freedom=4 - unknowns,
-            predicted=tuple(float(x) for x in entries[i]),
+            freedom=freedom,
+            predicted=tuple(float(y) for y in entries[i]),
         )
-        for i in np.flatnonzero(physical)
-    ]
-
-
-def _weights(family: Family, found: Map, terms: Terms, s: Floats, a: Extended, g: Extended) -> Floats:
-    """Inverse covariances (c, 4, 4): of the fit, of coefficients rounded once, of the interval.
-
-    The rounding of h k or h/m is the same in every step, so no number of pairs averages it away: an entry
-    of the map over s steps is uncertain by the roundings of its path times what s steps add to a state,
-    s h w of it and no more than s, whatever the fit says.  A factor near 1, of friction or of a velocity
-    that is rebuilt over the step, is rounded as well, and acts on the whole state in each of s steps.
-    """
-    b = np.abs(found.entries.astype(np.float64))
-    largest = max(1.0, float(np.max(b)))
-    added = np.minimum(np.sqrt(np.abs(a)) + np.abs(g), 1).astype(np.float64)
-    coherent = terms.rounding * (family.path * added + WHOLE) * s * largest
-    clock = np.diag((terms.jitter * b * np.array([[0, 1], [1, 0]])).reshape(4) ** 2)
-    bias = np.diag(np.repeat(terms.bias * found.residual, 2) ** 2)
-    total = found.covariance + clock + bias + coherent[:, None, None] ** 2 * np.eye(4)
-    return inverse(total)

@@ -21,6 +21,7 @@ from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, unt
 from springcheck.identify.record import Record, read
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import (
+    FEW,
     Joint,
     difference,
     disagreements,
@@ -96,15 +97,16 @@ def identify_arrays(
             "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
         )
     if any(found.drifts for found in maps):
-        return _unknown(record, moving, maps, base, stated, [], notes)
-    joints, fitting, terms = find(record, maps, base, stride)
-    explained = _explained(record, moving, maps, joints, terms) if fitting else {}
+        return _unknown(record, moving, maps, base, stated, range(1, 2), notes)
+    joints, terms = find(record, maps, base, stride)
+    fits_entries = bool(joints)
+    explained = _explained(record, moving, maps, joints, terms)
     if not explained:
         joints, remark = _single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)
         notes += [remark] if explained else []
     if not explained:
-        return _unknown(record, moving, maps, base, stated, [] if fitting else joints, notes)
+        return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
     joints = list(explained)
     if stated is not None:
         joints = [x for x in joints if not disagreements(record, moving, x, stated)] or joints
@@ -331,15 +333,15 @@ def _unknown(
     maps: list[Map],
     terms: list[Terms],
     stated: Floats | None,
-    tried: list[Joint],
+    strides: range,
     notes: list[str],
 ) -> Identification:
-    """No scheme: what may be wrong, and the nearest."""
+    """No scheme: what may be wrong, and the nearest of these strides."""
 
     def distance(joint: Joint) -> float:
         return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
-    tried = tried or search(maps, terms, range(1, 2))
+    tried = search(maps, terms, strides, far=True)
     determinant, symplectic = _determinants(maps, 1)
     nearest: str | None = None
     off: tuple[float, ...] = (math.nan,) * 4

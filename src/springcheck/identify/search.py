@@ -8,13 +8,14 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.arrays import Floats, Reals
 from springcheck.identify.families import DAMPED, FAMILIES, HELD, UNDAMPED, Family
 from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.match import STRIDES, Match, match
+from springcheck.identify.maps import table, unit
+from springcheck.identify.match import Match, match
 from springcheck.identify.record import Record
-from springcheck.identify.starts import Roots, Terms, roots, solved
-from springcheck.schemes import SCHEMES, rotation
+from springcheck.identify.starts import Terms, solved
+from springcheck.schemes import SCHEMES
 
 BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
@@ -72,9 +73,12 @@ class Joint:
 
 
 def _same(one: Family, other: Family, g: tuple[float, ...]) -> bool:
-    a = np.array([0.3, 1.1, 2.9], dtype=np.longdouble)
-    rates = np.array(g, dtype=np.longdouble)
-    return bool(np.max(np.abs(one.unit(a, rates) - other.unit(a, rates))) < 1e-15)
+    return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
+
+
+@cache
+def _samples(family: Family, g: tuple[float, ...]) -> Reals:
+    return unit(family, np.array([0.3, 1.1, 2.9], np.longdouble), np.array(g, np.longdouble))
 
 
 @cache
@@ -118,16 +122,18 @@ def distinct(*, damped: bool) -> tuple[Family, ...]:
 def coincident(name: str) -> tuple[str, ...]:
     """Damped families that have the map of this scheme without friction, on springs of another stiffness."""
     a = np.array([0.3, 0.7, 1.1])
-    wanted = FAMILIES[name].unit(a.astype(np.longdouble), np.zeros(3, dtype=np.longdouble)).astype(np.float64)
+    wanted = np.asarray(unit(FAMILIES[name], a, np.zeros(3)), np.float64)
     g = -np.log(np.abs(np.linalg.det(wanted)))
     if not np.all(g > 1e-9):
         return ()
-    out = []
-    for family in distinct(damped=True):
-        values, off = solved(family, a + (g / 2) ** 2, g, wanted, free_scale=False, turns=40)
-        if np.all(off < 1e-12) and np.all(values[:, 1] > 1e-6):
-            out.append(family.name)
-    return tuple(out)
+    every = table(distinct(damped=True))
+    n = len(every.families)
+    _, rates, off = solved(
+        every, np.repeat(np.arange(n), 3), np.tile(a + (g / 2) ** 2, n), np.tile(g, n),
+        np.tile(wanted, (n, 1, 1)), free_scale=False, turns=40,
+    )  # fmt: skip
+    same = np.all(((off < 1e-12) & (rates > 1e-6)).reshape(n, 3), axis=1)
+    return tuple(family.name for family, known in zip(every.families, same, strict=True) if known)
 
 
 def search(
@@ -135,37 +141,30 @@ def search(
     terms: list[Terms],
     strides: range,
     families: tuple[Family, ...] = (),
-    rooted: dict[tuple[int, range], Roots] | None = None,
+    *,
+    far: bool = False,
 ) -> list[Joint]:
-    """Every family and stride against every oscillator; what fails one is not tried on the next."""
-    rooted = {} if rooted is None else rooted
-    keys: dict[tuple[str, int], list[Match]] = {}
-    for i, (found, what) in enumerate(zip(maps, terms, strict=True)):
-        best: dict[tuple[str, int], Match] = {}
-        turning = bool(rotation(found.entries[None]).angle[0] > 0)
-        for family in families or distinct(damped=False):
-            wanted = sorted({key[1] for key in keys if key[0] == family.name}) if i else []
-            if i and not wanted:
-                continue
-            within = range(wanted[0], wanted[-1] + 1) if i else strides
-            if turning and (i, within) not in rooted:
-                rooted[i, within] = roots(found, within)
-            for m in match(family, found, what, within, rooted.get((i, within))):
-                key = family.name, m.stride
-                old = best.get(key)
-                if old is None or (not m.accepted, m.turns, m.chi2) < (not old.accepted, old.turns, old.chi2):
-                    best[key] = m
-        merged = {
-            key: [*keys.get(key, []), m]
-            for key, m in best.items()
-            if not i or (key in keys and len(keys[key]) == i)
-        }
-        passing = {key: ms for key, ms in merged.items() if all(m.accepted for m in ms)}
-        keys = passing if passing and i + 1 < len(maps) else merged
+    """Every family and stride against every oscillator; what fails one is not tried on the others.
+
+    Those that are accepted, or with `far` all."""
+    families = families or distinct(damped=False)
+    first = match(families, maps[:1], terms[:1], strides, far=far)[0]
+    passing = {key: m for key, m in first.items() if m.accepted} or (first if far else {})
+    rest: list[dict[tuple[str, int], Match]] = []
+    if passing and len(maps) > 1:
+        left = tuple(f for f in families if any(f.name == name for name, _ in passing))
+        found = [stride for _, stride in passing]
+        within = range(min(found), max(found) + 1)
+        rest = match(left, maps[1:], terms[1:], within, keys=set(passing), far=far)
     return [
-        Joint(family=k[0], stride=k[1], parts=tuple(ms)) for k, ms in keys.items() if len(ms) == len(maps)
+        Joint(family=key[0], stride=key[1], parts=(m, *(x[key] for x in rest)))
+        for key, m in passing.items()
+        if all(key in x for x in rest)
     ]
 
+
+STRIDES = 12, 100
+"""Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
 
 FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
 
@@ -186,33 +185,29 @@ class Room:
 
 def find(
     record: Record, maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], bool, list[Terms]]:
-    """All families that the states do not exclude, the plainest first, and True; or all tried, and False.
+) -> tuple[list[Joint], list[Terms]]:
+    """All families that the states do not exclude, the plainest first, and what was allowed for.
 
     What is plainer comes first, and ends the search where it fits.
     """
     residual = max(float(np.max(found.residual)) for found in maps)
     whole = all(found.whole for found in maps)
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    tried: list[Joint] = []
-    rooted: dict[tuple[int, range], Roots] = {}
     for rooms in _plan(fine=record.fine, text=record.text, whole=whole, residual=residual):
         accepted: list[Joint] = []
         for room in rooms:
             terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in base]
             for strides in (*first, *room.strides):
-                joints = search(maps, terms, strides, room.families, rooted)
-                fitting = [x for x in joints if x.accepted]
+                fitting = [x for x in search(maps, terms, strides, room.families) if x.accepted]
                 if fitting:
                     further = strides is FEW and (MANY in room.strides or not room.bias)
                     accepted += fitting
                     if further:
                         accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
                     break
-                tried += joints if not room.damped and strides is not MANY else []
         if accepted:
-            return _likely(accepted), True, terms
-    return tried, False, base
+            return _likely(accepted), terms
+    return [], base
 
 
 def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[Room]]:
@@ -281,7 +276,8 @@ def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> b
         return False
     wide = replace(terms, bias=1.0)
     flow = FAMILIES["exact, damped" if chosen.damped else "exact"]
-    return all(m.chi2 > PLAIN**2 for m in match(flow, found, wide, range(1, 2)))
+    near = match((flow,), [found], [wide], range(1, 2), far=True)[0]
+    return all(m.chi2 > PLAIN**2 for m in near.values())
 
 
 def numbers(

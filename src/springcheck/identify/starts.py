@@ -1,4 +1,4 @@
-"""First guesses of a family's unknowns, from the phase, the growth and the entries of one step."""
+"""First guesses of the families' unknowns, from the phase, the growth and the entries of one step."""
 
 from __future__ import annotations
 
@@ -8,16 +8,27 @@ from itertools import pairwise
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
+from springcheck.arrays import Floats, Integers
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
+from springcheck.identify.maps import Table, table, unit
 from springcheck.schemes import rotation
 
 NEAR = 3e-4
 """Distance of the entries of one step, of size 1, within which a family is worth an exact comparison."""
 
 GUESSED = 0.05
-"""The same for a first guess."""
+"""The same for a first guess without friction, which is good to 1e-3 where the family is right."""
+
+LOST = 30.0, 2.0, 0.5, 0.3
+"""The same before each step with friction.  Measured on 2,900 maps of h w up to 1 and up to a third of the
+critical damping: 19, 0.18, 0.006 and 1e-6 at most."""
+
+CHUNK = 4096
+"""Candidates that are solved at once, so that their arrays stay in the processor's cache."""
+
+FLOW_TURNS = 8
+"""Turns between two frames that the exact flow is looked for at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,38 +47,25 @@ class Terms:
     """Whether friction of the wrong sign is looked for."""
 
 
-def power(matrices: Extended, strides: Floats) -> Extended:
-    """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant."""
-    found = rotation(matrices)
-    s = np.asarray(strides, dtype=np.longdouble)
-    root = np.sqrt(np.abs(found.determinant))
-    turning = found.angle > 0
-    angle = np.where(turning, found.angle, 0)
-    growth = np.where(turning, 0, found.growth)
-    even_s, even_1 = (np.where(turning, np.cos(angle * x), np.cosh(growth * x)) for x in (s, 1))
-    odd_1 = np.where(turning, np.sin(angle), np.sinh(growth))
-    odd_s = np.where(turning, np.sin(angle * s), np.sinh(growth * s))
-    flat = odd_1 == 0
-    odd = np.where(flat, s, odd_s / np.where(flat, 1, odd_1))
-    # real eigenvalues of the sign of the trace: factor the sign out, take it to the power s
-    sign = np.where(turning, 1, found.sign)
-    normal = matrices * (sign / root)[:, None, None]
-    eye = np.eye(2, dtype=np.longdouble)
-    out = even_s[:, None, None] * eye + odd[:, None, None] * (normal - even_1[:, None, None] * eye)
-    return np.asarray(out * (root**s * np.where(np.mod(s, 2) == 0, 1, sign))[:, None, None])
+@dataclass(frozen=True, slots=True, eq=False)
+class Guesses:
+    """Candidates (c,): family of a table, map, strides, unseen turns, a and g; `near` is False for the one of
+    a family and stride that comes nearest and yet is far off."""
+
+    which: Integers
+    of: Integers
+    s: Floats
+    turns: Floats
+    a: Floats
+    g: Floats
+    near: np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+    def __getitem__(self, at: Integers) -> Guesses:
+        return Guesses(*(getattr(self, name)[at] for name in self.__slots__))
 
 
-def frame(
-    family: Family, a: Extended, g: Extended, log_mass: Extended, s: Floats, size: Extended
-) -> Extended:
-    """Predicted maps (c, 2, 2) over s steps on (q, v T) in units of `size`, T = s h."""
-    out = family.unit(a, g)
-    if np.any(s != 1):
-        out = power(out, s)
-    up = np.asarray(np.exp(-log_mass) / s * size[1] / size[0])
-    out[:, 0, 1] = out[:, 0, 1] * up
-    out[:, 1, 0] = out[:, 1, 0] / up
-    return out
+def joined(parts: list[Guesses]) -> Guesses:
+    return Guesses(*(np.concatenate([getattr(x, name) for x in parts]) for name in Guesses.__slots__))
 
 
 @cache
@@ -78,7 +76,7 @@ def _phases(name: str) -> tuple[tuple[Floats, Floats], ...]:
     # the phase bends like a square root at a limit of stability, so points crowd there
     x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
     x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
-    matrices = family.unit(np.square(x.astype(np.longdouble)), np.zeros(len(x), np.longdouble))
+    matrices = unit(family, np.square(x), np.zeros(len(x)))
     found = rotation(matrices)
     side = np.where(matrices[:, 0, 1] < 0, -1, 1)
     phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
@@ -107,57 +105,77 @@ def roots(found: Map, strides: range) -> Roots:
     s = np.repeat(np.array(strides, dtype=np.float64), [r // 2 + 1 for r in strides])
     turns = np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
     phase = (side * angle + 2 * np.pi * turns) / s
+    keep = (phase > 0) & (phase <= np.pi)
+    s, turns, phase = s[keep], turns[keep], phase[keep]
     generator = side * (b.astype(np.float64) / np.sqrt(d) - np.cos(angle) * np.eye(2)) / np.sin(angle)
     entries = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * generator
     entries = entries * (d ** (0.5 / s))[:, None, None]
     entries[:, 0, 1] *= s
     entries[:, 1, 0] /= s
-    keep = (phase > 0) & (phase <= np.pi)
-    return Roots(s[keep], turns[keep], phase[keep], entries[keep])
+    return Roots(s, turns, phase, entries)
 
 
-def starts(
-    family: Family, base: Family, root: Roots, terms: Terms, spread: float
-) -> tuple[Floats, Floats, Extended, Extended, bool]:
-    """Strides, turns and guesses of a and g of the roots that a family comes near to; where it comes near
-    none, the nearest, and True."""
-    parts = []
-    if family.held:
-        parts.append((np.arange(len(root.s)), root.phase))
-    for phases, x in () if family.held else _phases(base.name):
-        # the first range begins at the first tabulated step; a phase below it is as good as proportional
-        low = 0.0 if phases is _phases(base.name)[0][0] else phases[0]
-        inside = np.flatnonzero((root.phase > low) & (root.phase < phases[-1]))
-        value = np.interp(root.phase[inside], phases, x) * np.minimum(root.phase[inside] / phases[0], 1)
-        parts.append((inside, value))
-    index = np.concatenate([i for i, _ in parts])
-    a = np.square(np.concatenate([x for _, x in parts]))
-    g = np.zeros_like(a)
-    wanted = root.entries[index]
-    det = wanted[:, 0, 0] * wanted[:, 1, 1] - wanted[:, 0, 1] * wanted[:, 1, 0]
-    if family.held:
-        a = -wanted[:, 1, 0]
-        g = (1 - wanted[:, 0, 0]) / np.where(a == 0, 1, a)
-    elif family.damped and len(a):
-        own = base.unit(a, g)
-        own_det = np.abs(own[:, 0, 0] * own[:, 1, 1] - own[:, 0, 1] * own[:, 1, 0])
-        g = np.log(own_det) - np.log(det)
-        # friction shrinks areas; what grows beyond the scheme's own growth is no friction
-        good = (g > 0) | terms.growing
-        index, a, g, wanted = index[good], a[good], g[good], wanted[good]
-        a = a + np.square(g / 2)
-    if not len(index):
-        none = np.zeros(0, dtype=np.longdouble)
-        return root.s[index], root.turns[index], none, none, True
-    values, off = solved(family, a, g, wanted, free_scale=terms.mass_unknown, spread=spread)
+def starts(every: Table, found: Map, of: int, terms: Terms, strides: range) -> Guesses:
+    """Guesses for the families of a table on one map, number `of`, that turns."""
+    root = roots(found, strides)
+    det = np.linalg.det(root.entries)
+    bases: dict[str, tuple[Integers, Floats, Floats]] = {}
+
+    def of_phase(base: Family) -> tuple[Integers, Floats, Floats]:
+        """Roots that the undamped family reaches, a there, and -log of what its own area shrinks by."""
+        if base.name not in bases:
+            ranges = _phases(base.name)
+            index, values = [], []
+            for phases, x in ranges:
+                # the first range begins at the first tabulated step; a phase below is as good as proportional
+                low = 0.0 if phases is ranges[0][0] else phases[0]
+                inside = np.flatnonzero((root.phase > low) & (root.phase < phases[-1]))
+                phase = root.phase[inside]
+                index.append(inside)
+                values.append(np.interp(phase, phases, x) * np.minimum(phase / phases[0], 1))
+            at, a = np.concatenate(index), np.square(np.concatenate(values))
+            loss = np.zeros_like(a)
+            if every.damped:
+                loss = np.log(np.abs(np.linalg.det(unit(base, a, np.zeros_like(a))))) - np.log(det[at])
+            bases[base.name] = at, a, loss
+        return bases[base.name]
+
+    parts, flows = [], []
+    for k, family in enumerate(every.families):
+        if family.flow:
+            flows.append(_flow_starts(found, k, of, damped=family.damped, growing=terms.growing))
+            continue
+        if family.held:
+            index = np.arange(len(root.s))
+            a = -root.entries[:, 1, 0]
+            g = (1 - root.entries[:, 0, 0]) / np.where(a == 0, 1, a)
+        elif family.damped:
+            index, a, g = of_phase(FAMILIES[family.scheme])
+            # friction shrinks areas; what grows beyond the scheme's own growth is no friction
+            good = (g > 0) | terms.growing
+            index, a, g = index[good], a[good] + np.square(g[good] / 2), g[good]
+        else:
+            index, a, g = of_phase(family)
+        parts.append((np.full(len(index), k), index, a, g))
+    if not parts:
+        return joined(flows)
+    which, index, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
+    spread = 100 * float(np.sqrt(found.covariance.max()))
+    a, g, off = solved(every, which, a, g, root.entries[index], free_scale=terms.mass_unknown, spread=spread)
+    s = root.s[index]
     near = off <= NEAR + spread
-    far = not np.any(near)
-    near[np.argmin(off)] = True
-    return root.s[index][near], root.turns[index][near], values[near, 0], values[near, 1], far
+    # of each family and stride without a near root the nearest is kept
+    order = np.lexsort((off, s, which))
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(which[order]) != 0) | (np.diff(s[order]) != 0)
+    kept = np.union1d(np.flatnonzero(near), order[first])
+    turning = Guesses(which, np.full(len(s), of), s, root.turns[index], a, g, near)[kept]
+    return joined([turning, *flows])
 
 
 def solved(
-    family: Family,
+    every: Table,
+    which: Integers,
     a: Floats,
     g: Floats,
     wanted: Floats,
@@ -165,57 +183,135 @@ def solved(
     free_scale: bool,
     turns: int = 0,
     spread: float = 0.0,
-) -> tuple[Extended, Floats]:
+) -> tuple[Floats, Floats, Floats]:
     """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off."""
-    columns = 2 if family.damped else 1
-    values = np.stack([a, g], axis=1)
+    if len(a) > CHUNK:
+        cuts = range(0, len(a), CHUNK)
+        parts = [
+            solved(every, *(x[i : i + CHUNK] for x in (which, a, g, wanted)), free_scale=free_scale,
+                   turns=turns, spread=spread)
+            for i in cuts
+        ]  # fmt: skip
+        one, other, off = (np.concatenate(x) for x in zip(*parts, strict=True))
+        return one, other, off
+    damped = every.damped
+    values = np.stack([a, g], axis=1).astype(np.float64)
 
-    def entries(x: Floats) -> Floats:
-        out = np.asarray(family.unit(x[:, 0], x[:, 1]), np.float64).reshape(-1, 4)
+    def compared(out: Floats) -> Floats:
+        out = out.reshape(-1, 4)
         if free_scale:
             product = out[:, 1] * out[:, 2]
-            out = np.stack([out[:, 0], out[:, 3], product, np.zeros_like(product)], axis=1)
+            out = np.stack([out[:, 0], out[:, 3], product], axis=1)
         return out
 
-    target = wanted.reshape(-1, 4)
-    if free_scale:
-        product = target[:, 1] * target[:, 2]
-        target = np.stack([target[:, 0], target[:, 3], product, np.zeros_like(product)], axis=1)
+    def entries(at: Integers, x: Floats) -> Floats:
+        return compared(np.asarray(every.unit(which[at], x[:, 0], x[:, 1])))
+
+    target = compared(wanted)
+    size = np.maximum(np.abs(target), 1e-2)
     # every entry counts by its size, the lower left one by that of a
-    unit = np.maximum(np.abs(target), 1e-300)
-    unit = np.where(np.arange(4) == (4 if free_scale else 2), unit, np.maximum(unit, 1e-3))
+    least = 1e-3 if free_scale else np.array([1e-3, 1e-3, 1e-300, 1e-3])
+    weight = 1 / np.maximum(np.abs(target), least)
+    off = np.full(len(values), np.inf)
+    alive = np.arange(len(values))
+    rounds = turns or (6 if damped else 3)
     with np.errstate(all="ignore"):
-        if not turns and not family.damped:
-            # a first guess from the phase is good to 1e-3 where the family is right
-            first = np.max(np.abs(entries(values) - target) / np.maximum(np.abs(target), 1e-2), axis=1)
-            good = first <= GUESSED + spread
-            if not np.any(good):
-                return values.astype(np.longdouble), np.where(np.isfinite(first), first, np.inf)
-            if not np.all(good):
-                # the others stay what they are
-                better, off = solved(
-                    family, a[good], g[good], wanted[good], free_scale=free_scale, spread=spread
-                )
-                out = values.astype(np.longdouble)
-                out[good], first[good] = better, off
-                return out, np.where(np.isfinite(first), first, np.inf)
-        for _ in range(turns or (6 if family.damped else 3)):
-            now = entries(values)
-            slopes = np.empty((len(values), 4, columns))
-            for i in range(columns):
-                delta = 1e-6 * (np.abs(values[:, 0]) if i == 0 else np.maximum(np.abs(values[:, 1]), 1e-3))
-                shifted = values.copy()
+        for turn in range(rounds + 1):
+            now, x = entries(alive, values[alive]), values[alive]
+            miss = target[alive] - now
+            off[alive] = np.nan_to_num(np.max(np.abs(miss) / size[alive], axis=1), nan=np.inf)
+            if turn == rounds:
+                break
+            if not turns and turn < (len(LOST) if damped else 1):
+                good = off[alive] <= (LOST[turn] if damped else GUESSED) + spread
+                alive, now, x, miss = alive[good], now[good], x[good], miss[good]
+            if not len(alive):
+                break
+            slopes = []
+            for i in range(1 + damped):
+                delta = 1e-6 * (np.abs(x[:, 0]) if i == 0 else np.maximum(np.abs(x[:, 1]), 1e-3))
+                shifted = x.copy()
                 shifted[:, i] += delta
-                slopes[:, :, i] = (entries(shifted) - now) / delta[:, None]
-            scaled = slopes / unit[:, :, None]
-            right = np.einsum("cij,ci->cj", scaled, (target - now) / unit)
-            change = np.einsum("cij,cj->ci", inverse(np.einsum("cki,ckj->cij", scaled, scaled)), right)
-            change = np.nan_to_num(change)
-            limit = 0.5 * np.abs(values[:, 0])
+                slopes.append((entries(alive, shifted) - now) / delta[:, None] * weight[alive])
+            change = least_squares(np.stack(slopes, axis=2), miss * weight[alive])[0]
+            limit = 0.5 * np.abs(x[:, 0])
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
-            values[:, :columns] += change
-        off = np.max(np.abs(entries(values) - target) / np.maximum(np.abs(target), 1e-2), axis=1)
-    return values.astype(np.longdouble), np.where(np.isfinite(off), off, np.inf)
+            values[alive, : 1 + damped] += change
+    return values[:, 0], values[:, 1], off
+
+
+def least_squares(slopes: Floats, miss: Floats) -> tuple[Floats, Floats]:
+    """Solutions (c, k) of slopes (c, i, k) x = miss (c, i), the shortest ones, and variances (c, k) of x for
+    errors of 1; columns may differ by many powers of ten."""
+    size = np.sqrt(np.sum(slopes**2, axis=1))
+    size = np.where(np.isfinite(size) & (size > 0), size, 1.0)
+    even = np.nan_to_num(slopes / size[:, None, :], posinf=0, neginf=0)
+    right = np.nan_to_num(np.sum(even * miss[:, :, None], axis=1))
+    if even.shape[2] == 1:
+        present = np.sum(even[:, :, 0] ** 2, axis=1, keepdims=True) > 0
+        return right * present / size, present / size**2
+    if even.shape[2] == 2:
+        # columns of length 1: eigenvalues 1 + r and 1 - r, of the sum and the difference
+        r = np.sum(even[:, :, 0] * even[:, :, 1], axis=1)
+        plus, minus = (np.where(x > 1e-15, 0.5 / np.maximum(x, 1e-15), 0.0) for x in (1 + r, 1 - r))
+        inner = np.stack([plus + minus, plus - minus, plus + minus], axis=1)
+        x = np.stack(
+            [
+                inner[:, 0] * right[:, 0] + inner[:, 1] * right[:, 1],
+                inner[:, 1] * right[:, 0] + inner[:, 2] * right[:, 1],
+            ],
+            axis=1,
+        )
+        return x / size, inner[:, [0, 2]] / size**2
+    inverse = np.linalg.pinv(np.einsum("cia,cib->cab", even, even), hermitian=True)
+    return np.einsum("cab,cb->ca", inverse, right) / size, np.einsum("caa->ca", inverse) / size**2
+
+
+GRID = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
+"""Values of a that are tried where nothing turns."""
+
+
+def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range) -> Guesses:
+    """Guesses where nothing turns: an inverted spring, friction, or a step beyond the limit."""
+    kinds = [k for k, family in enumerate(every.families) if not family.held]
+    names = list(dict.fromkeys(every.families[k].scheme for k in kinds if every.families[k].damped))
+    bases = table(tuple(FAMILIES[x] for x in names)) if names else every
+    decays = _decays(found, strides)
+    ratio = np.array([float(found.size[1] / found.size[0])])
+    least: dict[int, tuple[list[float], list[float]]] = {}
+    with np.errstate(all="ignore"):
+        for b, base in enumerate(bases.families):
+            if base.held:
+                continue
+            strided, values = _decays(found, range(1, 2)) if base.flow else decays
+            s = np.repeat(np.arange(1.0, 2.0 if base.flow else 5.0), len(GRID))
+            x = np.tile(GRID, len(s) // len(GRID))
+            frames = bases.frame(np.full(len(x), b), x, 0 * x, 0 * x, s, ratio)
+            off = np.sum((frames - found.entries.reshape(4).astype(np.float64)) ** 2, axis=1)
+            off = np.where(np.isfinite(off), off, np.inf).reshape(-1, len(GRID))
+            row, low = np.nonzero(
+                (off[:, 1:-1] <= off[:, :-2]) & (off[:, 1:-1] <= off[:, 2:]) & (off[:, 1:-1] < 1)
+            )
+            least[b] = [*strided, *(row + 1.0).tolist()], [*values, *GRID[low + 1].tolist()]
+        parts = []
+        total = float(rotation(found.entries[None]).determinant[0])
+        for k in kinds:
+            family = every.families[k]
+            b = names.index(family.scheme) if names else k
+            s_, a_ = (np.array(x, dtype=np.float64) for x in least[b])
+            g = np.zeros_like(a_)
+            good = np.ones(len(a_), dtype=bool)
+            if family.damped and len(a_):
+                own = np.linalg.det(bases.unit(np.full(len(a_), b), a_, g))
+                g = np.log(np.abs(own)) - np.log(total) / s_
+                good = np.isfinite(g) & ((g > 0) | terms.growing)
+            n = int(np.count_nonzero(good))
+            parts.append(
+                Guesses(
+                    np.full(n, k), np.full(n, of), s_[good], np.zeros(n), a_[good], g[good], np.ones(n, bool)
+                )
+            )
+    return joined(parts)
 
 
 def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
@@ -230,40 +326,14 @@ def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
     return [float(s) for s in strides], [a / s**2 for s in strides]
 
 
-def real_starts(family: Family, found: Map, strides_wanted: range) -> tuple[Floats, Floats, Floats]:
-    """First guesses of a where nothing turns: an inverted spring, friction, or a step beyond the limit."""
-    grid = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
-    zero = np.zeros(1, dtype=np.longdouble)
-    strides, values = _decays(found, range(1, 2) if family.flow else strides_wanted)
-    for s in (1,) if family.flow else (1, 2, 3, 4):
-        s_all = np.full(len(grid), float(s))
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            miss = frame(family, grid.astype(np.longdouble), zero, zero, s_all, found.size) - found.entries
-            off = np.asarray(np.sum(miss**2, axis=(1, 2)), dtype=np.float64)
-        off = np.where(np.isfinite(off), off, np.inf)
-        low = np.flatnonzero((off[1:-1] <= off[:-2]) & (off[1:-1] <= off[2:]) & (off[1:-1] < 1)) + 1
-        strides += [float(s)] * len(low)
-        values += grid[low].tolist()
-    return np.array(strides), np.zeros(len(strides)), np.array(values)
-
-
-def flow_starts(found: Map, *, damped: bool, growing: bool) -> tuple[Floats, Floats, Extended, Extended]:
-    """The exact flow's guesses: it has no step, and turns up to eight times between frames."""
+def _flow_starts(found: Map, which: int, of: int, *, damped: bool, growing: bool) -> Guesses:
+    """The exact flow's guesses: it has no step, and turns several times between frames."""
     turn = rotation(found.entries[None])
     phase = float(turn.angle[0]) * (-1.0 if found.entries[0, 1] < 0 else 1.0)
-    turns = np.arange(0 if phase > 0 else 1, 8, dtype=np.float64)
+    turns = np.arange(0 if phase > 0 else 1, FLOW_TURNS, dtype=np.float64)
     g = -float(np.log(turn.determinant[0])) if damped else 0.0
     if damped and g <= 0 and not growing:
         turns = turns[:0]
-    a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2, np.longdouble)
-    return np.ones_like(turns), turns, a, np.full(len(turns), g).astype(np.longdouble)
-
-
-def inverse(normal: Floats) -> Floats:
-    """Inverses of positive matrices (c, i, i) whose diagonals differ by many powers of ten."""
-    if normal.shape[-1] == 1:
-        return np.where(normal > 0, 1 / np.where(normal > 0, normal, 1), 0.0)
-    scale = np.sqrt(np.einsum("caa->ca", normal))
-    scale = np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)
-    even = np.nan_to_num(normal / scale[:, :, None] / scale[:, None, :], posinf=0, neginf=0)
-    return np.asarray(np.linalg.pinv(even, hermitian=True) / scale[:, :, None] / scale[:, None, :])
+    n = len(turns)
+    a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2)
+    return Guesses(np.full(n, which), np.full(n, of), np.ones(n), turns, a, np.full(n, g), np.ones(n, bool))

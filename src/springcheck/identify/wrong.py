@@ -184,7 +184,7 @@ def misfit(e: Evidence) -> Explanation:
     """How large the misfit is, in physical terms: growth and phase of a frame."""
     entries = e.found.entries.astype(np.float64)
     det = float(np.linalg.det(entries))
-    joints = [x for x in search([e.found], [e.terms], range(1, 2)) if math.isfinite(x.chi2)]
+    joints = [x for x in search([e.found], [e.terms], range(1, 2), far=True) if math.isfinite(x.chi2)]
     nearest = min(joints, key=lambda x: distance(e.found, x.parts[0]), default=None)
     growth = (
         f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"

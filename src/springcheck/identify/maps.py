@@ -1,0 +1,269 @@
+"""One-step maps of many families at once on (q, v h), and what they are between frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.identify.families import EULER, FAMILIES, POSITION, VERLET, Family, Stage
+from springcheck.schemes import number, rotation
+
+KINDS: dict[str, tuple[float, float, float]] = {
+    "kick": (0, 0, 0),
+    "friction": (0, 0, 1),
+    "explicit": (1, 0, 0),
+    "implicit": (0, 1, 0),
+    "centred": (0.5, 0.5, 0),
+    "remembered": (2, -1, 0),
+}
+"""(e, i, x) of a kick over the share c: v' = ((1 - e c g) v - c a q)/(1 + i c g), then times exp(-x c g)."""
+
+Selected: TypeAlias = Integers | slice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slot:
+    """A kick and the drift after it, (F,) of every family: columns e, i, x, b, d with the shares in them."""
+
+    columns: tuple[Extended, ...]
+    kicks: bool
+    damps: bool
+    decays: bool
+    drifts: bool
+
+
+def _slots(families: tuple[Family, ...]) -> tuple[Slot, ...]:
+    rows = [_pairs(family.stages) for family in families]
+    out = []
+    for at in range(max((len(row) for row in rows), default=0)):
+        table = np.array(
+            [row[at] if at < len(row) else np.zeros(5, np.longdouble) for row in rows], np.longdouble
+        ).T
+        e, i, x, b, d = (bool(np.any(column)) for column in table)
+        out.append(Slot(columns=tuple(table), kicks=e or i or x or b, damps=e or i or x, decays=x, drifts=d))
+    return tuple(out)
+
+
+def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
+    """Stages as kicks with a drift each, columns as in `Slot`."""
+    out: list[Extended] = []
+    open_ = False
+    for kind, share in stages:
+        c = np.longdouble(number(share, np.longdouble))
+        if kind == "drift":
+            if not open_:
+                out.append(np.zeros(5, np.longdouble))
+            out[-1][4], open_ = c, False
+            continue
+        e, i, x = KINDS[kind]
+        force = 0 if kind == "friction" else 1
+        out.append(np.array([e * c, i * c, x * c, force * c, 0], np.longdouble))
+        open_ = True
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
+
+    families: tuple[Family, ...]
+    slots: tuple[Slot, ...]
+    rational: tuple[Extended, ...]
+    """Numerator and denominator (degree, F) of the stability functions, and whether friction is inside (F,)."""
+    kinds: tuple[tuple[str, Any], ...]
+    """Kinds of map other than stages, and which families are of it (F,)."""
+    path: Floats
+
+    @property
+    def damped(self) -> bool:
+        return any(family.damped for family in self.families)
+
+    def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
+        """One-step matrices (c, 2, 2), a and g (c,), in their width."""
+        out = np.zeros((2, 2, len(a)), a.dtype)
+        out[0, 0] = out[1, 1] = 1
+        staged: Selected = slice(None)
+        for kind, members in self.kinds:
+            at: Selected = slice(None) if np.all(members) else np.flatnonzero(members[which])
+            n, x, y = which[at], a[at], g[at]
+            if len(n):
+                out[:, :, at] = self._special(kind, n, x, y)
+        q, v = out
+        damped = bool(np.any(g))
+        for slot in self.slots:
+            e, i, x_, b, d = (column.astype(a.dtype)[which[staged]] for column in slot.columns)
+            if slot.kicks:
+                pull = b * a
+                if damped and slot.damps:
+                    below = 1 + i * g
+                    v = ((1 - e * g) * v - pull * q) / below
+                    v = v * np.exp(-x_ * g) if slot.decays else v
+                else:
+                    v = v - pull * q
+            if slot.drifts:
+                q = q + d * v
+        return np.moveaxis(np.stack([q, v]), -1, 0)
+
+    def _special(self, kind: str, n: Integers, a: Reals, g: Reals) -> Reals:
+        if kind == "held":
+            return _matrices(1 - g * a, np.ones_like(a), -a, np.ones_like(a))
+        if kind == "flow":
+            return _exponential(a, g)
+        if kind == "formula":
+            out = np.empty((2, 2, len(a)), a.dtype)
+            for i in np.unique(n):
+                at = n == i
+                out[:, :, at] = FORMULAS[self.families[i].formula](a[at])
+            return out
+        over, under, inside = (x.astype(a.dtype)[..., n] for x in self.rational)
+        return _rational(over, under, a, g * inside)
+
+    def frame(self, which: Integers, a: Reals, g: Reals, log_mass: Reals, s: Floats, ratio: Reals) -> Reals:
+        """Predicted entries (c, 4) over s steps on (q, v T), T = s h, in units whose ratio v to q is `ratio`."""
+        out = self.unit(which, a, g)
+        if np.any(s != 1):
+            out = power(out, s)
+        up = np.exp(-log_mass) / s.astype(a.dtype) * ratio.astype(a.dtype)
+        return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]], axis=1)
+
+
+@cache
+def table(families: tuple[Family, ...]) -> Table:
+    """The families' coefficients."""
+    degree = max(len(part) for family in families for part in (*family.stability, (1,)))
+
+    def coefficients(row: tuple[Fraction, ...]) -> list[np.longdouble]:
+        values = [np.longdouble(number(x, np.longdouble)) for x in row]
+        return values + [np.longdouble(0)] * (degree - len(row))
+
+    one = (Fraction(1),)
+    parts = [
+        np.array([coefficients(family.stability[i] or one) for family in families], np.longdouble).T
+        for i in (0, 1)
+    ]
+    inside = np.array([0 if family.stages else 1 for family in families], np.longdouble)
+    kinds = {
+        "held": [family.held for family in families],
+        "flow": [family.flow for family in families],
+        "formula": [bool(family.formula) for family in families],
+        "rational": [bool(family.stability[0]) for family in families],
+    }
+    return Table(
+        families=families,
+        slots=_slots(families),
+        rational=(parts[0], parts[1][:2], inside),
+        kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
+        path=np.array([family.path for family in families], np.float64),
+    )
+
+
+def unit(family: Family, a: Reals, g: Reals) -> Reals:
+    """One-step matrices (c, 2, 2) of one family, a and g (c,)."""
+    a, g = np.broadcast_arrays(a, g)
+    return table((family,)).unit(np.zeros(len(a), dtype=np.int64), a, g)
+
+
+def _matrices(a: Reals, b: Reals, c: Reals, d: Reals) -> Reals:
+    return np.array([[a, b], [c, d]])
+
+
+def _rational(over: Reals, under: Reals, a: Reals, g: Reals) -> Reals:
+    """R(L) of L = [[0, 1], [-a, -g]], by Horner's rule; coefficients (degree, c) from the constant up."""
+
+    def horner(rows: Reals) -> tuple[Reals, Reals]:
+        # every polynomial of L is x I + y L, because L**2 = -g L - a I
+        x, y = rows[-1], np.zeros_like(a)
+        for c in rows[-2::-1]:
+            x, y = c - a * y, x - g * y
+        return x, y
+
+    x, y = horner(over)
+    u, w = horner(under)
+    # (x + y L) / (u + w L): the adjugate of u + w L is (u - w g) - w L
+    det = u * u - u * w * g + w * w * a
+    p, r = u - w * g, -w
+    x, y = (x * p - a * y * r) / det, (x * r + y * p - g * y * r) / det
+    return _matrices(x, y, -a * y, x - g * y)
+
+
+def _exponential(a: Reals, g: Reals) -> Reals:
+    """exp(L), of any damping: L + g/2 is traceless, and its square a multiple of one."""
+    w2 = a - g * g / 4
+    w = np.sqrt(np.abs(w2))
+    even = np.where(w2 >= 0, np.cos(w), np.cosh(np.minimum(w, 1e3)))
+    safe = np.where(w == 0, 1, w)
+    odd = np.where(w == 0, 1, np.where(w2 >= 0, np.sin(w), np.sinh(np.minimum(w, 1e3))) / safe)
+    decay = np.exp(-g / 2)
+    return _matrices(
+        decay * (even + odd * g / 2), decay * odd, -decay * odd * a, decay * (even - odd * g / 2)
+    )
+
+
+def power(matrices: Reals, strides: Floats) -> Reals:
+    """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant."""
+    found = rotation(matrices)
+    s = strides.astype(matrices.dtype)
+    root = np.sqrt(np.abs(found.determinant))
+    turning = found.angle > 0
+    if np.all(turning):
+        angle, sign = found.angle, np.ones_like(root)
+        even_s, even_1 = np.cos(angle * s), np.cos(angle)
+        odd = np.sin(angle * s) / np.sin(angle)
+    else:
+        angle = np.where(turning, found.angle, 0)
+        growth = np.where(turning, 0, found.growth)
+        even_s, even_1 = (np.where(turning, np.cos(angle * x), np.cosh(growth * x)) for x in (s, 1))
+        odd_1 = np.where(turning, np.sin(angle), np.sinh(growth))
+        odd_s = np.where(turning, np.sin(angle * s), np.sinh(growth * s))
+        flat = odd_1 == 0
+        odd = np.where(flat, s, odd_s / np.where(flat, 1, odd_1))
+        # real eigenvalues of the sign of the trace: factor the sign out, take it to the power s
+        sign = np.where(turning, 1, found.sign).astype(matrices.dtype)
+    normal = matrices * (sign / root)[:, None, None]
+    out = odd[:, None, None] * normal
+    rest = even_s - odd * even_1
+    out[:, 0, 0] += rest
+    out[:, 1, 1] += rest
+    return np.asarray(out * (root**s * np.where(np.mod(s, 2) == 0, 1, sign))[:, None, None])
+
+
+def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
+    q11, q12 = 1 - drift * first * a, drift + 0 * a
+    return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
+
+
+def _lagging(a: Reals, base: str, steps: int) -> Reals:
+    """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
+    m = unit(FAMILIES[base], a, np.zeros_like(a))
+    det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
+    row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
+    turn = np.zeros_like(m)
+    turn[:, 0, 0], turn[:, 1, :] = 1, row
+    back = np.zeros_like(m)
+    back[:, 0, 0], back[:, 1, 0], back[:, 1, 1] = 1, -row[:, 0] / row[:, 1], 1 / row[:, 1]
+    return np.moveaxis(turn @ m @ back, 0, -1)
+
+
+FORMULAS: dict[str, Callable[[Reals], Reals]] = {
+    "old force": lambda a: _matrices(1 - a / 2, 1 + 0 * a, -a, 1 + 0 * a),
+    "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
+    "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
+    "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
+    "half drift": lambda a: _splitting(a, 0.5, 0.5, 0.5),
+    "double drift": lambda a: _splitting(a, 0.5, 2, 0.5),
+    "full kicks": lambda a: _splitting(a, 1, 1, 1),
+    "no second kick": lambda a: _splitting(a, 0.5, 1, 0),
+    "no first kick": lambda a: _splitting(a, 0, 1, 0.5),
+    **{
+        f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
+        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for n in (-1, 1)
+    },
+}
+"""Maps of faults, (2, 2, c), that stages do not give."""
