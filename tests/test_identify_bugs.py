@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -256,4 +257,61 @@ def test_a_trajectory_that_failed_says_what_its_states_are() -> None:
     assert sentence(run_, scene.m).startswith("Explicit Euler")
     assert sentence(springcheck.simulate(scene, "own:semi-implicit-euler"), scene.m).startswith(
         "Semi-implicit"
+    )
+
+
+def test_a_failed_verdict_says_where_and_what_the_states_show(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import springcheck
+    from springcheck.engines.own import simulation
+    from springcheck.identify import files
+    from springcheck.studies.run import measure
+
+    scene, start = springcheck.load_scene("spring-uneven"), simulation.start
+    path = tmp_path / "run.h5"
+
+    def asked(*_: object, **__: object) -> str:
+        raise AssertionError("a run that passes pays nothing")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "sentence", asked)
+        measure.run(scene, path, methods=["own:velocity-verlet"])
+
+    def longer(scene, method, label, step):  # type: ignore[no-untyped-def]
+        return start(scene, method, label, step * (1 + 1e-9))
+
+    monkeypatch.setattr(simulation, "start", longer)
+    report = measure.run(scene, path, methods=["own:velocity-verlet"], force=True)
+    failed = next(v for v in report.verdicts if v.check == "step-defect")
+    assert failed.passed is False
+    assert "the first of 200 frames off is at step 1." in failed.why
+    assert "What the states show: Velocity Verlet, but times are not what was stepped: " in failed.why
+    assert "longer by 1e-09" in failed.why
+    assert failed in measure.stored(path).verdicts
+
+
+def test_one_bad_frame_is_found_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import springcheck
+    from springcheck.engines.own.simulation import Own
+    from springcheck.studies.run import measure
+
+    advance = Own.advance
+    before = 0
+
+    def wrong(self: Own, every: int, q: Any, p: Any) -> None:
+        nonlocal before
+        advance(self, every, q, p)
+        if before <= 136 < before + len(p):
+            p[136 - before] *= 1 + 1e-6
+        before += len(p)
+
+    monkeypatch.setattr(Own, "advance", wrong)
+    scene = springcheck.load_scene("spring-uneven")
+    report = measure.run(scene, tmp_path / "run.h5", methods=["own:position-verlet"])
+    failed = next(v for v in report.verdicts if v.check == "step-defect")
+    assert failed.passed is False
+    assert "the first of 2 frames off is at step 137." in failed.why, failed.why
+    assert "The motion is one of Position Verlet, but frame 137 is wrong: its velocity" in failed.why, (
+        failed.why
     )

@@ -16,6 +16,7 @@ the solution and holds for nonlinear scenes too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,7 +27,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.motion import closed_form, frequency, growth_bound, momentum, shadow_energy
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import CONTRACTED, arithmetic, fastest, step_defect
+from springcheck.checks.steps import CONTRACTED, arithmetic, fastest, first_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory, Verdict
@@ -46,6 +47,7 @@ __all__ = [
     "closed_form",
     "energies",
     "fastest",
+    "first_off",
     "frequency",
     "grid",
     "growth_bound",
@@ -146,7 +148,10 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
     out: list[Verdict] = []
     for same in zip(*pieces, strict=True):
         judged = [verdict for verdict in same if verdict.passed is not None]
-        out.append(max(judged, key=_badness) if judged else same[0])
+        verdict = max(judged, key=_badness) if judged else same[0]
+        failed = next((x for x in same if x.passed is False), verdict)
+        # where it fails first is what is looked for, and how badly at the worst
+        out.append(replace(verdict, why=failed.why) if failed.check == verdict.check else verdict)
     return out
 
 

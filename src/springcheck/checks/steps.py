@@ -79,8 +79,32 @@ def step_defect(case: Case) -> Verdict:
     if not np.all(told):
         first = case.steps[int(np.argmin(told)) + 1]
         why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
-    why = _beyond_range(case, off) or why
+    why = _beyond_range(case, off) or why + _where(case, off)
     return case.verdict("step-defect", float(seen[worst]), float(bound), "roundings", why)
+
+
+def first_off(case: Case) -> int | None:
+    """The first frame that is not the scheme's own after the frame before; None where none is."""
+    if no_map(case):
+        return None
+    if case.ahead is None:
+        bound = case.roundings * _amplified(case, case.trajectory.every)
+        off = ~(_defects(case) <= bound) & (bound * case.trajectory.arithmetic.state < 1)
+    else:
+        off = ~(_defects(case) <= case.roundings) & _told(case)
+    return int(np.argmax(off)) + 1 if np.any(off) else None
+
+
+def _where(case: Case, off: NDArray[np.bool_]) -> str:
+    """Where the first of the frames that are off (f-1,) is, and how many are."""
+    if not np.any(off):
+        return ""
+    first, count = int(np.argmax(off)) + 1, int(np.count_nonzero(off))
+    return (
+        f"; the first of {count} frames off is at step {case.steps[first]}"
+        if count > 1
+        else (f"; one frame is off, at step {case.steps[first]}")
+    )
 
 
 BENT = 0.125
@@ -127,7 +151,7 @@ def _by_norm(case: Case) -> Verdict:
     if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
         return case.not_applicable("step-defect", f"{STILL} any step")
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
-    why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why
+    why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why + _where(case, off)
     return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why)
 
 

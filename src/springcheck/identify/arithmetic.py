@@ -15,7 +15,7 @@ from springcheck.identify.maps import table
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 
-__all__ = ["QUANTUM", "Defect", "defect", "misses", "predicted"]
+__all__ = ["QUANTUM", "Defect", "defects", "misses"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
@@ -35,9 +35,24 @@ class Defect:
     note: str = ""
 
 
-def predicted(match: Match, found: Map, slip: float = 0.0) -> Extended:
-    """The map between frames that a match predicts, extended precision, in the frame of `found`; for steps
-    longer by the share `slip`."""
+def misses(match: Match, found: Map) -> Extended:
+    """What each frame differs by from the step of the one before, (f - 1, 2), in the frame of `found`."""
+    return np.asarray(_misses([match], found)[0])
+
+
+def _misses(matches: list[Match], found: Map) -> Extended:
+    """The same for each match, (c, f - 1, 2)."""
+    b = np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
+    out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
+    if found.slips is not None:
+        d = 1e-7
+        change = np.stack([(_slipped(x, found, d) - _slipped(x, found, -d)) / (2 * d) for x in matches])
+        out = out - found.slips[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
+    return np.asarray(out)
+
+
+def _slipped(match: Match, found: Map, slip: float) -> Extended:
+    """The map (2, 2) between frames that a match predicts for steps longer by the share `slip`."""
     one = np.ones(1, dtype=np.longdouble)
     family = FAMILIES[match.family]
     out = table((family,)).frame(
@@ -51,81 +66,87 @@ def predicted(match: Match, found: Map, slip: float = 0.0) -> Extended:
     return np.asarray(out.reshape(2, 2))
 
 
-def misses(match: Match, found: Map) -> Extended:
-    """What each frame differs by from the step of the one before, (f - 1, 2), in the frame of `found`."""
-    b = predicted(match, found)
-    out = found.z[1:] - found.z[:-1] @ b.T
-    if found.slips is not None:
-        d = 1e-7
-        change = (predicted(match, found, d) - predicted(match, found, -d)) / (2 * d)
-        out = out - found.slips[:, None] * (found.z[:-1] @ change.T)
-    return np.asarray(out)
+TOGETHER = 128
+"""Matches whose defects are worked out at once, so that their arrays stay small."""
 
 
-def defect(record: Record, j: int, found: Map, match: Match, *, visible: bool) -> Defect:
-    """Defect of every step of oscillator j against the scheme, in units of double precision (2**-52).
+def defects(record: Record, j: int, found: Map, matches: list[Match], *, visible: bool) -> list[Defect]:
+    """Defect of every step of oscillator j against each scheme, in units of double precision (2**-52).
 
     `visible` says that the scheme's own error stands far above the defect, and no other scheme has it;
     only then is more than plain rounding explained, and never to an exact flow.
     """
-    scheme = FAMILIES[match.family]
-    b = predicted(match, found)
-    z, centre = found.z, found.centre / found.size
-    signed = misses(match, found).astype(np.float64)
+    chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
+    return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible=visible)]
+
+
+def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visible: bool) -> list[Defect]:
+    schemes = [FAMILIES[match.family] for match in matches]
+    z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
+    signed = _misses(matches, found).astype(np.float64)
     missing = np.abs(signed)
+    b = np.abs(np.array([match.predicted for match in matches]).reshape(-1, 2, 2)).astype(np.float64)
+    stride = np.array([float(match.stride) for match in matches])
     # a force is that of the whole position, whose rounding it carries into the velocity
-    at = np.abs(centre) + np.abs(b) @ np.abs(centre)
+    at = centre + b @ centre
     # sums of absolute values: what a rounding of either term is relative to
-    size = np.abs(z[:-1]) @ np.abs(b).T + np.abs(z[1:]) + 2 * at
-    if match.stride > 1:
-        # states between two frames lie on the same orbit: either component may be as large as the whole
-        size = size + np.sqrt(np.sum(z[:-1] ** 2, axis=1) + np.sum(z[1:] ** 2, axis=1))[:, None]
-    if scheme.flow:
-        # a solution is evaluated at times, and their rounding turns the phase
-        orbit = np.sqrt(np.max(np.sum(z**2, axis=1)))
-        size = size + orbit * np.sqrt(abs(match.a)) * record.clock / 2.0**-52
-    size = size.astype(np.float64)
+    size = np.abs(z[:-1]) @ np.swapaxes(b, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
+    # states between two frames lie on the same orbit: either component may be as large as the whole
+    lengths = np.sqrt(np.sum(z**2, axis=1))
+    size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * (lengths[:-1] + lengths[1:])[:, None]
+    # a solution is evaluated at times, and their rounding turns the phase
+    turned = [
+        np.sqrt(abs(match.a)) * record.clock / 2.0**-52 if scheme.flow else 0.0
+        for match, scheme in zip(matches, schemes, strict=True)
+    ]
+    size += np.array(turned)[:, None, None] * np.max(lengths)
     if record.parts is not None:
         summed = np.stack(
             [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1
         )
-        size = size + 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
+        size += 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
     # a velocity that is a difference of positions over the step carries their rounding, eps q / h
-    ratio = float(found.size[0] / found.size[1]) * match.stride
-    position = np.abs(z[1:, 0] + centre[0]).astype(np.float64)
-    difference = np.stack([np.zeros(len(size)), 2 * ratio * position], axis=1)
-    path = (4 if scheme.flow else scheme.path) * match.stride
+    ratio = float(found.size[0] / found.size[1]) * stride
+    position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
+    difference = np.zeros_like(size)
+    difference[:, :, 1] = 2 * ratio[:, None] * position
+    path = stride * [4 if scheme.flow else scheme.path for scheme in schemes]
     ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
-    if ulp <= min(path, 4 + 2 * np.sqrt(match.stride)) or (ulp <= path and visible):
-        return Defect(ulp=ulp, precision="double", note=_written(record, ""))
-    if _is_rebuilt(match, missing, size, difference):
-        return Defect(
-            ulp=ulp,
-            precision="double",
-            note="velocities carry the rounding of positions over the step: rebuilt as a difference of them",
+    plain = (ulp <= np.minimum(path, 4 + 2 * np.sqrt(stride))) | ((ulp <= path) & visible)
+    stored = coarse_file = np.zeros(len(matches), dtype=bool)
+    if not record.fine:
+        quanta = np.stack(
+            [record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1
         )
-    if record.fine:
-        if scheme.flow or not visible:
-            return Defect(ulp=ulp, precision="")
-        name, note = coarse.kinematic(record, j, found, match) or coarse.sized(
-            record, j, found, match, signed
-        )
-        return Defect(ulp=ulp, precision=name, note=note)
-    quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
-    quanta = quanta / found.size.astype(np.float64)
-    half = (quanta[1:] + quanta[:-1] @ np.abs(b).T.astype(np.float64)) / 2
-    rebuilt = size + difference
-    single = path * 2.0**-24 * rebuilt
-    # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
-    slack = 1 + 10 / np.sqrt(len(z))
-    if _largest(missing, slack * half + path * 2.0**-52 * rebuilt) <= 1:
-        return Defect(ulp=ulp, precision=_stored(record, found))
-    if _largest(missing, slack * half + single) <= 1:
-        texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
-        # one orbit, rounded once, leaves no room for more than that
-        return Defect(ulp=ulp, precision=texts[0] if texts else "" if found.once else "single")
-    return Defect(ulp=ulp, precision="")
+        quanta = quanta / found.size.astype(np.float64)
+        half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
+        rebuilt = (size + difference) * path[:, None, None]
+        # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
+        slack = 1 + 10 / np.sqrt(len(z))
+        stored = _largest(missing, slack * half + 2.0**-52 * rebuilt) <= 1
+        coarse_file = _largest(missing, slack * half + 2.0**-24 * rebuilt) <= 1
+    out = []
+    for i, match in enumerate(matches):
+        precision, note = "", ""
+        if plain[i]:
+            precision, note = "double", _written(record, "")
+        elif _is_rebuilt(match, missing[i], size[i], difference[i]):
+            precision = "double"
+            note = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
+        elif record.fine:
+            if visible and not schemes[i].flow:
+                precision, note = coarse.kinematic(record, j, found, match) or coarse.sized(
+                    record, j, found, match, signed[i]
+                )
+        elif stored[i]:
+            precision = _stored(record, found)
+        elif coarse_file[i]:
+            texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
+            # one orbit, rounded once, leaves no room for more than that
+            precision = texts[0] if texts else "" if found.once else "single"
+        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note))
+    return out
 
 
 def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats) -> bool:
@@ -137,18 +158,18 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     if match.scheme not in coarse.STOERMER:
         return False
     steps = np.sqrt(match.stride)
-    if _largest(missing[:, 0], 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]) > 1:
+    if np.any(missing[:, 0] > 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]):
         return False
     unit = 2.0**-52 * steps * difference[:, 1]
-    if _largest(missing[:, 1], 2.0**-52 * (4 + 2 * steps) * size[:, 1] + 4 * unit) > 1:
+    if np.any(missing[:, 1] > 2.0**-52 * (4 + 2 * steps) * size[:, 1] + 4 * unit):
         return False
     least, most = REBUILT
     share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
     return least <= share <= most
 
 
-def _largest(missing: Floats, unit: Floats) -> float:
-    return float(np.max(missing / np.maximum(unit, np.finfo(np.float64).tiny)))
+def _largest(missing: Floats, unit: Floats) -> Floats:
+    return np.asarray(np.max(missing / np.maximum(unit, np.finfo(np.float64).tiny), axis=(1, 2)))
 
 
 def _written(record: Record, otherwise: str) -> str:

@@ -27,7 +27,9 @@ SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
 
 def rows(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     """The numbers that all candidates share, to 1e-9, or None."""
-    same = all(np.allclose(row, rows[0], rtol=1e-9, atol=0, equal_nan=True) for row in rows[1:])
+    if len({len(row) for row in rows}) > 1:
+        return None
+    same = np.allclose(np.array(rows), np.array(rows[0]), rtol=1e-9, atol=0, equal_nan=True)
     return rows[0] if same else None
 
 

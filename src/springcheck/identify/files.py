@@ -150,14 +150,16 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
     return np.asarray(chosen), tuple(notes)
 
 
-def sentence(run: Trajectory, mass: Floats) -> str:
-    """What the states of a trajectory really are, in one sentence, for a verdict that failed; "" where they
-    show nothing."""
+def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:
+    """What the states of a trajectory around a frame really are, in one sentence, for a verdict that failed;
+    "" where they show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
     chosen, _ = _chosen(run.q, run.p, [])
-    frames = slice(MOST_FAILED)
+    first = max(0, min(about - MOST_FAILED // 2, len(run.t) - MOST_FAILED))
+    frames = slice(first, first + MOST_FAILED)
+    k = None if stiffness is None else stiffness[chosen]
     try:
         return identify_arrays(
-            run.t[frames], run.q[frames, chosen], run.p[frames, chosen], mass=mass[chosen]
+            run.t[frames], run.q[frames, chosen], run.p[frames, chosen], mass=mass[chosen], stiffness=k
         ).statement
     except IdentificationError:
         return ""

@@ -75,7 +75,7 @@ class Table:
     families: tuple[Family, ...]
     slots: tuple[Slot, ...]
     rational: tuple[Extended, ...]
-    """Numerator and denominator (degree, F) of the stability functions, and whether friction is inside (F,)."""
+    """Numerator and denominator (degree, F) of stability functions; whether friction is inside (F,)."""
     kinds: tuple[tuple[str, Any], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
@@ -125,7 +125,7 @@ class Table:
         return _rational(over, under, a, g * inside)
 
     def frame(self, which: Integers, a: Reals, g: Reals, log_mass: Reals, s: Floats, ratio: Reals) -> Reals:
-        """Predicted entries (c, 4) over s steps on (q, v T), T = s h, in units whose ratio v to q is `ratio`."""
+        """Predicted entries (c, 4) over s steps on (q, v T), T = s h, `ratio` the unit of v T over q's."""
         out = self.unit(which, a, g)
         if np.any(s != 1):
             out = power(out, s)

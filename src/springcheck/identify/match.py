@@ -58,7 +58,7 @@ class Match:
     mass_error: float
     chi2: float
     freedom: int
-    predicted: tuple[float, ...]
+    predicted: tuple[np.longdouble, ...]
     """The four entries, in the frame of the map."""
 
     @property
@@ -104,9 +104,9 @@ class Targets:
         """What roundings of coefficients do to an entry (c,), the same in every step.
 
         No number of pairs averages the rounding of h k or h/m away: an entry of the map over s steps is
-        uncertain by the roundings of its path times what s steps add to a state, s h w of it and no more than
-        s, whatever the fit says.  A factor near 1, of friction or of a velocity that is rebuilt over the step,
-        is rounded as well, and acts on the whole state in each of s steps.
+        uncertain by the roundings of its path times what s steps add to a state, s h w of it and no more
+        than s, whatever the fit says.  A factor near 1, of friction or of a velocity that is rebuilt over
+        the step, is rounded as well, and acts on the whole state in each of s steps.
         """
         added = np.minimum(np.sqrt(np.abs(a)) + np.abs(g), 1).astype(np.float64)
         return np.asarray((every.path[x.which] * added + WHOLE) * x.s * self.largest[x.of])
@@ -194,7 +194,7 @@ def _matched(
 def _refined(
     every: Table, target: Targets, x: Guesses, values: Reals, free: list[int]
 ) -> tuple[Floats, Reals, Reals, Floats]:
-    """Gauss-Newton on the four entries, weighted by their covariance, in the width of the values; chi-squared,
+    """Gauss-Newton on the four entries, by their covariance, in the width of the values: chi-squared,
     values, entries and errors."""
     n = len(values)
     whole = target.terms.rounding * target.coherent(every, x, values[:, 0], values[:, 1])
@@ -254,7 +254,7 @@ def _best(
     values: Reals,
     chi2: Floats,
     entries: Reals,
-    errors: Floats,
+    errors: Reals,
     freedom: int,
     out: list[dict[tuple[str, int], Match]],
 ) -> None:
@@ -285,5 +285,5 @@ def _best(
             mass_error=float(errors[i, 2]),
             chi2=float(chi2[i]),
             freedom=freedom,
-            predicted=tuple(float(y) for y in entries[i]),
+            predicted=tuple(entries[i].astype(np.longdouble)),
         )

@@ -149,19 +149,18 @@ def _explained(
     record: Record, moving: list[int], maps: list[Map], accepted: list[Joint], terms: list[Terms]
 ) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
-    out: dict[Joint, list[arithmetic.Defect]] = {}
-    for joint in accepted:
-        if FAMILIES[joint.family].held and not _whole_substeps(joint)[0]:
-            continue
-        defects = []
-        for j, x, part, what in zip(moving, maps, joint.parts, terms, strict=True):
-            alone = visible(x, what, joint, accepted)
-            defects.append(arithmetic.defect(record, j, x, part, visible=alone))
-            if not defects[-1].precision:
-                break
-        else:
-            out[joint] = defects
-    return out
+    left = [x for x in accepted if not FAMILIES[x.family].held or _whole_substeps(x)[0]]
+    alone = len({(x.scheme, x.stride) for x in accepted}) == 1
+    defects: list[list[arithmetic.Defect]] = [[] for _ in left]
+    for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):
+        if not left:
+            break
+        seen = alone and visible(found, what, damped=left[0].damped)
+        new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], visible=seen)
+        explained = [k for k, x in enumerate(new) if x.precision]
+        defects = [[*defects[k], new[k]] for k in explained]
+        left = [left[k] for k in explained]
+    return dict(zip(left, defects, strict=True))
 
 
 def _whole_substeps(joint: Joint) -> tuple[int, bool]:

@@ -266,16 +266,14 @@ def _likely(accepted: list[Joint]) -> list[Joint]:
     return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
 
 
-def visible(found: Map, terms: Terms, chosen: Joint, accepted: list[Joint]) -> bool:
-    """Whether the error of the scheme's step stands far above what the numbers leave over, and alone.
+def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
+    """Whether the error of a scheme's step stands far above what the numbers leave over.
 
     An adaptive solver misses the exact flow by as much as its steps scatter, and then many schemes with
     many small steps fit within that; a coarse arithmetic does not bring a map nearer to the exact flow.
     """
-    if any((x.scheme, x.stride) != (chosen.scheme, chosen.stride) for x in accepted):
-        return False
     wide = replace(terms, bias=1.0)
-    flow = FAMILIES["exact, damped" if chosen.damped else "exact"]
+    flow = FAMILIES["exact, damped" if damped else "exact"]
     near = match((flow,), [found], [wide], range(1, 2), far=True)[0]
     return all(m.chi2 > PLAIN**2 for m in near.values())
 

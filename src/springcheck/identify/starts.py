@@ -65,6 +65,7 @@ class Guesses:
 
 
 def joined(parts: list[Guesses]) -> Guesses:
+    """Candidates one after another."""
     return Guesses(*(np.concatenate([getattr(x, name) for x in parts]) for name in Guesses.__slots__))
 
 
@@ -186,11 +187,12 @@ def solved(
 ) -> tuple[Floats, Floats, Floats]:
     """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off."""
     if len(a) > CHUNK:
-        cuts = range(0, len(a), CHUNK)
         parts = [
-            solved(every, *(x[i : i + CHUNK] for x in (which, a, g, wanted)), free_scale=free_scale,
-                   turns=turns, spread=spread)
-            for i in cuts
+            solved(
+                every, which[i : i + CHUNK], a[i : i + CHUNK], g[i : i + CHUNK], wanted[i : i + CHUNK],
+                free_scale=free_scale, turns=turns, spread=spread,
+            )
+            for i in range(0, len(a), CHUNK)
         ]  # fmt: skip
         one, other, off = (np.concatenate(x) for x in zip(*parts, strict=True))
         return one, other, off

@@ -9,7 +9,7 @@ import numpy as np
 from springcheck.arrays import Floats
 from springcheck.identify.evidence import Evidence, distance, title
 from springcheck.identify.families import FAMILIES, FAULTS, HELD
-from springcheck.identify.fit import Map
+from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.search import Joint, distinct, search
@@ -90,11 +90,14 @@ def _scales(e: Evidence) -> list[Explanation]:
     free = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
     fitting = [x for x in search([e.found], [free], range(1, 4)) if x.accepted]
     fitting.sort(key=lambda x: x.plainness)
-    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 1e-3]
+    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
     meant = [(x, meaning) for x in fitting if (meaning := _meaning(e, x))]
     if meant:
         x, (cause, remedy) = meant[0]
-        return [_found(f"{title(x.scheme)}, but {cause}", remedy, x)]
+        # schemes that differ by less than the numbers show would each mean the same
+        names = list(dict.fromkeys(title(y.scheme) for y, _ in meant))
+        whose = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+        return [_found(f"{whose}, but {cause}", remedy, x)]
     if not fitting:
         return []
     x = fitting[0]
@@ -115,20 +118,21 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
     """What a scale of the velocities means, by the mass, the stated stiffness and well-known factors."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
-    error = 1e-6 + 6 * part.mass_error
+    known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
 
-    def is_(one: float, other: float) -> bool:
-        return abs(one / other - 1) <= error
+    def is_(one: float, other: float, room: float = 1e-6) -> bool:
+        return abs(one / other - 1) <= room + known
 
     h = float(e.record.interval) / x.stride
     mass = None if e.record.mass is None else float(e.record.mass[e.j])
     k = None if mass is None else mass * part.a / h**2
     stiffer = None if k is None or not e.stiffness else k / e.stiffness
-    if stiffer is not None and is_(stiffer, scale**2):
+    if stiffer is not None and is_(stiffer, scale**2, 0.0):
         if is_(scale, 1 / h**2):
             return "the step taken is 1/h: it divides by the step", "multiply by the step"
+        longer = f"{scale:.6g} times theirs" if abs(scale - 1) > 1e-3 else f"longer by {scale - 1:.3g} of it"
         return (
-            f"times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs",
+            f"times are not what was stepped: the step taken is {longer}",
             "look at how time is counted: the times are wrong by that factor",
         )
     if mass is not None and is_(scale, mass):

@@ -171,11 +171,14 @@ def judge(
     tallies = {name: _Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last: dict[str, Trajectory] = {}
+    failed: dict[str, Trajectory] = {}
     streams = {name: keeper.windows(source, name, rows, stride) for name, source in sources.items()}
     for pieces in _together(streams):
         judged_frames += max(len(piece.t) for piece in pieces.values())
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece))
+            if name not in failed and any(_tells(v) for v in verdicts[name][-1]):
+                failed[name] = piece
             tallies[name].add(piece)
             last[name] = piece
         if len(pieces) == len(sources):
@@ -184,17 +187,41 @@ def judge(
             parts.append(_incomplete(parts[-1]))
     comparison = compare.merge(parts)
     runs = tuple(_line(last[name], tallies[name]) for name in sources)
+    worst = {name: checks.worst(verdicts[name]) for name in sources}
+    for name, piece in failed.items():
+        worst[name] = _explained(scene, piece, worst[name])
     return Report(
         scene=scene,
         path=path,
         runs=runs,
         left_out=tuple(left),
-        verdicts=tuple(v for name in sources for v in checks.worst(verdicts[name])),
+        verdicts=tuple(v for name in sources for v in worst[name]),
         comparison=comparison,
         same=tuple(compare.same_motions(scene, last, comparison)),
         judged_frames=min(judged_frames, scene.frames),
         resumed=tuple(name for name in resumed if name in sources),
     )
+
+
+def _tells(verdict: Verdict) -> bool:
+    return verdict.passed is False and verdict.check in checks.TELLING
+
+
+def _explained(scene: Scene, piece: Trajectory, verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """The verdicts on a method, the first that failed with what the states of its first bad piece are."""
+    first = next(v for v in verdicts if _tells(v))
+    if not scene.system.is_linear:
+        # the sentences are about springs
+        return list(verdicts)
+    from springcheck.identify import files
+
+    springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= files.MOST_OSCILLATORS else None
+    alone = springs is not None and not np.any(springs - np.diag(np.diag(springs)))
+    about = checks.first_off(checks.Case(trajectory=piece, scene=scene)) or 0
+    stiffness = np.diag(springs) if springs is not None and alone else None
+    said = files.sentence(piece, scene.m, stiffness, about=about)
+    why = f"{first.why}. What the states show: {said}" if said else first.why
+    return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
 def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str, Trajectory]]:
