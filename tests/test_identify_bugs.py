@@ -287,7 +287,7 @@ def test_a_failed_verdict_says_where_and_what_the_states_show(
     assert failed.passed is False
     assert "the first of 200 frames off is at step 1." in failed.why
     assert "What the states show: Velocity Verlet, but times are not what was stepped: " in failed.why
-    assert "longer by 1e-09" in failed.why
+    assert "longer than theirs by 1e-09 of it" in failed.why
     assert failed in measure.stored(path).verdicts
 
 

@@ -130,9 +130,14 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
     if stiffer is not None and is_(stiffer, scale**2, 0.0):
         if is_(scale, 1 / h**2):
             return "the step taken is 1/h: it divides by the step", "multiply by the step"
-        longer = f"{scale:.6g} times theirs" if abs(scale - 1) > 1e-3 else f"longer by {scale - 1:.3g} of it"
+        cause = (
+            f"times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs"
+        )
+        if abs(scale - 1) <= 1e-2:
+            longer = f"{scale - 1:.3g} of it"
+            cause = f"times are not what was stepped: the step taken is longer than theirs by {longer}"
         return (
-            f"times are not what was stepped: the step taken is {longer}",
+            cause,
             "look at how time is counted: the times are wrong by that factor",
         )
     if mass is not None and is_(scale, mass):
