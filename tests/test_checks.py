@@ -11,6 +11,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes
+from springcheck.arrays import WIDE
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
@@ -97,6 +98,7 @@ def test_a_slip_between_two_pieces_shows_in_the_closed_form_of_those_after_it() 
     assert any(alarm.startswith("closed-form") for alarm in alarms(checks.judge(scene, piece)))
 
 
+@pytest.mark.skipif(not WIDE, reason="where references round like doubles, they are the textbook's numbers")
 def test_the_step_defect_s_bound_is_within_a_thousand_times_of_what_is_seen() -> None:
     ratios = []
     for seed in range(40):
@@ -206,7 +208,8 @@ def test_a_right_engine_passes_to_the_very_end_of_the_range_of_numbers(label: st
         assert np.max(np.abs(run.q)) > 1e300
     verdicts = checks.judge(scene, run)
     assert all(v.passed is not False for v in verdicts), [v for v in verdicts if v.passed is False]
-    assert any(v.check == "frequency" and v.passed for v in verdicts)
+    # where long double is a double, what rounding may do is beyond the range before the motion is
+    assert not WIDE or any(v.check == "frequency" and v.passed for v in verdicts)
 
 
 def test_a_force_left_out_is_seen_in_any_arithmetic_far_beyond_stability() -> None:

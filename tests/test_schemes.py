@@ -131,3 +131,19 @@ def test_a_force_gets_as_far_within_a_step_as_the_matrix_says(scheme: Scheme) ->
     # what a later force makes of an earlier one goes with the square of the stiffness
     felt = np.any(np.abs(two[1] - 2 * one[1] + none[1]) > 8 * ULP)
     assert scheme.reach == (2 if felt else int(moves))
+
+
+def test_the_closed_form_of_an_overdamped_motion_goes_on_for_ever() -> None:
+    """Friction's decay and the growth of the roots apart are 0 times infinity: together the slow root."""
+    k, c, h, far = 2.9, 40.0, 0.05, 10**7
+    matrices = schemes.matrix(schemes.scheme("implicit-euler"), h=h, m=np.ones(1), k=np.array([k]), c=c)
+    steps = np.array([1, 1000, far])
+    y, v = schemes.propagate(matrices, np.ones(1), np.zeros(1), steps, area_preserving=False)
+    # 1/(1 + h s) of the two roots s**2 - c s + k = 0
+    slow, fast = (c - np.sqrt(c * c - 4 * k)) / 2, (c + np.sqrt(c * c - 4 * k)) / 2
+    slow = k / fast
+    expected = (
+        fast * (1 + h * slow) ** -steps.astype(float) - slow * (1 + h * fast) ** -steps.astype(float)
+    ) / (fast - slow)
+    assert y[:, 0].astype(float) == pytest.approx(expected, rel=1e-10, abs=0)
+    assert np.all(np.isfinite(v))

@@ -28,6 +28,13 @@ Extended: TypeAlias = NDArray[np.longdouble]
 Reals: TypeAlias = NDArray[np.floating[Any]]
 """Real numbers of any width: what is computed comes back in the width that came in."""
 
+ROUNDOFF = float(np.finfo(np.longdouble).eps) / 2
+"""Unit roundoff of `Extended`, in which every reference is computed: 2**-64 on x86-64, 2**-53 where
+`long double` is no wider than double (Apple silicon, Windows), so that references round like the engines."""
+
+WIDE = ROUNDOFF < 2.0**-53
+"""Whether a reference has digits that an engine has not."""
+
 Integers: TypeAlias = NDArray[np.int64]
 Force: TypeAlias = Callable[[Reals, Reals], Reals]
 """(q, p), each (..., n) -> force on every particle (..., n) [M L/T2]."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Floats
+from springcheck.arrays import WIDE, Extended, Floats
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import STILL, closed_or_not
@@ -34,7 +34,7 @@ def closed_form(case: Case) -> Verdict:
     distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
     moved = case.norm.size(q - case.scene.q, p - case.scene.p)
     bound, unit = case.growth
-    late = case.steps > 0
+    late = (case.steps > 0) & ~_beyond(case, bound * unit, distance)
     allowed = np.where(late, bound * unit, 1)
     ratio = np.where(late, distance / allowed, 0)
     worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
@@ -57,6 +57,19 @@ def _how(case: Case) -> str:
     return "all of one sign"
 
 
+def _beyond(case: Case, allowed: Extended, *sizes: Extended) -> NDArray[np.bool_]:
+    """At which frames (f,) finite states have no reference in the range of numbers.
+
+    That is where what rounding may do, `allowed`, leaves it; where a reference has an engine's range
+    also where one of these sizes does.
+    """
+    finite = np.isfinite(case.trajectory.q).all(axis=1) & np.isfinite(case.trajectory.p).all(axis=1)
+    out = np.isinf(allowed)
+    for size in () if WIDE else sizes:
+        out |= ~np.isfinite(size)
+    return np.asarray(out & finite)
+
+
 def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
     """From where on a check says nothing any more because its bound is as large as what it looks at."""
     late = np.flatnonzero(~drowned)
@@ -73,38 +86,41 @@ def shadow_energy(case: Case) -> Verdict:
         return case.not_applicable("shadow-energy", why_not)
     run = case.trajectory
     form = schemes.invariant(case.matrices, h=run.step)
-    y, v = case.modes.into(run.q, run.p)
-    u = y - case.modes.centre()
-    stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
     turn = schemes.rotation(case.matrices)
     factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
     y0, v0 = case.modes.into(case.scene.q, case.scene.p)
     u0 = y0 - case.modes.centre()
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
-    expected = first * factor ** case.steps[:, None].astype(np.longdouble)
+    with np.errstate(over="ignore", invalid="ignore"):
+        y, v = case.modes.into(run.q, run.p)
+        u = y - case.modes.centre()
+        stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
+        expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = case.growth
     size = np.maximum.accumulate(case.norm.size(run.q - _rest(case), run.p))
     if case.steps[0] != 0:
         size = np.maximum(size, case.norm.size(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
-    scale = 2 * shape * size * unit
-    off = np.max(np.abs(stored - expected), axis=1)
-    late = case.steps > 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        scale = 2 * shape * size * unit
+        off = np.max(np.abs(stored - expected), axis=1)
+        late = (case.steps > 0) & ~_beyond(case, scale, shape * size * size, np.max(np.abs(expected), axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.where(late & (off != 0), off / scale, 0)
     limit = np.where(late, np.minimum(case.roundings * case.steps, case.walk(case.steps)), 1)
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
     energy = np.max(np.abs(expected), axis=1)
-    if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & (energy > limit * scale)):
+    with np.errstate(over="ignore", invalid="ignore"):
+        drowned = energy <= limit * scale
+    if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & ~drowned):
         return case.not_applicable("shadow-energy", "rounding may be as large as the energy")
     return case.verdict(
         "shadow-energy",
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"roundings of {case.steps[worst]} steps: {_how(case)}"
-        + _untold(case, energy <= limit * scale, "energy"),
+        f"roundings of {case.steps[worst]} steps: {_how(case)}" + _untold(case, drowned, "energy"),
     )
 
 
@@ -147,6 +163,8 @@ def frequency(case: Case) -> Verdict:
     # extended: a motion that spirals out is squared here, up to the end of double's range
     mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
     wide = unit[-1] * np.sqrt(np.longdouble(2))
+    if not np.isfinite(mode) or not np.isfinite(wide):
+        return case.not_applicable("frequency", "what rounding may do is beyond all numbers")
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
     shape = schemes.condition(case.matrices, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
@@ -167,7 +185,7 @@ def frequency(case: Case) -> Verdict:
     )
 
 
-_LOW_TWO_PI = 2 * (np.longdouble("3.14159265358979323846264338327950288") - np.longdouble(np.pi))
+_LOW_TWO_PI = 2.4492935982947064e-16
 """What the double 2 pi lacks."""
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Force, Integers, Reals
+from springcheck.arrays import ROUNDOFF, Extended, Force, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.rounding import Met
@@ -44,8 +44,10 @@ def of_step(
         rate=scene.system.friction_rates if scene.system.is_damped else None,
         met=_evaluations(case, places),
     )
+    # the scheme's own step, which it is compared with, rounds as well
+    state = how.state + ROUNDOFF
     # an engine may count positions from where the springs rest, and so round those
-    of_q, of_p = how.state * (size_q + np.abs(case.rest_positions)), how.state * size_p
+    of_q, of_p = state * (size_q + np.abs(case.rest_positions)), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
         of_p = of_p + how.state * m * (q + size_q) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products

@@ -10,6 +10,9 @@ import numpy as np
 from springcheck.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.term import Term
 
+SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
+"""Below it squares lose digits to underflow."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Norm:
@@ -37,9 +40,17 @@ class Norm:
 
     def size(self, dq: Reals, dp: Reals) -> Extended:
         """The same, not divided by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        q, p = np.broadcast_arrays(np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble))
         with np.errstate(invalid="ignore", over="ignore"):
-            wide = np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble)
-            return np.asarray(np.sqrt(self._energy(*wide)), np.longdouble)
+            energy = np.asarray(self._energy(q, p), np.longdouble)
+            size = np.sqrt(energy)
+            # squares that leave the range: of a power of two of the difference, which rounds nothing
+            out = ~((energy > SMALLEST_ENERGY) & np.isfinite(energy))
+            if np.any(out):
+                power = np.frexp(np.max(np.maximum(np.abs(q[out]), np.abs(p[out])), axis=-1))[1]
+                scaled = (np.ldexp(x[out], -power[..., None]) for x in (q, p))
+                size[out] = np.ldexp(np.sqrt(self._energy(*scaled)), power)
+            return np.asarray(size)
 
     def _energy(self, dq: Reals, dp: Reals) -> Reals:
         total = kinetic_energy(self.m, dp)

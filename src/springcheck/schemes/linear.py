@@ -154,24 +154,30 @@ def propagate(
     with np.errstate(over="ignore", invalid="ignore"):
         turning, growing = x != 0, g != 0
         near = np.where(turning, np.cos(x), np.where(growing, turn.sign * np.cosh(g), turn.sign * one))
-        even = np.where(turning, np.cos(j * x), np.where(growing, sign * np.cosh(j * g), sign))
         sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))
-        odd = np.where(
-            turning,
-            np.sin(j * x) / sine,
-            np.where(growing, sign * turn.sign * np.sinh(j * g) / sine, sign * turn.sign * j),
-        )
         root = np.sqrt(d)
         # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
         less = matrices - np.eye(2, dtype=np.longdouble)
         a, c = less[:, 0, 0], less[:, 1, 1]
         beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
-        size = np.exp(j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond)))
+        decay = j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond))
+        # with the powers of the root: what grows by cosh and decays by friction is 0 times infinity apart
+        size, up = np.exp(decay), np.exp(decay + j * g)
+        even = np.where(
+            turning,
+            size * np.cos(j * x),
+            np.where(growing, sign * up * (1 + np.exp(-2 * j * g)) / 2, sign * size),
+        )
+        odd = np.where(
+            turning,
+            size * np.sin(j * x) / sine,
+            sign * turn.sign * np.where(growing, -up * np.expm1(-2 * j * g) / (2 * sine), j * size),
+        )
         a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
         c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
         return (
-            np.asarray(size * (even * y + odd * (a * y + b * v))),
-            np.asarray(size * (even * v + odd * (c * y + e * v))),
+            np.asarray(even * y + odd * (a * y + b * v)),
+            np.asarray(even * v + odd * (c * y + e * v)),
         )
 
 

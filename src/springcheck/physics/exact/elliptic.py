@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Extended
+from springcheck.arrays import ROUNDOFF, Extended
 
-EPS = float(np.finfo(np.longdouble).eps)
-"""Of the extended precision used for every reference: 1.1e-19 on x86-64.  Where `long double` is no
-wider than double the references round like the engines, and every bound that names EPS widens."""
+EPS = 2 * ROUNDOFF
+"""Spacing of the numbers above 1 in extended precision: 1.1e-19 on x86-64."""
 
 MOST = 40
 """Rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""
