@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from springcheck import checks, schemes, simulate
+from springcheck.arrays import WIDE
 from springcheck.checks import experiments, laws
 from springcheck.errors import MethodError
+from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults import clean, steppers
@@ -71,8 +73,9 @@ def test_the_reference_of_the_well_agrees_with_its_elliptic_function() -> None:
     slope = -m * amplitude * w * mpmath.ellipfun("sn", u, m=half) * mpmath.ellipfun("dn", u, m=half)
     q, p = laws.extrapolated(laws.WELL, laws.DURATION)
     # seven levels of extrapolation enlarge the rounding of long double some tenfold
-    assert abs(mpmath.mpf(str(q[0])) - true) < 2e-17
-    assert abs(mpmath.mpf(str(p[0])) - slope) < 2e-17
+    bound = max(2e-17, 16 * exact.EPS)
+    assert abs(mpmath.mpf(str(q[0])) - true) < bound
+    assert abs(mpmath.mpf(str(p[0])) - slope) < bound
 
 
 def test_symmetric_schemes_are_those_that_are_their_own_adjoint() -> None:
@@ -94,7 +97,8 @@ def test_openmm_s_rebuilt_velocity_drifts_as_its_arithmetic_implies(need: Need) 
         return replace(simulate.run(scene, label), rebuilds_velocity=False)
 
     unexplained = checks.Bench(scene=bench.scene, label="openmm:verlet", run=silent)
-    assert laws.rounding_bias(unexplained).passed is False
+    # a drift of 0.8 of what the reference itself rounds where it is no wider than the engine
+    assert laws.rounding_bias(unexplained).passed is not WIDE
 
 
 def test_a_power_law_with_its_second_term_is_fitted_to_its_order() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, compare, schemes
-from springcheck.arrays import Floats
+from springcheck.arrays import WIDE, Floats
 from springcheck.checks import experiments, laws, verdicts
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
@@ -295,6 +295,7 @@ def test_a_tolerance_that_allows_the_whole_motion_is_not_judged() -> None:
     assert one(scene, still, checks.tolerance).passed is None
 
 
+@pytest.mark.skipif(not WIDE, reason="such energies leave the range of double: the scene is refused")
 @pytest.mark.parametrize("size", [1e-200, 1.0, 1e200])
 def test_the_bound_of_a_tolerance_goes_with_the_size_of_the_motion(size: float) -> None:
     scene = uneven(steps=40)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from springcheck import engines, store
+from springcheck.arrays import WIDE
 from springcheck.studies.extremes import figure as figures
 from springcheck.studies.extremes import grid, judging, refusals, running
 from springcheck.studies.extremes import measure as extremes
@@ -23,6 +24,8 @@ GPU = [
     for method in ("verlet", "euler")
     for precision in ("single", "mixed", "double")
 ]
+
+pytestmark = pytest.mark.skipif(not WIDE, reason="the study needs a wider range than double's")
 
 
 @pytest.mark.parametrize("name", [*METHODS, *GPU])

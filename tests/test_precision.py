@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from springcheck import engines, simulate, store
+from springcheck.arrays import WIDE
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -115,6 +116,7 @@ def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], 
     assert fit is None or abs(fit.order - 1) > 0.02 or fit.standard_error > 0.01
 
 
+@pytest.mark.skipif(not WIDE, reason="rounding is told from a motion that rounds less")
 @pytest.mark.parametrize(
     "label", [label for label, _ in serving(FIXED, ["spring-uneven"]) if not label.startswith("ase")]
 )

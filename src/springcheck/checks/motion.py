@@ -36,7 +36,8 @@ def closed_form(case: Case) -> Verdict:
     bound, unit = case.growth
     late = (case.steps > 0) & ~_beyond(case, bound * unit, distance)
     allowed = np.where(late, bound * unit, 1)
-    ratio = np.where(late, distance / allowed, 0)
+    with np.errstate(over="ignore"):
+        ratio = np.where(late, distance / allowed, 0)
     worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
         return case.not_applicable("closed-form", f"{STILL} the motion")

@@ -43,7 +43,7 @@ class Norm:
         q, p = np.broadcast_arrays(np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble))
         with np.errstate(invalid="ignore", over="ignore"):
             energy = np.asarray(self._energy(q, p), np.longdouble)
-            size = np.sqrt(energy)
+            size = np.array(np.sqrt(energy))
             # squares that leave the range: of a power of two of the difference, which rounds nothing
             out = ~((energy > SMALLEST_ENERGY) & np.isfinite(energy))
             if np.any(out):

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended, Floats, Force, Integers, Reals
+from springcheck.arrays import WIDE, Extended, Floats, Force, Integers, Reals
+from springcheck.errors import SceneError
 from springcheck.physics import graph
 from springcheck.physics.exact.linear import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
-from springcheck.physics.norm import Norm, kinetic_energy
+from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Spring, WallSpring
 
@@ -291,15 +292,27 @@ class System:
     def norm(self) -> Norm:
         """The measure of errors of this scene (see `Norm`)."""
         q, p = self.scene.q.astype(np.longdouble), self.scene.p.astype(np.longdouble)
-        unit = self.kinetic_energy(p)
-        for term in self.terms:
-            unit = unit + np.abs(term.energy(q))
+        with np.errstate(all="warn" if WIDE else "ignore"):
+            unit = self.kinetic_energy(p)
+            for term in self.terms:
+                unit = unit + np.abs(term.energy(q))
+        if not SMALLEST_ENERGY < unit < np.inf and not WIDE and self._is_away_from_rest:
+            raise SceneError(
+                f"scene {self.scene.name}: the energy of its start is {unit:.0e}, which leaves the range of "
+                "numbers of this machine (long double is no wider than double): choose other units"
+            )
         return Norm(
             m=self.m,
             terms=self.terms,
             groups=self.free_groups,
             duration=self.duration,
             unit=np.longdouble(np.sqrt(unit)),
+        )
+
+    @property
+    def _is_away_from_rest(self) -> bool:
+        return bool(np.any(self.scene.p != 0)) or any(
+            np.any(x.elongation(self.scene.q) != 0) for x in self.terms
         )
 
     @cached_property

@@ -3,7 +3,8 @@
 Linear scenes move in normal modes (`linear`).  Single particles in a quartic potential or on a pendulum,
 and pairs on a Morse bond, have closed forms of their own (`wells`), by Jacobi's elliptic functions
 (`elliptic`).  Where the particles of a scene fall into groups that nothing joins, its motion is known if
-that of every group is.
+that of every group is.  Its error is some roundings of that width times the angle turned through: a phase
+of 1e6 is known to 1e-13, and to 1e-9 where `long double` is no wider than double (`arrays.ROUNDOFF`).
 
 Times are taken as (number of steps) * h with the very double h that the engines were given: after 1e7
 steps a phase in double precision would be wrong by 1e-10.

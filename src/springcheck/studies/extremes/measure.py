@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from springcheck import engines
+from springcheck.arrays import WIDE
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, SpringcheckError
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
@@ -52,7 +53,13 @@ def measure(
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
+        SpringcheckError: nothing here has the range to judge numbers at the ends of double's.
     """
+    if not WIDE:
+        raise SpringcheckError(
+            "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than double on "
+            "this machine: run it on Linux on x86-64"
+        )
     usable = []
     left_out = []
     for label in engines.match(tuple(methods) or everything()):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.checks.steps import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.physics import exact
@@ -197,8 +197,8 @@ class _Rounding:
 
     @classmethod
     def of(cls, scene: Scene, scheme: schemes.Scheme, h: float) -> _Rounding | None:
-        """None for an adaptive solver and where the discrete motion has no closed form."""
-        if not scheme.one_step or scheme.mixes or not scene.system.has_modes:
+        """None for an adaptive solver, where the discrete motion has no closed form, or one that rounds as well."""
+        if not WIDE or not scheme.one_step or scheme.mixes or not scene.system.has_modes:
             return None
         modes = exact.modes(scene)
         if np.any((modes.w2 == 0) & (modes.pull != 0)):
