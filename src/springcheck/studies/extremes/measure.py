@@ -57,8 +57,8 @@ def measure(
     """
     if not WIDE:
         raise SpringcheckError(
-            "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than double on "
-            "this machine: run it on Linux on x86-64"
+            "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
+            "double on this machine: run it on Linux on x86-64"
         )
     usable = []
     left_out = []

@@ -197,7 +197,7 @@ class _Rounding:
 
     @classmethod
     def of(cls, scene: Scene, scheme: schemes.Scheme, h: float) -> _Rounding | None:
-        """None for an adaptive solver, where the discrete motion has no closed form, or one that rounds as well."""
+        """None for an adaptive solver, and without a closed form that rounds less than the engine."""
         if not WIDE or not scheme.one_step or scheme.mixes or not scene.system.has_modes:
             return None
         modes = exact.modes(scene)
