@@ -16,6 +16,7 @@ from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
+from springcheck.stats import student
 from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
 
@@ -105,7 +106,7 @@ def test_a_power_law_with_its_second_term_is_fitted_to_its_order() -> None:
     h = [0.2 / 2**j for j in range(6)]
     error = [3.1 * x**3 * (1 + 0.8 * x) for x in h]
     slope, se, rounding = laws.fitted(h, error, [0.0] * 6, second=1)
-    assert abs(slope - 3) < laws.T_THREE * se
+    assert abs(slope - 3) < student(3, laws.CHANCE) * se
     assert se < 1e-3
     assert rounding == 0.0
 

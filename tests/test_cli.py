@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, store
+from springcheck import output, store
 from springcheck.cli import main
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
@@ -231,11 +231,11 @@ def test_a_narrow_terminal_cuts_no_number_and_breaks_sentences(
     sentences = table(["a", "b"], [["1.5e-300", "half a kick too early " * 6]], prose="b")
     monkeypatch.setenv("TERM", "dumb")  # 80 columns, no colours
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    cli._show([numbers])
+    output.show([numbers])
     shown = capsys.readouterr().out
     assert not Counter(" ".join(words).split()) - Counter(shown.split())
     assert max(map(len, shown.splitlines())) <= 80
-    cli._show([sentences])
+    output.show([sentences])
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
 
 

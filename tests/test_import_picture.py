@@ -15,9 +15,10 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "slips", "workers", "arrays", "physics", "schemes", "engines",
+    "interrupts", "errors", "slips", "workers", "arrays", "stats", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
-    "doors", "figures", "studies", "inspect", "plot", "page", "explain", "listing", "api", "cli", "__main__",
+    "doors", "figures", "studies", "inspect", "plot", "page", "explain", "listing", "api", "output",
+    "commands", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
@@ -31,7 +32,7 @@ HOMES = {
     "numba": ("engines/own",),
     "jinja2": ("page/writing.py",),
     "markupsafe": ("page/writing.py",),
-    "rich": ("text.py", "studies/run/text.py", "cli.py"),
+    "rich": ("text.py", "studies/run/text.py", "output.py"),
     "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
 }
 
@@ -110,7 +111,7 @@ def test_the_keeper_alone_of_the_studies_knows_the_store(path: Path) -> None:
     assert not uses or own in ("studies/keeper.py", "studies/tables.py", "studies/study.py"), uses
 
 
-@pytest.mark.parametrize("place", ["cli.py", "inspect.py", "plot.py"])
+@pytest.mark.parametrize("place", ["cli.py", "commands.py", "inspect.py", "plot.py"])
 def test_no_study_is_named_outside_of_the_list(place: str) -> None:
     named = {name for name in _imports(HOME / place) if name.startswith("springcheck.studies.")}
     for study in STUDIES:

@@ -19,7 +19,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import cli, engines, store
+from springcheck import engines, output, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.figures.style import save
@@ -338,7 +338,7 @@ def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points
     assert (kept.front, kept.cheapest) == (fresh.front, fresh.cheapest)
     assert kept.document() == fresh.document()
     for study in (fresh, kept):
-        cli._show(report.lines(study, Namespace(points=True)))
+        output.show(report.lines(study, Namespace(points=True)))
     text = capsys.readouterr().out
     assert text[: len(text) // 2] == text[len(text) // 2 :]
     assert main(["inspect", str(path)]) == 0

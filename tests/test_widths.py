@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from springcheck import cli, store
+from springcheck import output, store
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.studies.precision import measure as precision
@@ -98,7 +98,7 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
         with monkeypatch.context() as patch:
             patch.setattr("sys.stdout.isatty", lambda wide=width: wide is not None, raising=False)
             patch.setenv("COLUMNS", str(width or 1))
-            cli._show(text.lines(found, Options()))  # type: ignore[arg-type]
+            output.show(text.lines(found, Options()))  # type: ignore[arg-type]
         printed.append(bare(capsys.readouterr().out))
         assert not Counter(printed[0].split()) - Counter(printed[-1].split()), width
         assert max(map(len, printed[-1].splitlines())) <= (width or 200)

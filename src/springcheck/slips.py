@@ -25,7 +25,7 @@ NAMES = {
 
 UNREAD = (
     ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
-    ("stepper", "--stepper", ("--mass", "--stiffness", "--step", "--trajectory")),
+    ("integrator", "--stepper", ("--mass", "--stiffness", "--step", "--trajectory")),
 )
 """An option, and those that its command does not read beside it."""
 

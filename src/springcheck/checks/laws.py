@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +21,15 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.experiments import symmetric
 from springcheck.physics import exact
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic, WallSpring
+from springcheck.physics.terms import Quartic
+from springcheck.stats import line, student
 from springcheck.trajectory import Trajectory, Verdict
 
 HALVINGS = 6
-T_THREE = 12.92
-"""Student's t of 3 degrees of freedom, two-sided 1e-3: six points less three parameters."""
+CHANCE = 1e-3
+"""Probability with which a right order or exponent may be refused, by Student's t, two-sided."""
 UNRESOLVED = 0.125
 """Orders are whole numbers; a slope that is not known to an eighth does not name one."""
 COARSEST = 16
@@ -37,31 +40,13 @@ LONG = 4096
 SIGMAS = 5.0
 """Of a normal variable: passed by chance once in 1.7 million."""
 
-T_SEVEN = 5.41
-"""Student's t of 7 degrees of freedom, two-sided 1e-3: nine tolerances less two parameters."""
 DECADES = tuple(10.0**-d for d in range(4, 13))
 
 
-def _scene(terms: tuple[WallSpring | Quartic, ...], q: Floats, p: Floats, m: Floats) -> Scene:
-    return Scene(
-        name="experiment",
-        m=m,
-        q=q,
-        p=p,
-        terms=terms,
-        step=1.0,
-        steps=1,
-        quantities=("q", "p"),
-    )
-
-
-def _one(x: float) -> Floats:
-    return np.array([x])
-
-
 # values far from 1, so that no mass, stiffness or coefficient can hide
-SPRING = _scene((WallSpring(i=np.array([0]), k=_one(2.9), at=_one(0.0)),), _one(0.3), _one(0.7), _one(3.7))
-WELL = _scene((Quartic(i=np.array([0]), b=_one(2.3), at=_one(0.0)),), _one(0.9), _one(0.4), _one(1.3))
+_GRID: dict[str, Any] = {"step": 1.0, "steps": 1, "quantities": ("q", "p"), "name": "experiment"}
+SPRING = spring(m=3.7, k=2.9, q=0.3, p=0.7, title="", **_GRID)
+WELL = Scene(m=[1.3], q=[0.9], p=[0.4], terms=(Quartic(i=[0], b=2.3, at=0.0),), **_GRID)  # type: ignore[arg-type]
 DURATION = 2.5 / np.sqrt(2.9 / 3.7)
 
 
@@ -98,7 +83,7 @@ def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
     return bench.verdict(
         check,
         abs(slope - scheme.order),
-        min(T_THREE * se + rounding, UNRESOLVED),
+        min(student(HALVINGS - 3, CHANCE) * se + rounding, UNRESOLVED),
         "orders",
         f"slope {slope:.5f} +- {se:.1g} on the {where}, h from {h[0]:.3g} to {h[-1]:.3g}; "
         f"{scheme.title} has order {scheme.order}",
@@ -110,14 +95,9 @@ def fitted(
 ) -> tuple[float, float, float]:
     """Signed slope of log error on log h beside a term h**second: slope, standard error, and what errors
     of the size of `floor` can do to it."""
-    x, y = np.array(h), np.log(np.maximum(np.array(error), 1e-300))
-    design = np.stack([np.ones_like(x), np.log(x), x**second], axis=1)
-    inverse = np.linalg.pinv(design)
-    best = inverse @ y
-    left = y - design @ best
-    variance = float(left @ left) / (len(x) - 3)
-    rounding = float(np.sum(np.abs(inverse[1]) * np.array(floor) / np.maximum(np.array(error), 1e-300)))
-    return float(best[1]), float(np.sqrt(variance) * np.linalg.norm(inverse[1])), rounding
+    x, size = np.array(h), np.maximum(np.array(error), 1e-300)
+    fit = line(np.log(x), np.log(size), x**second)
+    return fit.slope, fit.standard_error, float(np.sum(np.abs(fit.leverage) * np.array(floor) / size))
 
 
 @cache
@@ -156,11 +136,10 @@ def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extend
 def ensemble(h: float) -> Scene:
     """256 springs of one kind with random starts: the random walks of their rounding are independent."""
     rng = np.random.default_rng(20260101)
-    m, k = np.full(MEMBERS, 3.7), np.full(MEMBERS, 2.9)
     amplitude, phase = rng.uniform(1, 2, MEMBERS), rng.uniform(0, 2 * np.pi, MEMBERS)
-    spring = WallSpring(i=np.arange(MEMBERS), k=k, at=np.zeros(MEMBERS))
-    start = amplitude * np.cos(phase), amplitude * np.sin(phase) * np.sqrt(m * k)
-    return replace(_scene((spring,), start[0], start[1], m), step=h, steps=LONG, every=LONG // 64)
+    q, p = amplitude * np.cos(phase), amplitude * np.sin(phase) * np.sqrt(3.7 * 2.9)
+    grid = _GRID | {"step": h, "steps": LONG, "every": LONG // 64}
+    return spring(m=3.7, k=2.9, q=q, p=p, title="", **grid)
 
 
 ODD, EVEN = 0.013, 2.0**-7
@@ -263,7 +242,7 @@ def rounding_growth(bench: Bench) -> Verdict:
             return float("nan")
         if np.any(size == 0):
             return 0.0
-        return float(np.polyfit(np.log(steps[late]), np.log(size), 1)[0])
+        return line(np.log(steps[late]), np.log(size)).slope
 
     blocks = np.array_split(np.arange(MEMBERS), 16)
     left = np.array([exponent(np.delete(change, block, axis=1)) for block in blocks])
@@ -301,22 +280,18 @@ def convergence(bench: Bench) -> Verdict:
         case = Case(trajectory=run, scene=scene)
         q, p = exact.true_motion(scene, case.steps, scene.step)
         error.append(float(np.sqrt(np.mean(case.norm(run.q - q, run.p - p) ** 2))))
-    x, y = np.log(np.array(DECADES)), np.log(np.maximum(np.array(error), 1e-300))
-    design = np.stack([np.ones_like(x), x], axis=1)
-    inverse = np.linalg.pinv(design)
-    slope = float((inverse @ y)[1])
-    left = y - design @ (inverse @ y)
-    se = float(np.sqrt(left @ left / (len(x) - 2)) * np.linalg.norm(inverse[1]))
-    law = float(power)
-    if abs(slope - law) <= T_SEVEN * se and T_SEVEN * se >= law:
+    fit = line(np.log(np.array(DECADES)), np.log(np.maximum(np.array(error), 1e-300)))
+    slope, se, law = fit.slope, fit.standard_error, float(power)
+    bound = student(len(error) - 2, CHANCE) * se
+    if abs(slope - law) <= bound and bound >= law:
         return bench.not_applicable(
             "convergence", f"an exponent of {slope:.3f} +- {se:.2g} does not tell its law from no law at all"
         )
     return bench.verdict(
         "convergence",
         abs(slope - law),
-        T_SEVEN * se,
+        bound,
         "exponent",
-        f"exponent {slope:.3f} +- {se:.2g} over {len(x)} decades of tolerance; {bench.scheme.title} "
+        f"exponent {slope:.3f} +- {se:.2g} over {len(error)} decades of tolerance; {bench.scheme.title} "
         f"has {power}: what a step of its highest order leaves, times the number of steps",
     )

@@ -29,7 +29,6 @@ from springcheck.engines.contract import (
 from springcheck.engines.registry import (
     OURS,
     bring,
-    brought,
     engine,
     from_file,
     is_brought,
@@ -44,7 +43,7 @@ from springcheck.physics.scene import Scene
 
 __all__ = [
     "ANY_POTENTIAL", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method", "Need",
-    "Simulation", "Stopped", "absence", "bring", "brought", "engine", "from_file", "guarded",
+    "Simulation", "Stopped", "absence", "bring", "engine", "from_file", "guarded",
     "installed_version", "internal_steps", "load", "match", "method", "module_name", "module_of",
     "named", "names", "origin", "parse", "refusal", "start", "unusable",
 ]  # fmt: skip

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -174,16 +172,6 @@ def bring(found: Engine, where: str, version: str = "") -> Engine:
 def is_brought(name: str) -> bool:
     """Whether a call has brought it, rather than a package."""
     return name in _brought
-
-
-@contextmanager
-def brought(found: Engine, where: str) -> Iterator[Engine]:
-    """An engine that is known within this context only."""
-    bring(found, where)
-    try:
-        yield found
-    finally:
-        del _brought[found.name]
 
 
 def from_file(path: Path) -> Engine | None:

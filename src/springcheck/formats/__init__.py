@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Columns, States, split
+from springcheck.formats.columns import States
 from springcheck.formats.molecular import read_ase, read_gro, read_lammps, read_trr
 from springcheck.formats.numbers import read_npy, read_npz
 from springcheck.formats.tables import read_table
 
-__all__ = ["Columns", "States", "is_hdf5", "read", "split"]
+__all__ = ["States", "is_hdf5", "read"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck import formats, schemes, store
 from springcheck.arrays import Floats, Integers
-from springcheck.errors import IdentificationError, MethodError, StoreError
+from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
@@ -163,6 +163,35 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
         ).statement
     except IdentificationError:
         return ""
+
+
+def identify_file(
+    path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
+) -> dict[str, Identification]:
+    """What a file holds, by label, `stated` the mass, stiffness and step of the command line.
+
+    Raises SpringcheckError, which names the trajectory.
+    """
+    given = {name: value for name, value in stated.items() if value is not None}
+    for name, value in given.items():
+        # beyond these sizes the squares of numbers are none
+        if not 1e-150 < abs(value) < 1e150 or (name == "mass" and value < 0):
+            if value == 0 and name == "stiffness":
+                continue
+            needed = "a number of a size from 1e-150 to 1e150, a mass above 0"
+            raise SpringcheckError(f"--{name} {value:g}: {needed} is needed")
+    found = {}
+    for states in read(path, trajectory, columns, given.get("step")):
+        try:
+            found[states.label] = identify_states(states, **given)
+        except SpringcheckError as error:
+            raise type(error)(f"{path}, {states.label}: {error}") from error
+        except (ArithmeticError, ValueError) as error:
+            numbers = ", ".join(f"--{name} {value:g}" for name, value in given.items()) or "its numbers"
+            raise IdentificationError(
+                f"{path}, {states.label}: nothing can be worked out with {numbers}: {error}"
+            ) from error
+    return found
 
 
 def identify_states(

@@ -66,7 +66,8 @@ class Scene:
     def __repr__(self) -> str:
         size = f"{self.n} particle{'s' if self.n != 1 else ''}"
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
-        return f"Scene({self.name!r}, {size}, {terms}, {self.steps} steps of {self.step:g})"
+        steps = f"{self.steps} step{'s' if self.steps != 1 else ''} of {self.step:g}"
+        return f"Scene({self.name!r}, {size}, {terms}, {steps})"
 
     @property
     def n(self) -> int:

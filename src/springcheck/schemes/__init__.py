@@ -5,13 +5,10 @@ from __future__ import annotations
 from springcheck.schemes.catalogue import (
     FRICTION,
     SCHEMES,
-    Coefficient,
     Scheme,
-    Stage,
     number,
 )
 from springcheck.schemes.linear import (
-    Rotation,
     amplification,
     condition,
     invariant,
@@ -25,24 +22,6 @@ from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "Coefficient",
-    "FRICTION",
-    "Scheme",
-    "SCHEMES",
-    "Stage",
-    "bring",
-    "scheme",
-    "title",
-    "number",
-    "step",
-    "magnitude_step",
-    "roundings",
-    "Rotation",
-    "amplification",
-    "condition",
-    "invariant",
-    "matrix",
-    "propagate",
-    "propagator",
-    "rotation",
-]
+    "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "title", "number", "step", "magnitude_step",
+    "roundings", "amplification", "condition", "invariant", "matrix", "propagate", "propagator", "rotation",
+]  # fmt: skip

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from springcheck.schemes.catalogue import HALF, ONE, Scheme, Stage
+from springcheck.schemes.catalogue import HALF, ONE, Scheme, Stage, splitting
 
 
 def _force_held(n: int) -> tuple[Stage, ...]:
@@ -19,37 +19,26 @@ def _force_held(n: int) -> tuple[Stage, ...]:
 
 _ALL = (
     *(
-        Scheme(
-            name=f"force-held-{n}",
-            title=f"semi-implicit Euler, {n} substeps by one force",
-            order=1,
-            limit=0.0,
-            symplectic=False,
-            stages=_force_held(n),
-            source="a control force held for a frame of n substeps (frame_skip): [[1 - g a, h/m], [-h k, 1]] "
-            "with g = (n + 1)/2n and a = (h w)**2, determinant 1 + a (n - 1)/2n",
+        splitting(
+            f"force-held-{n}", f"semi-implicit Euler, {n} substeps by one force", 1, 0.0, _force_held(n),
+            "a control force held for a frame of n substeps (frame_skip): [[1 - g a, h/m], [-h k, 1]] "
+            "with g = (n + 1)/2n and a = (h w)**2, determinant 1 + a (n - 1)/2n", symplectic=False,
         )
         for n in (2, 4, 5, 10)
     ),
-    Scheme(
-        name="force-held-rk4",
-        title="constant force over the step (RK4 of a force that is held)",
-        order=1,
-        limit=0.0,
-        symplectic=False,
-        stages=(("kick", HALF), ("drift", ONE), ("held", HALF)),
-        source="a force held over infinitely many substeps; velocity Verlet that kicks twice by the old "
-        "force; determinant 1 + (h w)**2/2",
+    splitting(
+        "force-held-rk4", "constant force over the step (RK4 of a force that is held)", 1, 0.0,
+        (("kick", HALF), ("drift", ONE), ("held", HALF)),
+        "a force held over infinitely many substeps; velocity Verlet that kicks twice by the old "
+        "force; determinant 1 + (h w)**2/2", symplectic=False,
     ),
-    Scheme(
-        name="semi-implicit-euler-implicit-friction",
-        title="semi-implicit Euler, friction implicit: v' = (v + h F/m) / (1 + h c/m)",
-        order=1,
-        limit=2.0,
+    splitting(
+        "semi-implicit-euler-implicit-friction",
+        "semi-implicit Euler, friction implicit: v' = (v + h F/m) / (1 + h c/m)", 1, 2.0,
+        (("pull", ONE), ("implicit-friction", ONE), ("drift", ONE)),
+        "MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
         symplectic=False,
-        stages=(("pull", ONE), ("implicit-friction", ONE), ("drift", ONE)),
-        source="MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
     ),
-)
+)  # fmt: skip
 
 ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}

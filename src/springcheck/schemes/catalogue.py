@@ -104,216 +104,86 @@ _HALF_X0_X1 = "-0.175603595979828817023843904485730413461"
 _EIGHT: tuple[Stage, ...] = 8 * _mirrored(("fast", Fraction(1, 16)), ("drift", Fraction(1, 8)))
 
 
-def _row(*numbers: int | Fraction) -> tuple[Fraction, ...]:
-    return tuple(Fraction(x) for x in numbers)
+def splitting(
+    name: str, title: str, order: int, limit: float, stages: tuple[Stage, ...], source: str, *,
+    symplectic: bool = True,
+) -> Scheme:  # fmt: skip
+    """A splitting into kicks, drifts and the like."""
+    return Scheme(
+        name=name, title=title, order=order, limit=limit, symplectic=symplectic, stages=stages, source=source
+    )
 
+
+def _tableau(
+    name: str, title: str, order: int, limit: float, a: Any, b: Any, source: str, *, symplectic: bool = False
+) -> Scheme:
+    """A Runge-Kutta tableau: rows of `a`, weights `b`."""
+    return Scheme(
+        name=name, title=title, order=order, limit=limit, symplectic=symplectic,
+        a=tuple(tuple(map(Fraction, row)) for row in a), b=tuple(map(Fraction, b)), source=source,
+    )  # fmt: skip
+
+
+def _solver(name: str, title: str, convergence: Fraction | None = None) -> Scheme:
+    return Scheme(
+        name=name, title=title, order=0, limit=np.inf, symplectic=False, convergence=convergence,
+        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
+    )  # fmt: skip
+
+
+_HLW = "Hairer, Lubich & Wanner, I.1.2"
+_TUCKERMAN = "Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990"
+_ZHANG = "Zhang et al., J. Phys. Chem. A 123 (2019) 6056"
+_RUTH: tuple[Stage, ...] = (
+    ("kick", Fraction(7, 24)), ("drift", Fraction(2, 3)), ("kick", Fraction(3, 4)),
+    ("drift", Fraction(-2, 3)), ("kick", Fraction(-1, 24)), ("drift", ONE),
+)  # fmt: skip
 
 _ALL = (
-    Scheme(
-        name="explicit-euler",
-        title="explicit Euler",
-        order=1,
-        limit=0.0,
-        symplectic=False,
-        a=(_row(0),),
-        b=_row(1),
-        source="Euler 1768",
-    ),
-    Scheme(
-        name="semi-implicit-euler",
-        title="semi-implicit Euler, kick-drift",
-        order=1,
-        limit=2.0,
-        symplectic=True,
-        stages=(("kick", ONE), ("drift", ONE)),
-        source="Hairer, Lubich & Wanner, I.1.2; the blog's own",
-    ),
-    Scheme(
-        name="semi-implicit-euler-drift-kick",
-        title="semi-implicit Euler, drift-kick",
-        order=1,
-        limit=2.0,
-        symplectic=True,
-        stages=(("drift", ONE), ("kick", ONE)),
-        source="Hairer, Lubich & Wanner, I.1.2",
-    ),
-    Scheme(
-        name="implicit-euler",
-        title="implicit Euler",
-        order=1,
-        limit=np.inf,
-        symplectic=False,
-        a=(_row(1),),
-        b=_row(1),
-        source="Hairer, Lubich & Wanner, I.1.2",
-    ),
-    Scheme(
-        name="velocity-verlet",
-        title="velocity Verlet",
-        order=2,
-        limit=2.0,
-        symplectic=True,
-        stages=_mirrored(("kick", HALF), ("drift", ONE)),
-        source="Swope et al., J. Chem. Phys. 76 (1982) 637",
-    ),
-    Scheme(
-        name="position-verlet",
-        title="position Verlet",
-        order=2,
-        limit=2.0,
-        symplectic=True,
-        stages=_mirrored(("drift", HALF), ("kick", ONE)),
-        source="Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990",
-    ),
-    Scheme(
-        name="implicit-midpoint",
-        title="implicit midpoint",
-        order=2,
-        limit=np.inf,
-        symplectic=True,
-        a=((HALF,),),
-        b=_row(1),
-        source="Hairer, Lubich & Wanner, I.1.2",
-    ),
-    Scheme(
-        name="trapezoidal",
-        title="trapezoidal rule (Newmark average acceleration)",
-        order=2,
-        limit=np.inf,
-        symplectic=False,
-        a=(_row(0, 0), _row(HALF, HALF)),
-        b=_row(HALF, HALF),
-        source="Newmark, J. Eng. Mech. Div. 85 (1959) 67, beta 1/4, gamma 1/2",
-    ),
-    Scheme(
-        name="rk2-midpoint",
-        title="explicit midpoint (RK2)",
-        order=2,
-        limit=0.0,
-        symplectic=False,
-        a=(_row(0, 0), _row(HALF, 0)),
-        b=_row(0, 1),
-        source="Runge 1895",
-    ),
-    Scheme(
-        name="rk2-heun",
-        title="Heun (RK2)",
-        order=2,
-        limit=0.0,
-        symplectic=False,
-        a=(_row(0, 0), _row(1, 0)),
-        b=_row(HALF, HALF),
-        source="Heun 1900",
-    ),
-    Scheme(
-        name="rk4",
-        title="classical Runge-Kutta (RK4)",
-        order=4,
-        limit=float(np.sqrt(8.0)),
-        symplectic=False,
-        a=(_row(0, 0, 0, 0), _row(HALF, 0, 0, 0), _row(0, HALF, 0, 0), _row(0, 0, 1, 0)),
-        b=_row(Fraction(1, 6), Fraction(1, 3), Fraction(1, 3), Fraction(1, 6)),
-        source="Kutta 1901",
-    ),
-    Scheme(
-        name="ruth3",
-        title="Ruth, third order",
-        order=3,
-        limit=2.507481170952355,
-        symplectic=True,
-        stages=(
-            ("kick", Fraction(7, 24)),
-            ("drift", Fraction(2, 3)),
-            ("kick", Fraction(3, 4)),
-            ("drift", Fraction(-2, 3)),
-            ("kick", Fraction(-1, 24)),
-            ("drift", ONE),
-        ),
-        source="Ruth 1983",
-    ),
-    Scheme(
-        name="forest-ruth",
-        title="Forest-Ruth, fourth order, drift first",
-        order=4,
-        limit=1.5734019474345401,
-        symplectic=True,
-        stages=_mirrored(("drift", _HALF_X1), ("kick", _X1), ("drift", _HALF_X0_X1), ("kick", _X0)),
-        source="Forest & Ruth 1990",
-    ),
-    Scheme(
-        name="yoshida4",
-        title="Yoshida, fourth order, kick first",
-        order=4,
-        limit=1.5734019474345401,
-        symplectic=True,
-        stages=_mirrored(("kick", _HALF_X1), ("drift", _X1), ("kick", _HALF_X0_X1), ("drift", _X0)),
-        source="Yoshida 1990",
-    ),
-    Scheme(
-        name="langevin-middle",
-        title="Langevin middle scheme at T = 0: half pull, half drift, friction, half drift, half pull",
-        order=2,
-        limit=2.0,
-        symplectic=True,
-        stages=_mirrored(("pull", HALF), ("drift", HALF), ("friction", ONE)),
-        source="Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; Zhang et al., "
-        "J. Phys. Chem. A 123 (2019) 6056",
-    ),
-    Scheme(
-        name="respa8",
-        title="r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones",
-        order=2,
-        limit=16.0,
-        symplectic=True,
-        stages=(("slow", HALF), *_EIGHT, ("slow", HALF)),
-        source="Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990; the limit is that of a fast "
-        "spring alone, in company it resonates from h w = 16 sin(pi/16) on",
-    ),
-    Scheme(
-        name="langevin-middle-early",
-        title="Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
-        order=1,
-        limit=2.0,
-        symplectic=True,
-        stages=(("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
-        source="Zhang et al., J. Phys. Chem. A 123 (2019) 6056; as OpenMM's integrator stores it",
-    ),
-    Scheme(
-        name="exact",
-        title="exact flow",
-        order=0,
-        limit=np.inf,
-        symplectic=True,
-        flow=True,
-        source="the solution of the equation of motion",
-    ),
-    Scheme(
-        name="adams",
-        title="CVODE Adams-Moulton, orders 1-12",
-        order=0,
-        limit=np.inf,
-        symplectic=False,
-        convergence=Fraction(12, 13),
-        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
-    ),
-    Scheme(
-        name="bdf",
-        title="CVODE BDF, orders 1-5",
-        order=0,
-        limit=np.inf,
-        symplectic=False,
-        convergence=Fraction(5, 6),
-        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
-    ),
-    Scheme(
-        name="ida",
-        title="IDA BDF, orders 1-5, of a circuit's equations",
-        order=0,
-        limit=np.inf,
-        symplectic=False,
-        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
-    ),
-)
+    _tableau("explicit-euler", "explicit Euler", 1, 0.0, [[0]], [1], "Euler 1768"),
+    splitting("semi-implicit-euler", "semi-implicit Euler, kick-drift", 1, 2.0,
+              (("kick", ONE), ("drift", ONE)), f"{_HLW}; the blog's own"),
+    splitting("semi-implicit-euler-drift-kick", "semi-implicit Euler, drift-kick", 1, 2.0,
+              (("drift", ONE), ("kick", ONE)), _HLW),
+    _tableau("implicit-euler", "implicit Euler", 1, np.inf, [[1]], [1], _HLW),
+    splitting("velocity-verlet", "velocity Verlet", 2, 2.0, _mirrored(("kick", HALF), ("drift", ONE)),
+              "Swope et al., J. Chem. Phys. 76 (1982) 637"),
+    splitting("position-verlet", "position Verlet", 2, 2.0, _mirrored(("drift", HALF), ("kick", ONE)),
+              _TUCKERMAN),
+    _tableau("implicit-midpoint", "implicit midpoint", 2, np.inf, [[HALF]], [1], _HLW, symplectic=True),
+    _tableau("trapezoidal", "trapezoidal rule (Newmark average acceleration)", 2, np.inf,
+             [[0, 0], [HALF, HALF]], [HALF, HALF],
+             "Newmark, J. Eng. Mech. Div. 85 (1959) 67, beta 1/4, gamma 1/2"),
+    _tableau("rk2-midpoint", "explicit midpoint (RK2)", 2, 0.0, [[0, 0], [HALF, 0]], [0, 1], "Runge 1895"),
+    _tableau("rk2-heun", "Heun (RK2)", 2, 0.0, [[0, 0], [1, 0]], [HALF, HALF], "Heun 1900"),
+    _tableau("rk4", "classical Runge-Kutta (RK4)", 4, float(np.sqrt(8.0)),
+             [[0, 0, 0, 0], [HALF, 0, 0, 0], [0, HALF, 0, 0], [0, 0, 1, 0]],
+             [Fraction(1, 6), Fraction(1, 3), Fraction(1, 3), Fraction(1, 6)], "Kutta 1901"),
+    splitting("ruth3", "Ruth, third order", 3, 2.507481170952355, _RUTH, "Ruth 1983"),
+    splitting("forest-ruth", "Forest-Ruth, fourth order, drift first", 4, 1.5734019474345401,
+              _mirrored(("drift", _HALF_X1), ("kick", _X1), ("drift", _HALF_X0_X1), ("kick", _X0)),
+              "Forest & Ruth 1990"),
+    splitting("yoshida4", "Yoshida, fourth order, kick first", 4, 1.5734019474345401,
+              _mirrored(("kick", _HALF_X1), ("drift", _X1), ("kick", _HALF_X0_X1), ("drift", _X0)),
+              "Yoshida 1990"),
+    splitting("langevin-middle",
+              "Langevin middle scheme at T = 0: half pull, half drift, friction, half drift, half pull",
+              2, 2.0, _mirrored(("pull", HALF), ("drift", HALF), ("friction", ONE)),
+              f"Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; {_ZHANG}"),
+    splitting("respa8", "r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones", 2, 16.0,
+              (("slow", HALF), *_EIGHT, ("slow", HALF)),
+              f"{_TUCKERMAN}; the limit is that of a fast spring alone, in company it resonates from "
+              "h w = 16 sin(pi/16) on"),
+    splitting("langevin-middle-early",
+              "Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
+              1, 2.0, (("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
+              f"{_ZHANG}; as OpenMM's integrator stores it"),
+    Scheme(name="exact", title="exact flow", order=0, limit=np.inf, symplectic=True, flow=True,
+           source="the solution of the equation of motion"),
+    _solver("adams", "CVODE Adams-Moulton, orders 1-12", Fraction(12, 13)),
+    _solver("bdf", "CVODE BDF, orders 1-5", Fraction(5, 6)),
+    _solver("ida", "IDA BDF, orders 1-5, of a circuit's equations"),
+)  # fmt: skip
 
 SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}
 

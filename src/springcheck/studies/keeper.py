@@ -23,18 +23,8 @@ from springcheck.studies.team import ALONE, Team
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 __all__ = [
-    "Keeper",
-    "Kept",
-    "Piece",
-    "Table",
-    "command",
-    "each",
-    "kept",
-    "origin",
-    "plain",
-    "read",
-    "restored",
-]
+    "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restored",
+]  # fmt: skip
 
 T = TypeVar("T")
 Table = store.Table

@@ -141,10 +141,16 @@ def door_options(parser: ArgumentParser) -> None:
     )
 
 
+Argument = tuple[tuple[str, ...], dict[str, Any]]
+JSON: Argument = (("--json",), {"action": "store_true", "help": "one JSON document on standard output"})
+QUIET: Argument = (("--quiet",), {"action": "store_true", "help": "print nothing but mistakes"})
+"""Options of many commands: names, and what argparse is told of them."""
+
+
 def report_options(parser: ArgumentParser) -> None:
     """The options of every study."""
-    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    for names, how in (JSON, QUIET):
+        parser.add_argument(*names, **how)
 
 
 def scene_option(parser: ArgumentParser, **more: Any) -> None:

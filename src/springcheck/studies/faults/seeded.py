@@ -6,7 +6,7 @@ A fault's `make(scene, scheme, size)` moves the scene wrongly and records it as 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -23,14 +23,15 @@ Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
 Where: TypeAlias = Literal["spring", "chain", "long spring"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Fault:
     """An engine broken on purpose."""
 
     name: str
     about: str
-    make: Make
     caught_by: tuple[str, ...]
+    make: Make
+    _: KW_ONLY
     scheme: str = "velocity-verlet"
     """The scheme that the engine claims."""
     size: float | None = None

@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.engines.contract import Arithmetic, Method
+from springcheck.stats import line
 from springcheck.studies.precision.points import Point
 
 ASYMPTOTIC = 2e-2
@@ -62,15 +63,13 @@ def order(points: Sequence[Point]) -> Fit | None:
     ][-FITTED:]
     if len(chosen) < FEWEST:
         return None
-    x = np.log([abs(point.size) for point in chosen])
-    y = np.log([point.error for point in chosen])
-    centred = x - np.mean(x)
-    spread = float(np.sum(centred**2))
-    slope = float(np.sum(centred * y)) / spread
-    left = y - np.mean(y) - slope * centred
-    error = float(np.sqrt(np.sum(left**2) / (len(x) - 2) / spread))
-    constant = float(np.exp(np.mean(y) - slope * np.mean(x)))
-    return Fit(order=slope, standard_error=error, constant=constant, points=len(x))
+    found = line(np.log([abs(x.size) for x in chosen]), np.log([x.error for x in chosen]))
+    return Fit(
+        order=found.slope,
+        standard_error=found.standard_error,
+        constant=float(np.exp(found.intercept)),
+        points=len(chosen),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ import numpy as np
 from springcheck import engines, schemes, simulate
 from springcheck.arrays import Extended, Floats
 from springcheck.engines.contract import Label
+from springcheck.stats import line
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
 from springcheck.studies.tables import column
@@ -173,7 +174,7 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
         logs = 0.5 * np.log(ellipse.astype(np.float64))
     else:
         logs = np.log(size[n])
-    return float(np.polyfit(n.astype(np.float64), logs, 1)[0]), predicted
+    return line(n.astype(np.float64), logs).slope, predicted
 
 
 def _edge(label: Label, theory: float) -> tuple[float, float]:
@@ -188,5 +189,4 @@ def _edge(label: Label, theory: float) -> tuple[float, float]:
     defective = abs(discriminant) <= 1e-12 and rest > 1e-6
     if len(size) <= steps or np.any(size[n] <= 0):
         return float("nan"), float(defective)
-    slope = np.polyfit(np.log(n), np.log(size[n]), 1)[0]
-    return float(slope), float(defective)
+    return line(np.log(n), np.log(size[n])).slope, float(defective)

@@ -1,0 +1,252 @@
+"""The commands that are no studies: what each takes, and what it does with it.
+
+Heavy modules are imported by the command that needs them.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springcheck import output
+from springcheck.errors import SpringcheckError, plain
+from springcheck.studies.study import JSON, QUIET, Argument, engine_option
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command of the command line."""
+
+    name: str
+    about: str
+    perform: Callable[[Namespace], int]
+    """Does what it is for; returns the exit status."""
+    arguments: tuple[Argument, ...]
+    engines: bool = False
+    """Whether a call may bring engines."""
+
+    def options(self, parser: ArgumentParser) -> None:
+        """Add its arguments to its parser."""
+        for names, how in self.arguments:
+            parser.add_argument(*names, **how)
+        if self.engines:
+            engine_option(parser)
+
+
+def _inspect(options: Namespace) -> int:
+    from springcheck import inspect
+
+    rows = 20 if options.rows is None else options.rows
+    if rows < 1:
+        raise SpringcheckError(f"--rows {rows}: a number of frames from 1 on is needed")
+    doubts = output.doubts(options.file)
+    found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=rows)
+    output.warn(options.file, doubts)
+    if options.json:
+        output.document({"not_trusted": doubts, **inspect.document(found)})
+    else:
+        output.show(inspect.lines(found, options))
+    return int(bool(doubts))
+
+
+def _plot(options: Namespace) -> int:
+    from springcheck import plot
+    from springcheck.figures import folder
+
+    path = Path(options.file)
+    doubts = output.doubts(options.file)
+    written, notes = plot.draw(path, Path(options.output or folder.folder_of(path)))
+    output.warn(options.file, doubts)
+    if not options.quiet:
+        for line in (*notes, *written):
+            print(plain(line))
+    return int(bool(doubts))
+
+
+def _report(options: Namespace) -> int:
+    from springcheck import page
+
+    path = Path(options.file)
+    into = Path(options.output or f"{path.stem}.html")
+    content = page.gather(path)
+    size = page.write(content, into)
+    output.warn(options.file, output.listed(content.not_trusted))
+    if not options.quiet:
+        print(plain(f"{into}: {size / 1e3:.0f} kB"))
+    return int(bool(content.not_trusted))
+
+
+def _show(options: Namespace) -> int:
+    from springcheck.physics import scenefile
+
+    text = scenefile.text_of(options.scene)
+    if options.output is None:
+        sys.stdout.write(text)
+        return 0
+    try:
+        with open(options.output, "x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise SpringcheckError(f"cannot write {options.output}: {error.strerror}") from error
+    print(plain(f"{options.output}: run it with springcheck run {options.output}"))
+    return 0
+
+
+def _explain(options: Namespace) -> int:
+    from springcheck import explain
+
+    for line in explain.lines(options.word):
+        print(line)
+    return 0
+
+
+def _columns(options: Namespace) -> list[str]:
+    return [name.strip() for name in (options.columns or "").split(",") if name.strip()]
+
+
+def _identify(options: Namespace) -> int:
+    from springcheck import formats, identify
+    from springcheck.identify import files, text
+
+    if (options.file is None) == (options.integrator is None):
+        raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
+    doubts: list[dict[str, str]] = []
+    if options.integrator is not None:
+        # what it prints is not ours to show
+        with redirect_stdout(sys.stderr):
+            integrator = identify.load_stepper(options.integrator)
+            found = {options.integrator: identify.identify_stepper(integrator)}
+    else:
+        path = Path(options.file)
+        if formats.is_hdf5(path):
+            doubts = output.doubts(options.file)
+        stated = {"mass": options.mass, "stiffness": options.stiffness, "step": options.step}
+        found = files.identify_file(path, options.trajectory, _columns(options), stated)
+    output.warn(options.file, doubts)
+    documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
+    if options.json:
+        document = documents[0] if len(documents) == 1 else {"identifications": documents}
+        output.document({**document, "not_trusted": doubts})
+    else:
+        output.show([line for label, one in found.items() for line in text.identification(label, one)])
+    fits = all(one.fits or one.verdict == "adaptive" for one in found.values())
+    return 0 if fits and not doubts else 1
+
+
+def _judge(options: Namespace) -> int:
+    from springcheck.doors import file
+
+    found = file.judge(
+        Path(options.file),
+        scene=options.scene,
+        scheme=options.scheme,
+        columns=_columns(options),
+        step=options.step,
+        trajectory=options.trajectory,
+    )
+    if options.json:
+        output.document(found.document())
+    else:
+        output.show(found.lines())
+    return found.status
+
+
+def _check(options: Namespace) -> int:
+    from springcheck import store
+
+    findings = store.check(Path(options.file))
+    for finding in findings:
+        print(plain(f"{options.file}: {finding.place}: {finding.what}"))
+    if not findings:
+        ended = store.summary(Path(options.file)).complete
+        rest = "" if ended else "; unfinished: the command that writes it goes on when it is given again"
+        print(f"{options.file}: whole; every digest matches{rest}")
+    return 1 if findings else 0
+
+
+def _export(options: Namespace) -> int:
+    from springcheck import store
+
+    doubts = store.export(Path(options.file), options.label, Path(options.output))
+    output.warn(options.file, output.listed(doubts))
+    print(plain(f"{options.output}: {options.label}"))
+    return int(bool(doubts))
+
+
+def _list(options: Namespace) -> int:
+    from springcheck import listing
+
+    found = listing.listing()
+    if options.json:
+        output.document(found)
+    else:
+        for line in listing.lines(found):
+            print(line)
+    return 0
+
+
+def _argument(*names: str, **how: Any) -> Argument:
+    return names, how
+
+
+_FILE = _argument("file", metavar="FILE")
+_GROUP = _argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
+_NAMES = _argument("--columns", metavar="NAMES", help="names of a table's columns, as t,q,v")
+
+COMMANDS = (
+    Command("inspect", "what is in a store", _inspect, (
+        _FILE,
+        _argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory"),
+        _argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
+        _argument("--verdicts", action="store_true", help="print every verdict with its reason"),
+        JSON,
+    )),
+    Command("plot", "draw what is in a store, as PNG and SVG", _plot, (
+        _FILE,
+        _argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
+        QUIET,
+    )),
+    Command("report", "a store as one HTML page that checks itself in a browser", _report, (
+        _FILE,
+        _argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
+        QUIET,
+    )),
+    Command("show", "a shipped scene as a file to start from", _show, (
+        _argument("scene", metavar="SCENE"),
+        _argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
+    )),
+    Command("explain", "what a check looks at, what a scheme does", _explain, (
+        _argument("word", metavar="NAME", help="a check, a scheme, or a method as engine:method"),
+    ), engines=True),
+    Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
+        _argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities"),
+        _GROUP,
+        _argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
+        _argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
+        _NAMES,
+        _argument("--step", type=float, metavar="H", help="is this the time step?"),
+        _argument("--stepper", dest="integrator", metavar="MODULE:FUNCTION",
+                  help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
+        JSON,
+    )),
+    Command("judge", "is a trajectory of any program what its scheme promises", _judge, (
+        _argument("file", metavar="FILE", help="a table, NPY, NPZ, extended XYZ, LAMMPS dump, H5MD ..."),
+        _argument("--scene", required=True, metavar="SCENE", help="the scene that it is of"),
+        _argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
+        _NAMES,
+        _GROUP,
+        _argument("--step", type=float, metavar="H", help="the time step of a file that counts steps"),
+        JSON,
+    )),
+    Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),
+    Command("export", "one trajectory as a file of its own, for other tools", _export, (
+        _FILE, _argument("label", metavar="LABEL"), _argument("output", metavar="OUT.h5md"),
+    )),
+    Command("list", "scenes, engines with their versions, checks", _list, (JSON,), engines=True),
+)  # fmt: skip
+"""Every command that is no study, in the order in which `--help` names them."""

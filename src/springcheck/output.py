@@ -1,0 +1,91 @@
+"""What the command line shows: lines and JSON on standard output, doubts and progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from springcheck.errors import plain
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from springcheck.studies.study import Progress
+
+
+def show(lines: Sequence[RenderableType]) -> None:
+    """Print lines, as wide as the terminal."""
+    from rich.console import Console
+
+    terminal = sys.stdout.isatty()
+    # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
+    console = Console(highlight=False, width=None if terminal else 1 << 16)
+    if terminal:
+        for line in lines:
+            console.print(line, crop=False)
+        return
+    with console.capture() as captured:
+        for line in lines:
+            console.print(line, crop=False)
+    # a line that was folded ends in a blank, which a file or a diff need not keep
+    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
+def document(data: Any) -> None:
+    """Print one JSON document."""
+    print(json.dumps(data, allow_nan=False, indent=2))
+
+
+def doubts(file: str) -> list[dict[str, str]]:
+    """What of a store cannot be trusted, for JSON; `warn` says it first."""
+    from springcheck import store
+
+    return listed(store.doubts(Path(file)))
+
+
+def listed(found: Sequence[Any]) -> list[dict[str, str]]:
+    """Findings of a store as plain data."""
+    return [{"place": one.place, "what": one.what} for one in found]
+
+
+def warn(file: str, found: Sequence[dict[str, str]]) -> None:
+    """Say in one line what of a store cannot be trusted, before anything of it is shown."""
+    if found:
+        first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
+        more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
+        print(f"springcheck: {plain(f'{file} is not what was written: {first}', 400)}{more}", file=sys.stderr)
+
+
+@contextmanager
+def progress(title: str, *, quiet: bool) -> Iterator[Progress | None]:
+    """A progress bar on a terminal, nothing in a pipe."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    import rich.progress
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    bars = rich.progress.Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task: list[TaskID] = []
+
+    def told(done: float, whole: float, what: str = "") -> None:
+        if not task:
+            task.append(bars.add_task(title, total=whole))
+        bars.update(task[0], completed=done, total=whole, description=f"{title}: {what}" if what else title)
+
+    with bars:
+        yield told

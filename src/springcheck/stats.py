@@ -1,0 +1,44 @@
+"""Straight lines through measured points, and quantiles of Student's t."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Line:
+    """Least squares of y = intercept + slope x, and further terms."""
+
+    slope: float
+    standard_error: float
+    """Of the slope; NaN where there are as many unknowns as points."""
+    intercept: float
+    leverage: Floats
+    """What the slope changes by for a change of each y (n,)."""
+
+
+def line(x: Floats, y: Floats, *terms: Floats) -> Line:
+    """The line through points x, y (n,), fitted together with the coefficients of these terms (n,)."""
+    design = np.stack([np.ones_like(x), x, *terms], axis=1)
+    inverse = np.linalg.pinv(design)
+    best = inverse @ y
+    left = y - design @ best
+    freedom = len(x) - len(best)
+    variance = float(left @ left) / freedom if freedom else np.nan
+    return Line(
+        slope=float(best[1]),
+        standard_error=float(np.sqrt(variance) * np.linalg.norm(inverse[1])),
+        intercept=float(best[0]),
+        leverage=inverse[1],
+    )
+
+
+def student(freedom: int, chance: float) -> float:
+    """What |t| of so many degrees of freedom exceeds by this chance."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 1 - chance / 2))
