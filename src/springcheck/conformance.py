@@ -123,8 +123,9 @@ def _served(label: Label) -> list[Scene]:
 
 
 def _serves(label: Label, scene: Scene) -> bool:
-    uneven_friction = engines.method(label).one_friction and np.ptp(scene.system.friction_rates) > 0
-    return engines.refusal(scene, label) is None and not uneven_friction
+    rates = scene.system.friction_rates
+    one_rate = bool(np.ptp(rates) <= 2.0**-52 * np.max(rates))
+    return engines.refusal(scene, label) is None and (one_rate or not engines.method(label).one_friction)
 
 
 def _damped(scene: Scene) -> Scene:

@@ -21,6 +21,7 @@ def _method(
     terms: str = "",
     requires: Need | None = None,
     one_friction: bool = False,
+    default: bool = True,
 ) -> Method:
     return Method(
         name=name,
@@ -30,6 +31,7 @@ def _method(
         requires=frozenset({requires} if requires else ()),
         rebuilds_velocity=rebuilds,
         one_friction=one_friction,
+        default=default,
     )
 
 
@@ -55,6 +57,21 @@ ENGINE = Engine(
             one_friction=True,
         ),
         _method("mts", "respa8", "MTSIntegrator, fast springs 8 times a step", requires=Need.FAST_SPRINGS),
+        _method(
+            "langevin",
+            "langevin-middle",
+            "LangevinIntegrator at T = 0, started and read synchronised",
+            terms="damping",
+            requires=Need.DAMPING,
+            one_friction=True,
+            default=False,
+        ),
+        _method(
+            "nose-hoover",
+            "semi-implicit-euler",
+            "NoseHooverIntegrator without a thermostat, handed p0 as it is",
+            default=False,
+        ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     step_seconds=8e-7,

@@ -10,7 +10,8 @@ v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("
 
 `LangevinMiddleIntegrator` kicks, drifts half a step, lets friction and noise act on the velocity,
 and drifts the other half.  At T = 0 there is no noise, and read like "verlet" it is the symmetric
-scheme pull-drift-friction-drift-pull.  Its friction is one rate c/m for all particles.
+scheme pull-drift-friction-drift-pull.  Its friction is one rate c/m for all particles.  `LangevinIntegrator`
+is the same by now, bit for bit.
 
 OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every
 scheme here turns into its own -h under that reflection, because the force does not depend on p.
@@ -67,7 +68,7 @@ EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
 """One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`.  No parameter is divided
 by or multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
-SHIFTED = frozenset({"verlet", "langevin-middle"})
+SHIFTED = frozenset({"verlet", "langevin-middle", "langevin"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
 
 
@@ -216,23 +217,16 @@ def _stays_right_way_round(scene: Scene, term: Morse) -> None:
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
-    if name == "langevin-middle" and step < 0:
-        raise MethodError(
-            f"openmm:langevin-middle: time.step = {step:g}: OpenMM's friction goes forwards in time only"
-        )
     step = abs(step)
     if name in ("verlet", "leapfrog"):
         return mm.VerletIntegrator(step)
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
-    if name == "langevin-middle":
-        rate = scene.system.friction_rates.astype(np.float64)
-        if np.ptp(rate) > 2.0**-52 * np.max(rate):
-            raise MethodError(
-                "openmm:langevin-middle has one friction rate for all particles, and damping/mass of scene "
-                f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}"
-            )
-        return mm.LangevinMiddleIntegrator(0.0, float(rate[0]), step)
+    if name == "nose-hoover":
+        return mm.NoseHooverIntegrator(step)
+    if name in ("langevin", "langevin-middle"):
+        made = mm.LangevinIntegrator if name == "langevin" else mm.LangevinMiddleIntegrator
+        return made(0.0, _friction_rate(scene, name), step)
     integrator = mm.CustomIntegrator(step)
     if name == "euler":
         integrator.addPerDofVariable("v0", 0)
@@ -243,6 +237,17 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         integrator.addComputePerDof("v", "v + dt*(f/m)")
         integrator.addComputePerDof("x", "x + dt*v")
     return integrator
+
+
+def _friction_rate(scene: Scene, name: str) -> float:
+    """The one friction rate of all particles [1/T].  MethodError where they differ."""
+    rate = scene.system.friction_rates.astype(np.float64)
+    if np.ptp(rate) > 2.0**-52 * np.max(rate):
+        raise MethodError(
+            f"openmm:{name} has one friction rate for all particles, and damping/mass of scene "
+            f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}"
+        )
+    return float(rate[0])
 
 
 def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.Context:

@@ -25,7 +25,7 @@ from springcheck.studies.study import Progress
 from springcheck.trajectory import Trajectory
 
 EVERY = "*:*"
-"""Every method of every engine, default or not."""
+"""Every method of every engine; of an engine that has default ones, those."""
 
 BLOG, UNEVEN = "spring", "spring-uneven"
 
@@ -44,7 +44,7 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     left = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
     for label in engines.match(tuple(methods) or (EVERY,)):
         scenes = (load_scene(BLOG), load_scene(UNEVEN))
-        reasons = [engines.refusal(scene, label) for scene in scenes] + [engines.absence(label.engine)]
+        reasons = [engines.refusal(scene, label) for scene in scenes] + [_absence(label)]
         reason = next((x for x in reasons if x), None)
         if reason:
             left.append(LeftOut(method=str(label), reason=reason))
@@ -55,6 +55,15 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     kept = kept or Keeper()
     found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
     return Census(entries=tuple(found), left_out=tuple(left), taken_up=kept.taken_up)
+
+
+def _absence(label: Label) -> str | None:
+    """Why an engine cannot be used here: it is not installed, or what it stands on is not."""
+    try:
+        engines.load(label.engine)
+    except MethodError as error:
+        return str(error)
+    return None
 
 
 def record(
