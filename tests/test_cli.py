@@ -127,11 +127,14 @@ def test_inspect_shows_the_store_and_the_numbers_asked_for(capsys: pytest.Captur
     ]  # fmt: skip
 
 
-def test_plot_draws_three_pictures_twice(capsys: pytest.CaptureFixture[str]) -> None:
+PICTURES = ("phase-portrait", "position", "energy", "error")
+
+
+def test_plot_draws_four_pictures_twice(capsys: pytest.CaptureFixture[str]) -> None:
     main(["run", "spring", *OWN, "--quiet"])
     assert main(["plot", "spring.h5", "-o", "pictures"]) == 0
     written = {Path(line).name for line in capsys.readouterr().out.splitlines()}
-    assert written == {f"{a}.{b}" for a in ("phase-portrait", "position", "energy") for b in ("png", "svg")}
+    assert written == {f"{a}.{b}" for a in PICTURES for b in ("png", "svg")}
     assert all((Path("pictures") / name).stat().st_size > 10_000 for name in written)
 
 

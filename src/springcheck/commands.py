@@ -60,7 +60,8 @@ def _plot(options: Namespace) -> int:
 
     path = Path(options.file)
     doubts = output.doubts(options.file)
-    written, notes = plot.draw(path, Path(options.output or folder.folder_of(path)))
+    into = Path(options.output or folder.folder_of(path))
+    written, notes = plot.draw(path, into, particle=options.particle)
     output.warn(options.file, doubts)
     if not options.quiet:
         for line in (*notes, *written):
@@ -209,6 +210,7 @@ COMMANDS = (
     Command("plot", "draw what is in a store, as PNG and SVG", _plot, (
         _FILE,
         _argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
+        _argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
         QUIET,
     )),
     Command("report", "a store as one HTML page that checks itself in a browser", _report, (

@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def draw(path: Path, into: Path) -> tuple[list[Path], list[str]]:
+def draw(path: Path, into: Path, *, particle: int | None = None) -> tuple[list[Path], list[str]]:
     """Draw the studies of a store into a folder -> the files, and notes on what they leave out.
 
-    Figures of this store are replaced, and nothing else.  SpringcheckError where there is nothing to draw.
+    `particle`: the motion of this one alone.  Figures of this store are replaced, and nothing else.
+    SpringcheckError where there is nothing to draw.
     """
     if into.exists() and not into.is_dir():
         raise SpringcheckError(f"{into} is a file: figures need a folder, name another one with -o")
@@ -27,11 +28,16 @@ def draw(path: Path, into: Path) -> tuple[list[Path], list[str]]:
     if not studies:
         rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
         raise SpringcheckError(f"{path}: holds no trajectory and no study to draw{rest}")
+    if particle is not None:
+        studies = [(study, found) for study, found in studies if study.trajectories]
+        if not studies:
+            raise SpringcheckError(f"{path}: --particle goes with trajectories, and it holds none")
+    chosen = {} if particle is None else {"particle": particle}
     notes: list[str] = []
     with tempfile.TemporaryDirectory() as name:
         written: list[Path] = []
         for study, found in studies:
-            written += study.draw(found, Path(name))
+            written += study.draw(found, Path(name), **chosen)
             notes += getattr(found, "notes", ())
         if not written:
             raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")

@@ -75,9 +75,9 @@ class Study:
         found: Result = self._part("measure").stored(path)
         return found
 
-    def draw(self, found: Result, folder: Path) -> list[Path]:
-        """Draw a stored or a fresh result into a folder; returns the files."""
-        written: list[Path] = self._part("figure").draw(found, folder)
+    def draw(self, found: Result, folder: Path, **chosen: Any) -> list[Path]:
+        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
+        written: list[Path] = self._part("figure").draw(found, folder, **chosen)
         return written
 
     def banks(self, found: Result) -> list[Bank]:

@@ -1,0 +1,138 @@
+"""Energy and error over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from springcheck.arrays import Floats, Reals
+from springcheck.figures import overlay
+from springcheck.figures.motion import Exact, true_motion
+from springcheck.figures.overlay import TRUTH, Frame, Group, every
+from springcheck.figures.views import with_unit
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Trajectory
+
+MOST = 1e3
+"""Energies and errors, relative to those of the start, beyond which nothing is read off a picture."""
+
+LARGE = 30.0
+"""How many times the right energy one may be that sets the scale; one beyond leaves the picture."""
+
+DECADES = 100.0
+"""Ratio of largest to smallest energy from which the scale is logarithmic."""
+
+LEAST = 1e-4
+"""Of the initial energy, what the logarithmic scale goes down to."""
+
+FLOOR = 2.0**-53
+"""Relative differences below this are none: they stand on the lower edge."""
+
+
+def energy(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+    """Energy over time, and below it how far it is from that of the exact motion on a logarithmic scale.
+
+    Without friction that is the initial energy; where friction acts and no closed form is known it is the
+    initial one too, and the axis says so.  All in units of the kinetic plus the absolute potential energy of
+    the start, which is the initial energy unless a potential is negative.
+    """
+    figure = Figure(figsize=(7.8, 6.0), layout="constrained")
+    upper, lower = figure.subplots(2, sharex=True)
+    start = scene.system.initial_energy
+    unit = float(scene.system.norm.unit) ** 2 or 1.0
+    whole = abs(start - unit) <= 1e-12 * unit
+    unit = start if whole else unit
+    of = "initial energy" if whole else "(T + |V|) of the start"
+    damped = scene.system.is_damped and exact.known
+
+    def energies(q: Reals, p: Reals) -> Floats:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(scene.system.energy(q, p), np.float64)
+
+    def off(run: Trajectory) -> Floats:
+        right = energies(*exact.at(run)) if damped else start
+        return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
+
+    found = {run.label: energies(run.q, run.p) / unit for run in every(groups)}
+    dt, t_unit = overlay.time_unit(scene, groups)
+    true: Floats | None = None
+    if damped and (truth := true_motion(scene, every(groups))) is not None:
+        true = energies(*truth[1:]) / unit
+        upper.plot(dt * truth[0], true, **TRUTH)
+    elif not scene.system.is_damped:
+        true = np.full(2, start / unit)
+        upper.axhline(start / unit, **TRUTH)
+    ys = _scale(upper, list(found.values()), true)
+    overlay.overlay(upper, groups, lambda run: (dt * run.t, ys.within(found[run.label])))
+    upper.set_ylabel(f"energy / {of}")
+    overlay.note(upper, overlay.leaving(groups, lambda run: ys.leaves(found[run.label])), dt, t_unit)
+    _decades(lower, groups, off, dt, t_unit)
+    lower.set_ylabel(f"|energy - {'exact' if damped else 'initial'}| / {of}")
+    lower.set_xlabel(with_unit("time t", t_unit))
+    lower.ticklabel_format(axis="x", useOffset=False)
+    overlay.heading(figure, f"{scene.title}: energy")
+    overlay.legend(figure, groups, *([overlay.truth_line()] if true is not None else []))
+    return figure
+
+
+def _scale(axes: Axes, found: Sequence[Floats], true: Floats | None) -> Frame:
+    """Scale and limits of an axis of energies, set by all that stay within some times the right one."""
+    largest = max(1.0, 0.0 if true is None else float(np.max(np.abs(true))))
+    near = [x for x in found if np.max(np.abs(x)) <= LARGE * largest] or list(found)
+    right = [] if true is None else [true]
+    low, high = (float(f([f(x) for x in (*near, *right)])) for f in (np.min, np.max))
+    if low > 0 and high > DECADES * low:
+        axes.set_yscale("log")
+        # the right energy may fall further
+        bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
+        ys = Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom)
+    else:
+        ys = overlay.widened(low, high, clipped=len(near) < len(found))
+    axes.set_ylim(ys.low, ys.high)
+    return ys
+
+
+def _decades(
+    axes: Axes, groups: Sequence[Group], pick: Callable[[Trajectory], Floats], dt: float, t_unit: str
+) -> None:
+    """Differences on a logarithmic scale."""
+    found = {run.label: pick(run) for run in every(groups)}
+    # the start is right; what is less than the floor at other frames stands on the lower edge
+    positive = [x[1:][x[1:] > 0] for x in found.values()]
+    low = max(min((float(np.min(x)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
+    inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST]
+    clipped = len(inside) < len(found)
+    high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 1e3 * low)
+
+    def shown(run: Trajectory) -> tuple[Floats, Floats]:
+        y = found[run.label]
+        end = _beyond(y, high)
+        last = len(y) if end is None else end + 1
+        return dt * run.t[1:last], np.clip(y[1:last], low, high * overlay.FAR)
+
+    overlay.overlay(axes, groups, shown)
+    axes.set_yscale("log")
+    axes.set_ylim(low, high)
+    overlay.note(axes, overlay.leaving(groups, lambda run: _beyond(found[run.label], high)), dt, t_unit)
+
+
+def _beyond(values: Floats, high: float) -> int | None:
+    return int(np.argmax(values > high)) if np.any(values > high) else None
+
+
+def error(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+    """Distance from the exact solution over time, on a logarithmic scale."""
+    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    dt, t_unit = overlay.time_unit(scene, groups)
+    _decades(axes, groups, exact.error, dt, t_unit)
+    axes.axhline(1.0, color="#888888", linewidth=0.8)
+    axes.set_xlabel(with_unit("time t", t_unit))
+    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.set_ylabel("error / initial energy norm")
+    overlay.heading(figure, f"{scene.title}: distance from the exact solution")
+    overlay.legend(figure, groups)
+    return figure

@@ -1,0 +1,142 @@
+"""One colour for one scheme, one mark for one engine, in every figure; axes in readable units.
+
+Relatives share a colour and differ by their line.  Colours are those of Okabe & Ito (2008) and two dark ones
+of Tol (2021), told apart by people with any colour vision; the common schemes also differ by their lines, so
+that a grey print can be read.  Nothing here needs a library.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from springcheck import schemes
+
+Line: TypeAlias = str | tuple[int, tuple[float, ...]]
+
+SOLID, DASHED, DOTTED, DASH_DOT = "-", "--", ":", "-."
+LONG: Line = (0, (8, 1.5))
+TWO_DOTS: Line = (0, (5, 1.5, 1, 1.5, 1, 1.5))
+SPARSE: Line = (0, (1, 2.5))
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Colour and line of a scheme."""
+
+    color: str
+    linestyle: Any
+    """A `Line`, as drawing libraries take it."""
+
+
+_BLUE, _RED, _GREEN, _PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+_ORANGE, _SKY, _BLACK, _WINE, _OLIVE = "#E69F00", "#56B4E9", "#000000", "#882255", "#999933"
+
+LOOKS = {
+    "explicit-euler": Look(_RED, DASHED),
+    "semi-implicit-euler": Look(_BLUE, SOLID),
+    "semi-implicit-euler-drift-kick": Look(_BLUE, DOTTED),
+    "semi-implicit-euler-implicit-friction": Look(_BLUE, DASH_DOT),
+    "implicit-euler": Look(_PINK, DASH_DOT),
+    "velocity-verlet": Look(_GREEN, LONG),
+    "position-verlet": Look(_GREEN, DOTTED),
+    "respa8": Look(_GREEN, DASH_DOT),
+    "langevin-middle": Look(_SKY, DASHED),
+    "langevin-middle-early": Look(_SKY, DOTTED),
+    "implicit-midpoint": Look(_SKY, SOLID),
+    "trapezoidal": Look(_SKY, LONG),
+    "rk2-midpoint": Look(_ORANGE, DOTTED),
+    "rk2-heun": Look(_ORANGE, DASHED),
+    "rk4": Look(_ORANGE, TWO_DOTS),
+    "ruth3": Look(_WINE, DOTTED),
+    "forest-ruth": Look(_WINE, SOLID),
+    "yoshida4": Look(_WINE, DASHED),
+    "exact": Look(_BLACK, LONG),
+    "adams": Look(_BLACK, DOTTED),
+    "bdf": Look(_BLACK, DASH_DOT),
+    "ida": Look(_BLACK, DASHED),
+    "scipy-rk45": Look(_ORANGE, DASH_DOT),
+    "scipy-dop853": Look(_ORANGE, SOLID),
+    "scipy-radau": Look(_WINE, DASH_DOT),
+    "scipy-bdf": Look(_BLACK, TWO_DOTS),
+    "scipy-lsoda": Look(_BLACK, SPARSE),
+    "force-held-2": Look(_OLIVE, SOLID),
+    "force-held-4": Look(_OLIVE, LONG),
+    "force-held-5": Look(_OLIVE, DASHED),
+    "force-held-10": Look(_OLIVE, DASH_DOT),
+    "force-held-rk4": Look(_OLIVE, DOTTED),
+}
+_REST = tuple(Look(c, line) for line in (TWO_DOTS, SPARSE) for c in (_OLIVE, _WINE, _SKY, _PINK, _RED, _BLUE))
+
+MARKS = {
+    "own": ("o", "\u25cb"),
+    "openmm": ("s", "\u25a1"),
+    "ase": ("^", "\u25b3"),
+    "sundials": ("D", "\u25c7"),
+    "scipy": ("v", "\u25bd"),
+    "mujoco": ("<", "\u25c1"),
+    "pymunk": (">", "\u25b7"),
+    "rebound": ("*", "\u2606"),
+    "dart": ("p", "\u2b20"),
+}
+"""Of each engine: the mark on a line, and the character that stands for it in a legend."""
+_OTHER_MARKS = (("h", "\u2b21"), ("X", "\u2716"), ("P", "\u271a"), ("d", "\u2b26"))
+
+
+def look(scheme: str) -> Look:
+    """Colour and line of a scheme, of any name, the same in every figure."""
+    return LOOKS.get(scheme) or _REST[zlib.crc32(scheme.encode()) % len(_REST)]
+
+
+def mark(engine: str) -> tuple[str, str]:
+    """Mark and character of an engine, of any name."""
+    return MARKS.get(engine) or _OTHER_MARKS[zlib.crc32(engine.encode()) % len(_OTHER_MARKS)]
+
+
+def engine(label: str) -> str:
+    """The engine of a method's label."""
+    return label.partition(":")[0]
+
+
+def title(scheme: str) -> str:
+    """The title of a scheme as short as a legend needs it: without how it goes, and without its orders."""
+    return schemes.title(scheme).partition(":")[0].partition(", orders ")[0]
+
+
+MOST_MEMBERS = 6
+
+
+def members(labels: Iterable[str]) -> str:
+    """Whose marks lie on a scheme's line: the one label, or the engines with their marks."""
+    given = list(labels)
+    if len(given) == 1:
+        return f"{mark(engine(given[0]))[1]} {given[0]}"
+    count: dict[str, int] = {}
+    for label in given:
+        count[engine(label)] = count.get(engine(label), 0) + 1
+    names = [f"{mark(name)[1]} {name}" + (f" ({n})" if n > 1 else "") for name, n in count.items()]
+    more = [f"and {len(names) - MOST_MEMBERS} more"] if len(names) > MOST_MEMBERS else []
+    lines = [names[i : i + 3] for i in range(0, min(len(names), MOST_MEMBERS), 3)]
+    return "\n".join("  ".join(line) for line in [*lines, *([more] if more else [])])
+
+
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "\u00b5", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+SCALED = {"nm": ("m", -9), "ps": ("s", -12)}
+"""Units that carry a prefix already: what they are a power of ten of."""
+
+
+def prefixed(largest: float, unit: str) -> tuple[float, str]:
+    """The factor and the unit in which numbers up to `largest` are read easily: from 1 to 999.
+
+    Only units of one name take a prefix; without a unit, or beyond the prefixes, numbers stay as they are.
+    """
+    name, power = SCALED.get(unit, (unit, 0))
+    if not name.isalpha() or not (math.isfinite(largest) and largest > 0) or name in ("rad", "\u03c0"):
+        return 1.0, unit
+    exponent = 3 * math.floor((math.log10(largest) + power) / 3 + 1e-9)
+    if exponent not in PREFIXES or exponent == power:
+        return 1.0, unit
+    return 10.0 ** (power - exponent), PREFIXES[exponent] + name

@@ -1,0 +1,70 @@
+"""The exact solution beside runs: smooth for a line, at their own frames for their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from springcheck.arrays import Extended, Floats
+from springcheck.physics import exact
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Trajectory
+
+Motion = tuple[Floats, Floats, Floats]
+"""t (f,) [T], q and p (f, n)."""
+
+SMOOTH = 1500
+"""Points of a smooth line."""
+
+
+def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> Motion | None:
+    """A smooth exact motion from the first frame of these runs to the last, None where none is known."""
+    times = [np.abs(run.t[[0, -1]]) for run in runs]
+    return smooth(scene, float(np.min(times)), float(np.max(times)))
+
+
+def smooth(scene: Scene, first: float, last: float) -> Motion | None:
+    """A smooth exact motion between two times from the start [T], None where none is known."""
+    if not exact.has_true_motion(scene):
+        return None
+    begin, end = (round(x / abs(scene.step)) for x in (first, last))
+    # some 1500 whole parts of steps, or whole steps
+    finer = max(1, -(-SMOOTH // max(1, end - begin)))
+    steps = np.unique(np.rint(np.linspace(begin * finer, end * finer, SMOOTH + 1)).astype(np.int64))
+    q, p = exact.true_motion(scene, steps, scene.step / finer)
+    return (
+        np.asarray(steps * (scene.step / finer), np.float64),
+        np.asarray(q, np.float64),
+        np.asarray(p, np.float64),
+    )
+
+
+class Exact:
+    """The exact solution of a scene at the frames of its runs; alike frames are computed once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.known = exact.has_true_motion(scene)
+        self._found: dict[tuple[float, ...], tuple[Extended, Extended]] = {}
+
+    def at(self, run: Trajectory) -> tuple[Extended, Extended]:
+        """Exact q and p (f, n) at the frames of a run."""
+        key = (len(run.t), float(run.t[0]), float(run.t[-1]), run.step)
+        if key not in self._found:
+            steps = np.rint(run.t / run.step).astype(np.int64)
+            self._found[key] = exact.true_motion(self.scene, steps, run.step)
+        return self._found[key]
+
+    def error(self, run: Trajectory) -> Floats:
+        """Distance of each frame from it (f,), relative to the initial energy norm."""
+        q, p = self.at(run)
+        return self.scene.system.norm(run.q - q, run.p - p)
+
+
+def periods(x: Floats) -> float:
+    """How many times a motion goes round: half of the crossings of its mean."""
+    if len(x) < 3 or not np.isfinite(x).all():
+        return 0.0
+    side = x > np.mean(x)
+    return float(np.count_nonzero(side[1:] != side[:-1])) / 2

@@ -1,0 +1,243 @@
+"""Runs laid over each other: a line a scheme, marks of its engines, one legend, what explodes clipped."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from springcheck.arrays import Floats
+from springcheck.figures import looks
+from springcheck.figures.views import units
+from springcheck.physics.scene import Scene
+from springcheck.trajectory import Trajectory
+
+TRUTH: dict[str, Any] = {
+    "color": "#b3b3b3",
+    "linewidth": 4.0,
+    "alpha": 0.7,
+    "label": "exact solution",
+    "zorder": 1,
+}
+
+EXPLODED, LARGE = 3.0, 6.0
+"""How many times as far as the exact solution goes a run that grows may go and still set the scale of a
+picture, and one that does not grow."""
+
+GROWS = 1.3
+"""Ratio of the second half's reach to the first half's from which a run grows."""
+
+FAR = 1e6
+"""How many times the room outside a line is drawn to: far enough to leave the picture in its direction."""
+
+ROUNDINGS = 1e-9
+"""Relative difference of values below which a picture shows them as equal."""
+
+MARKS = 11
+"""Of each run on a picture."""
+
+MOST_LEAVING = 4
+"""Schemes that are named where they leave a picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Runs of one scheme: they lie on one another, so they share a line."""
+
+    scheme: str
+    members: tuple[Trajectory, ...]
+
+    @property
+    def title(self) -> str:
+        """Of its scheme."""
+        return looks.title(self.scheme)
+
+
+def grouped(runs: Mapping[str, Trajectory]) -> list[Group]:
+    """Trajectories by scheme; what has but its start is left out."""
+    found: dict[str, list[Trajectory]] = {}
+    for run in runs.values():
+        if len(run.t) > 1:
+            found.setdefault(run.scheme, []).append(run)
+    return [Group(name, tuple(members)) for name, members in found.items()]
+
+
+def every(groups: Sequence[Group]) -> list[Trajectory]:
+    """All runs."""
+    return [run for group in groups for run in group.members]
+
+
+Pick = Callable[[Trajectory], tuple[Floats, Floats]]
+
+
+def overlay(
+    axes: Axes, groups: Sequence[Group], pick: Pick, *, joined: bool = True, faint: bool = False
+) -> None:
+    """The first run of each scheme as a line (`joined`) or dots, and marks of every engine.
+
+    `faint`: lines between the dots that are seen to be none of the motion.
+    """
+    for group in groups:
+        look = looks.look(group.scheme)
+        for j, run in enumerate(group.members):
+            x, y = pick(run)
+            if j == 0 and joined:
+                axes.plot(x, y, color=look.color, linestyle=look.linestyle, label=group.title, zorder=2)
+            elif j == 0:
+                axes.plot(x, y, ".", color=look.color, markersize=3, label=group.title, zorder=2)
+                if faint:
+                    axes.plot(x, y, color=look.color, linewidth=0.7, alpha=0.4, zorder=1.5)
+            _marks(axes, x, y, look.color, j, run.label)
+
+
+def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> None:
+    apart = max(1, len(x) // MARKS)
+    first = (j * apart * 2) // 5 % max(1, apart)
+    axes.plot(
+        x[first::apart],
+        y[first::apart],
+        linestyle="none",
+        marker=looks.mark(looks.engine(label))[0],
+        markersize=4.2,
+        markerfacecolor="white",
+        markeredgecolor=color,
+        markeredgewidth=0.9,
+        label=label,
+        zorder=3,
+    )
+
+
+def legend(figure: Figure, groups: Sequence[Group], *extra: Line2D) -> None:
+    """One entry for each scheme, with the marks of its engines; `extra` lines first."""
+    handles = list(extra)
+    for group in groups:
+        look = looks.look(group.scheme)
+        label = f"{group.title}\n{looks.members(run.label for run in group.members)}"
+        handles.append(Line2D([], [], color=look.color, linestyle=look.linestyle, label=label))
+    figure.legend(
+        handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
+    )
+
+
+def truth_line() -> Line2D:
+    """The exact solution in a legend."""
+    return Line2D([], [], color=TRUTH["color"], linewidth=TRUTH["linewidth"], label=TRUTH["label"])
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The part of an axis that a picture shows."""
+
+    low: float
+    high: float
+    clipped: bool = False
+    """Whether some run goes far beyond."""
+
+    @property
+    def centre(self) -> float:
+        """Its middle."""
+        return self.low / 2 + self.high / 2
+
+    @property
+    def room(self) -> float:
+        """From its middle to its edge."""
+        return self.high / 2 - self.low / 2
+
+    def leaves(self, values: Floats) -> int | None:
+        """The first of the values outside, None where all are inside or nothing was left out."""
+        if not self.clipped:
+            return None
+        outside = (values < self.low) | (values > self.high)
+        return int(np.argmax(outside)) if outside.any() else None
+
+    def within(self, values: Floats) -> Floats:
+        """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
+        end = self.leaves(values)
+        near = np.clip(values, self.centre - FAR * self.room, self.centre + FAR * self.room)
+        return near if end is None else np.where(np.arange(len(near)) <= end, near, np.nan)
+
+
+def frame(runs: Sequence[Floats], truth: Floats | None, *, far: float | None = None) -> Frame:
+    """What to show: the exact solution and every run that does not go far beyond it.
+
+    Without an exact solution far is measured by the middle one of the runs.  `far`: how far beyond the exact
+    solution any run may go.
+    """
+    spans = [(float(np.min(x)), float(np.max(x))) for x in runs]
+    if truth is not None and np.isfinite(truth).all():
+        low, high = float(np.min(truth)), float(np.max(truth))
+    else:
+        low, high = sorted(spans, key=lambda x: x[1] - x[0])[(len(spans) - 1) // 2]
+    centre, half = low / 2 + high / 2, high / 2 - low / 2
+    if half == 0:
+        half = abs(centre) or 1e-300
+    near = [
+        (a, b)
+        for x, (a, b) in zip(runs, spans, strict=True)
+        if max(b - centre, centre - a) <= half * (far or (EXPLODED if _grows(x - centre) else LARGE))
+    ]
+    low, high = min([low, *(a for a, _ in near)]), max([high, *(b for _, b in near)])
+    clipped = len(near) < len(spans)
+    return widened(low, high, 0.2 if clipped else 0.06, clipped=clipped)
+
+
+def widened(low: float, high: float, margin: float = 0.06, *, clipped: bool = False) -> Frame:
+    """A frame around values, some room about them; what differs by roundings alone is one value."""
+    size = max(abs(low), abs(high))
+    edge = margin * (high - low) if high - low > ROUNDINGS * size else 0.1 * size or 1.0
+    return Frame(low - edge, high + edge, clipped)
+
+
+def _grows(x: Floats) -> bool:
+    """Whether a run reaches further in its second half than in its first one."""
+    with np.errstate(over="ignore"):
+        size = np.abs(x)
+    middle = (len(x) + 1) // 2
+    return bool(np.max(size[middle:], initial=0) > GROWS * np.max(size[:middle]))
+
+
+def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
+    """States up to the first one outside, brought nearer along the ray from the middle if it is far away."""
+    ends = [i for i in (a.leaves(x), b.leaves(y)) if i is not None]
+    if not ends:
+        return x, y
+    x, y = x[: min(ends) + 1], y[: min(ends) + 1]
+    # in extended precision: 1e300 over a room of 1e-200 overflows
+    u, v = (
+        (np.asarray(one, np.longdouble) - its.centre) / its.room for one, its in ((x, a), (y, b))
+    )  # fmt: skip
+    scale = np.maximum(1, np.maximum(np.abs(u), np.abs(v)) / FAR)
+    return tuple(np.asarray(w / scale * its.room + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
+
+
+def note(axes: Axes, leaving: Mapping[str, float], factor: float, unit: str) -> None:
+    """Say above a picture which schemes leave it for good, and when (times [T] by scheme)."""
+    said = [f"{name} at {factor * t:.3g} {unit}".rstrip() for name, t in leaving.items()]
+    if len(said) > MOST_LEAVING:
+        said = [*said[: MOST_LEAVING - 1], f"{len(said) - MOST_LEAVING + 1} more"]
+    if said:
+        text = "outside: " + ", ".join(said)
+        axes.set_title(textwrap.fill(text, 76), loc="right", fontsize=7.5, color="#555555")
+
+
+def time_unit(scene: Scene, groups: Sequence[Group]) -> tuple[float, str]:
+    """Factor and unit of a readable axis of time."""
+    last = max(abs(float(run.t[-1])) for run in every(groups))
+    return looks.prefixed(last, units(scene).t)
+
+
+def leaving(groups: Sequence[Group], when: Callable[[Trajectory], int | None]) -> dict[str, float]:
+    """The time at which each scheme leaves a picture, of those that do."""
+    found = {group.title: (group.members[0], when(group.members[0])) for group in groups}
+    return {name: abs(float(run.t[i])) for name, (run, i) in found.items() if i is not None}
+
+
+def heading(figure: Figure, text: str, width: int = 66) -> None:
+    """A title over all axes of a figure, broken where the legend begins."""
+    figure.suptitle(textwrap.fill(text, width), x=0.02, ha="left", fontsize=10)

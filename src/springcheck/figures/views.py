@@ -1,0 +1,196 @@
+"""What a picture of a scene shows: which coordinate beside which momentum, in which units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from springcheck.arrays import Floats, Reals
+from springcheck.errors import SpringcheckError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine
+
+MOST_PANELS = 4
+"""Particles up to which each has a panel of its own."""
+
+State = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Units:
+    """Units of a scene's numbers, "" for reduced ones."""
+
+    q: str = ""
+    p: str = ""
+    t: str = ""
+    energy: str = ""
+
+
+_UNITS = {
+    "reduced": Units(),
+    "md": Units(q="nm", p="u nm/ps", t="ps", energy="kJ/mol"),
+    "si": Units(q="m", p="kg m/s", t="s", energy="J"),
+    "circuit": Units(q="C", p="Wb", t="s", energy="J"),
+    "rotor": Units(q="rad", p="N m s", t="s", energy="J"),
+}
+
+
+def units(scene: Scene) -> Units:
+    """The units of a scene."""
+    if scene.kind == "rotor" and scene.units != "si":
+        return _UNITS[scene.units]
+    return _UNITS[scene.units if scene.kind == "particles" else scene.kind]
+
+
+def with_unit(name: str, unit: str) -> str:
+    """The label of an axis."""
+    return f"{name} ({unit})" if unit else name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """One coordinate x of a scene and its momentum y."""
+
+    title: str
+    """Of its panel: "particle 1", or "" for a scene of one."""
+    what: str
+    """What x is, in one word."""
+    x_name: str
+    y_name: str
+    x_unit: str
+    y_unit: str
+    pick: Callable[[Reals, Reals], State]
+    """q and p (f, n) -> x and y (f,)."""
+    turn: float = 0.0
+    """The length after which x begins again, 0 where it does not."""
+    potential: Callable[[Floats], Floats] | None = field(default=None)
+    """Of x alone, where the motion of x depends on nothing else."""
+    mass: float = 1.0
+
+    def wrapped(self, x: Floats, y: Floats) -> State:
+        """States on one turn, from -turn/2 to turn/2; NaN between two of which one is on the other side."""
+        if not self.turn:
+            return x, y
+        near = x - self.turn * np.round(x / self.turn)
+        breaks = 1 + np.flatnonzero(np.abs(np.diff(near)) > self.turn / 2)
+        return np.insert(near, breaks, np.nan), np.insert(y, breaks, np.nan)
+
+    def separatrices(self, low: float, high: float) -> list[State]:
+        """The curves of constant energy through the tops of hills near a range of x: motions on their two
+        sides are of different kinds."""
+        if self.potential is None or not (np.isfinite([low, high]).all() and high > low):
+            return []
+        x = (
+            np.linspace(low, high, 2001)
+            if self.turn
+            else np.linspace(low - (high - low), 2 * high - low, 6001)
+        )
+        with np.errstate(all="ignore"):
+            v = self.potential(x)
+        inside = v[1:-1]
+        tops = {int(i) + 1 for i in np.flatnonzero((inside > v[:-2]) & (inside >= v[2:]))}
+        if self.turn:
+            tops.add(int(np.argmax(v)))
+        levels = sorted({float(v[i]) for i in tops if np.isfinite(v[i])})
+        out = []
+        for level in levels:
+            rest = level - v
+            # the top of a hill itself, where a rounding may make it negative
+            rest = np.where(np.abs(rest) <= 1e-12 * np.ptp(v), 0, rest)
+            with np.errstate(invalid="ignore"):
+                out.append((x, np.sqrt(2 * self.mass * rest)))
+        return out
+
+
+_NAMES = {
+    "particles": ("position q", "momentum p"),
+    "circuit": ("charge q", "flux p"),
+    "rotor": ("angle q", "angular momentum p"),
+}
+
+
+def views(scene: Scene, particle: int | None = None) -> list[View]:
+    """What the pictures of a scene show: this particle, a free pair's bond, or the first ones, one by one.
+
+    SpringcheckError where there is no such particle.
+    """
+    if particle is not None:
+        if not 0 <= particle < scene.n:
+            raise SpringcheckError(
+                f"--particle {particle}: scene {scene.name} has particles 0 to {scene.n - 1}"
+            )
+        return [_single(scene, particle)]
+    if _is_pair(scene):
+        return [_bond(scene)]
+    return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
+
+
+def _is_pair(scene: Scene) -> bool:
+    """Whether two particles hold on to each other and to nothing else."""
+    return scene.n == 2 and bool(scene.terms) and all(term.bodies == 2 for term in scene.terms)
+
+
+def _single(scene: Scene, i: int) -> View:
+    unit = units(scene)
+    x_name, y_name = _NAMES[scene.kind]
+    turns = {float(2 * np.pi / w) for t in scene.terms if isinstance(t, Cosine) for w in t.wave[t.i == i]}
+    alone = scene.system.is_separate
+    part = scene.system.part(np.array([i])) if alone else None
+    # an angle in units of pi, where it is one: of a pendulum and of nothing else
+    turn = turns.pop() if len(turns) == 1 and part is not None and _only_cosine(part) else 0.0
+    centre = float(part.terms[0].at[0]) if turn and part is not None else 0.0  # type: ignore[attr-defined]
+    scale = 2.0 / turn if turn else 1.0
+
+    def pick(q: Reals, p: Reals) -> State:
+        return scale * (np.asarray(q[:, i], np.float64) - centre), np.asarray(p[:, i], np.float64)
+
+    def potential(x: Floats) -> Floats:
+        assert part is not None
+        q = (x / scale + centre)[:, None]
+        return np.asarray(part.system.energy(q, np.zeros_like(q)), np.float64)
+
+    return View(
+        title=f"particle {i}" if scene.n > 1 else "",
+        what="angle" if turn else x_name.split()[0],
+        x_name="angle" if turn else x_name,
+        y_name=y_name,
+        x_unit="\u03c0" if turn else unit.q,
+        y_unit=unit.p,
+        pick=pick,
+        turn=2.0 if turn else 0.0,
+        potential=potential if alone else None,
+        mass=float(scene.m[i]),
+    )
+
+
+def _only_cosine(part: Scene) -> bool:
+    held = [term for term in part.terms if term.is_potential]
+    return len(held) == 1 and isinstance(held[0], Cosine) and len(held[0]) == 1
+
+
+def _bond(scene: Scene) -> View:
+    unit = units(scene)
+    m = scene.m
+    mass = float(m[0] * m[1] / (m[0] + m[1]))
+
+    def pick(q: Reals, p: Reals) -> State:
+        x, y = q[:, 1] - q[:, 0], mass * (p[:, 1] / m[1] - p[:, 0] / m[0])
+        return np.asarray(x, np.float64), np.asarray(y, np.float64)
+
+    def potential(x: Floats) -> Floats:
+        q = np.stack([np.zeros_like(x), x], axis=1)
+        return np.asarray(scene.system.energy(q, np.zeros_like(q)), np.float64)
+
+    return View(
+        title="the bond",
+        what="length",
+        x_name="length q1 - q0",
+        y_name="relative momentum",
+        x_unit=unit.q,
+        y_unit=unit.p,
+        pick=pick,
+        potential=potential,
+        mass=mass,
+    )

@@ -1,0 +1,191 @@
+"""What figures show: one look for a scheme, readable units, the separatrix, and no exploding run's scale."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from springcheck import schemes, simulate
+from springcheck.cli import main
+from springcheck.errors import SpringcheckError
+from springcheck.figures import chain, looks, overlay
+from springcheck.figures.motion import Exact, periods
+from springcheck.figures.views import views
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.schemes.attached import ATTACHED
+from springcheck.studies.run import figure as trajectories
+from springcheck.trajectory import Trajectory
+
+mpl.use("agg")
+
+OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
+
+
+def runs(scene: Scene, *methods: str) -> dict[str, Trajectory]:
+    return {method: simulate.run(scene, method) for method in methods}
+
+
+def test_every_scheme_has_a_look_of_its_own() -> None:
+    known = [*schemes.SCHEMES, *ATTACHED]
+    assert set(known) <= set(looks.LOOKS)
+    assert len({looks.LOOKS[name] for name in looks.LOOKS}) == len(looks.LOOKS)
+    assert looks.look("a plug-in's") == looks.look("a plug-in's")
+    assert looks.look("a plug-in's") not in looks.LOOKS.values()
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "factor", "shown"),
+    [
+        (2.35e-7, "C", 1e9, "nC"),
+        (4e-4, "s", 1e6, "\N{MICRO SIGN}s"),
+        (0.2, "ps", 1e3, "fs"),
+        (4e3, "ps", 1e-3, "ns"),
+        (0.117, "nm", 1e3, "pm"),
+        (20.0, "ps", 1.0, "ps"),
+        (999.0, "J", 1.0, "J"),
+        (1000.0, "J", 1e-3, "kJ"),
+        (1e-3, "s", 1e3, "ms"),
+        (0.05, "\N{GREEK SMALL LETTER PI}", 1.0, "\N{GREEK SMALL LETTER PI}"),
+        (0.05, "kg m/s", 1.0, "kg m/s"),
+        (0.05, "", 1.0, ""),
+        (0.0, "s", 1.0, "s"),
+    ],
+)
+def test_axes_are_in_units_in_which_numbers_are_read_easily(
+    largest: float, unit: str, factor: float, shown: str
+) -> None:
+    found, name = looks.prefixed(largest, unit)
+    assert name == shown
+    assert found == pytest.approx(factor, rel=1e-12)
+
+
+def test_a_legend_has_one_entry_for_each_scheme() -> None:
+    scene = scenefile.load_scene("spring")
+    one = simulate.run(scene, "own:euler")
+    import dataclasses
+
+    same = {name: dataclasses.replace(one, label=name) for name in ("own:euler", "x:a", "x:b", "y:c")}
+    (group,) = overlay.grouped(same)
+    assert looks.members(run.label for run in group.members).split() == [
+        looks.mark("own")[1], "own", looks.mark("x")[1], "x", "(2)", looks.mark("y")[1], "y",
+    ]  # fmt: skip
+    figure = trajectories.pictures(scene, same, same)["energy"]
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 2  # the exact solution, and the scheme
+
+
+def test_the_separatrix_of_a_pendulum_is_the_motion_that_stops_at_its_top() -> None:
+    scene = scenefile.load_scene("pendulum")
+    shown = views(scene)
+    assert len(shown) == 4
+    for i, view in enumerate(shown):
+        ((x, y),) = view.separatrices(-1, 1)
+        depth = scene.terms[0].depth[i]  # type: ignore[attr-defined]
+        expected = 2 * np.sqrt(scene.m[i] * depth) * np.cos(np.pi * x / 2)
+        np.testing.assert_allclose(y, expected, atol=1e-6 * np.max(expected))
+
+
+def test_angles_go_round_with_a_gap_where_they_come_in_again() -> None:
+    view = views(scenefile.load_scene("pendulum"))[3]
+    x, y = view.wrapped(np.array([0.5, 0.9, 1.3, 1.7]), np.arange(4.0))
+    np.testing.assert_allclose(x, [0.5, 0.9, np.nan, -0.7, -0.3])
+    np.testing.assert_array_equal(y, [0, 1, np.nan, 2, 3])
+
+
+def test_a_free_pair_is_shown_by_its_bond_and_a_particle_where_it_is_asked_for() -> None:
+    scene = scenefile.load_scene("carbon-monoxide")
+    (bond,) = views(scene)
+    q, p = scene.q[None, :], scene.p[None, :]
+    x, y = bond.pick(q, p)
+    assert x[0] == scene.q[1] - scene.q[0]
+    # of the relative motion, the kinetic energy beside that of the centre
+    kinetic = float(np.sum(scene.p**2 / (2 * scene.m))) - float(np.sum(scene.p)) ** 2 / (2 * np.sum(scene.m))
+    assert y[0] ** 2 / (2 * bond.mass) == pytest.approx(kinetic, rel=1e-13)
+    (one,) = views(scene, 1)
+    assert one.pick(q, p) == (scene.q[1], scene.p[1])
+    with pytest.raises(SpringcheckError, match="--particle 2: scene carbon-monoxide has particles 0 to 1"):
+        views(scene, 2)
+
+
+def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:
+    t = np.linspace(0, 20, 400)
+    truth = np.sin(t)
+    assert overlay.frame([truth, 5 * truth], truth).high == pytest.approx(5, rel=0.2)
+    grown = overlay.frame([truth, truth * np.exp(t)], truth)
+    assert grown.high == pytest.approx(1, rel=0.5)
+    assert grown.clipped
+    left = grown.leaves(truth * np.exp(t))
+    assert left is not None
+    assert t[left] == pytest.approx(1, abs=0.5)
+    # a value that differs by roundings is one value, not a picture of its roundings
+    flat = overlay.frame([np.array([7.0, 7 + 1e-14])], np.array([7.0, 7.0]))
+    assert flat.room > 0.1
+
+
+def test_errors_are_distances_from_the_exact_solution() -> None:
+    scene = scenefile.load_scene("spring")
+    run = simulate.run(scene, "own:euler")
+    exact = Exact(scene)
+    # m = k = 1 from (0, 1): the distance in the plane
+    expected = np.hypot(run.q[:, 0] - np.sin(run.t), run.p[:, 0] - np.cos(run.t))
+    np.testing.assert_allclose(exact.error(run), expected, rtol=1e-9, atol=1e-15)
+    axes = trajectories.pictures(scene, {"own:euler": run}, {"own:euler": run})["error"].axes[0]
+    np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata(), float), expected[1:], rtol=1e-9)
+
+
+def test_the_energies_of_all_modes_of_a_chain_are_its_energy() -> None:
+    scene = scenefile.load_scene("chain")
+    run = simulate.run(scene, "own:semi-implicit-euler")
+    found = chain._energies(scene, run.q, run.p)
+    rest = scene.system.modes.centre()
+    q = np.asarray(scene.system.modes.out_of(rest, np.zeros_like(rest))[0], float)[None, :]
+    least = scene.system.energy(q, np.zeros_like(q))
+    np.testing.assert_allclose(np.sum(found, axis=1), scene.system.energy(run.q, run.p) - least, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "also"),
+    [("free", set()), ("inverted", set()), ("chain", {"modes"}), ("long-chain", {"modes", "wave"})],
+)
+def test_a_scene_has_the_pictures_that_suit_it(name: str, also: set[str]) -> None:
+    scene = scenefile.load_scene(name)
+    if name == "long-chain":
+        from dataclasses import replace
+
+        scene = replace(scene, steps=40)
+    made = runs(scene, "own:semi-implicit-euler", "own:euler")
+    found = trajectories.pictures(scene, made, made)
+    assert set(found) == {"phase-portrait", "position", "energy", "error"} | also
+    for picture in found.values():
+        for axes in picture.axes:
+            assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
+
+
+def test_many_periods_are_shown_by_the_first_and_the_last_ones() -> None:
+    scene = scenefile.load_scene("stiff-spring")
+    made = runs(scene, "own:implicit-euler")
+    figure = trajectories.pictures(scene, made, made)["position"]
+    first, last = (axes.get_xlim() for axes in figure.axes)
+    omega = np.sqrt(14800 / 0.37)
+    assert (last[1] - last[0]) * omega / (2 * np.pi) == pytest.approx(6, rel=0.15)
+    assert first[1] < last[0]
+    t = np.linspace(0, 20 * np.pi, 1501)
+    assert periods(np.sin(t)) == pytest.approx(10, abs=0.6)
+
+
+def test_one_particle_is_drawn_beside_the_others_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "chain", "--method", "own:euler", "--quiet"]) == 0
+    assert main(["plot", "chain.h5", "--particle", "2"]) == 0
+    names = {Path(line).name for line in capsys.readouterr().out.splitlines()}
+    assert names == {
+        f"{one}-particle-2.{end}" for one in ("phase-portrait", "position") for end in ("png", "svg")
+    }
+    assert main(["plot", "chain.h5", "--particle", "3"]) == 2
+    assert "particles 0 to 2" in capsys.readouterr().err
