@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
 import mpmath
 import numpy as np
 import pytest
@@ -10,6 +15,14 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
+
+ROOT = Path(__file__).parent.parent
+_spec = importlib.util.spec_from_file_location("exact_check", ROOT / "validation" / "exact_check.py")
+assert _spec is not None
+assert _spec.loader is not None
+exact_check = importlib.util.module_from_spec(_spec)
+sys.modules["exact_check"] = exact_check
+_spec.loader.exec_module(exact_check)
 
 
 def spring(m: float, k: float, q: float, p: float, h: float) -> Scene:
@@ -224,3 +237,88 @@ def test_a_pendulum_that_begins_near_its_top_keeps_its_digits() -> None:
     with mpmath.workdps(30):
         assert abs(wide(q[0, 0]) / mpmath.mpf("-2.445627449351431161618859") - 1) < 100 * exact.EPS
         assert abs(wide(p[0, 0]) / mpmath.mpf("-1.348575697690617284844982") - 1) < 100 * exact.EPS
+
+
+@pytest.mark.parametrize("kind", ["spring", "chain", "quartic", "pendulum", "bond", "crowd"])
+def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
+    """By Taylor series and exponentials in integers: `validation/exact_check.py` takes 10,000 of them."""
+    known = 0
+    for j in range(5):
+        scene = exact_check.KINDS[kind](np.random.default_rng([3, j]))
+        off = exact_check.ratio(scene)
+        known += off is not None
+        assert off is None or off <= 0.2, j
+    assert known >= 4
+
+
+def test_the_stated_error_is_small_enough_to_see_a_mistake_of_the_exact_solution() -> None:
+    scene = exact_check.pendulum(np.random.default_rng([3, 0]))
+    solution = scene.system.solution
+    assert solution is not None
+    moved = replace(scene, q=scene.q * (1 + 1e-15), step=scene.step * (1 + 1e-15))
+    for one, other, limit in zip(
+        exact.true_motion(scene, np.array([scene.steps]), scene.step),
+        exact.true_motion(moved, np.array([scene.steps]), moved.step),
+        solution.doubt(scene.step * scene.steps),
+        strict=True,
+    ):
+        assert np.all(np.abs(one - other) > limit)
+
+
+def on_the_way_to_the_top(kind: str) -> Scene:
+    """Let go with the energy of the barrier, to a rounding."""
+    m, t = 1.7, 30.0
+    if kind == "pendulum":
+        swing = Cosine(i=np.array([0]), depth=np.array([2.3]), wave=np.array([1.1]), at=np.zeros(1))
+        return made([m], (swing,), [0.4], [2 * np.sqrt(m * 2.3) * np.cos(0.4 * 1.1 / 2)], t)
+    if kind == "bond":
+        ends = np.zeros(1, np.int64), np.ones(1, np.int64)
+        bond = Morse(a=ends[0], b=ends[1], depth=np.array([2.3]), steepness=np.array([1.1]), rest=np.zeros(1))
+        p = np.sqrt(m * 2.3 * (1 - (1 - np.exp(-1.1 * 0.2)) ** 2))
+        return made([m, m], (bond,), [0.0, 0.2], [-p, p], t)
+    b, k = (0.9, -2.3) if kind == "double well" else (-0.9, 2.3)
+    quartic, u = Quartic(i=np.array([0]), b=np.array([b]), at=np.zeros(1)), 0.7
+    room = -k * u * u - b * u**4 / 2 + (k * k / (-2 * b) if b < 0 else 0)
+    return made([m], (held([k], [0.0]), quartic), [u], [-np.sqrt(m * room)], t)
+
+
+@pytest.mark.parametrize("kind", ["pendulum", "double well", "softening spring", "bond"])
+def test_on_a_separatrix_the_exact_solution_keeps_its_digits_and_says_so(kind: str) -> None:
+    scene = on_the_way_to_the_top(kind)
+    assert exact_check.ratio(scene) < 0.2
+    assert exact.uncertainty(scene, 30.0) < 1e-14
+
+
+def test_a_chain_over_thirteen_decades_keeps_the_digits_of_every_particle() -> None:
+    rng = np.random.default_rng(11)
+    n = 6
+    spring = Spring(
+        a=np.arange(n - 1),
+        b=np.arange(1, n),
+        k=10.0 ** np.linspace(-3, 3.5, n - 1),
+        rest=rng.normal(size=n - 1),
+    )
+    m = 10.0 ** np.linspace(3, -3.5, n)
+    q, p = rng.normal(size=n), m * rng.normal(size=n)
+    scene = made(m.tolist(), (spring, held([1e-3], [0.3])), q.tolist(), p.tolist(), 1.0)
+    w2 = np.sort(exact.modes(scene).w2)
+    assert w2[-1] / w2[0] > 1e13
+    assert exact_check.ratio(scene) < 0.2
+    assert exact.uncertainty(scene, 1.0) < 1e-13
+    solution = scene.system.solution
+    assert solution is not None
+    # each particle by itself: the fast ones do not spoil what is known of the slow ones
+    assert np.all(solution.doubt(1.0)[0][:3] < 1e-16)
+
+
+def test_no_error_below_that_of_the_exact_solution_is_reported() -> None:
+    import springcheck
+    from springcheck.studies.run.measure import _Tally
+
+    rng = np.random.default_rng(2)
+    scene = exact_check.large(rng)
+    known = exact.uncertainty(scene, scene.step * scene.steps)
+    run = springcheck.exact(replace(scene, every=scene.steps))
+    tally = _Tally(scene)
+    tally.add(run)
+    assert tally.error >= known > 1e-15

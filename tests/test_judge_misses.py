@@ -142,7 +142,6 @@ def test_a_body_that_freezes_far_below_its_start_is_seen_at_every_10() -> None:
     assert "step-defect" in failed(scene, frozen)
 
 
-@pytest.mark.xfail(strict=True, reason="a recorded position counts as rounded once more")
 def test_a_pendulum_far_out_is_judged_by_the_positions_that_it_records() -> None:
     def scene(depth: float) -> Scene:
         swing = Cosine(i=np.array([0]), depth=np.array([depth]), wave=np.ones(1), at=np.zeros(1))

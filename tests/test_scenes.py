@@ -23,7 +23,7 @@ from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.exact import linear
+from springcheck.physics.exact import normal
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring
 from springcheck.studies.run import measure as session
@@ -260,10 +260,10 @@ def test_the_modes_of_a_uniform_chain_are_sines() -> None:
     scene = shortened("long-chain")
     waves = exact.modes(scene)
     assert waves.waves
-    w2, vectors = linear._eigen(np.asarray(scene.system.hessian(scene.q) / scene.m[0], np.longdouble))
+    w2, vectors = normal._eigen(np.asarray(scene.system.hessian(scene.q) / scene.m[0], np.longdouble))
     assert np.max(np.abs(w2 - waves.w2)) < 16 * scene.n * exact.EPS * np.max(w2)
     r = np.arange(1, scene.n + 1)
-    shapes = linear._one_turn(scene.n)[np.outer(r, r) % (2 * (scene.n + 1))]
+    shapes = normal._one_turn(scene.n)[np.outer(r, r) % (2 * (scene.n + 1))]
     turned = np.abs(vectors.T @ shapes)
     # the slow modes lie close together, and what rounding mixes of them grows with the inverse distance
     assert np.max(np.abs(turned - np.eye(scene.n))) < 1e-14

@@ -81,7 +81,12 @@ def _telling(scene: Scene, trajectory: Trajectory) -> float:
 
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:
     """Groups of trajectories whose differences rounding and tolerances explain, largest group first."""
-    limits = {EXACT: 0.0} | {label: _telling(scene, run) for label, run in trajectories.items()}
+    known = 0.0
+    if exact.has_true_motion(scene):
+        known = max(
+            (exact.uncertainty(scene, float(run.t[-1])) for run in trajectories.values()), default=0.0
+        )
+    limits = {EXACT: known} | {label: _telling(scene, run) for label, run in trajectories.items()}
     labels = comparison.labels
     limit = np.array([limits[label] for label in labels])
     bounds = limit[:, None] + limit[None, :]

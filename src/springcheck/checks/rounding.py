@@ -12,6 +12,7 @@ from springcheck import schemes
 from springcheck.arrays import ROUNDOFF, Extended, Force, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
+from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.rounding import Met
 
 if TYPE_CHECKING:
@@ -22,13 +23,20 @@ SMALLEST = np.longdouble(5e-324)
 
 
 def of_step(
-    case: Case, q: Reals, p: Reals, places: list[Reals] | None, *, smallest: np.longdouble = SMALLEST
+    case: Case,
+    q: Reals,
+    p: Reals,
+    places: list[Reals] | None,
+    *,
+    smallest: np.longdouble = SMALLEST,
+    recorded: bool = False,
 ) -> tuple[Extended, Extended]:
     """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
     `places` are the positions at which the scheme evaluates the force on its way: a law that bends is
     weighed there, and so is the solution of an implicit stage.  `smallest` is what an operation may lose to
-    underflow.
+    underflow.  `recorded` says that the step starts and ends at recorded positions, which are not rounded
+    once more.
     """
     run, scene = case.trajectory, case.judged
     how = run.arithmetic
@@ -42,7 +50,7 @@ def of_step(
         m=m,
         magnitude=_none,
         rate=scene.system.friction_rates if scene.system.is_damped else None,
-        met=_evaluations(case, places),
+        met=_evaluations(case, places, recorded),
     )
     # the scheme's own step, which it is compared with, rounds as well
     state = how.state + ROUNDOFF
@@ -61,7 +69,20 @@ def _none(q: Reals, p: Reals) -> Reals:
     raise ValueError("every evaluation of the force is given by itself")
 
 
-def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
+def _recorded(scheme: Scheme) -> list[bool]:
+    """Of each evaluation of the force within a step, whether it is at the position where the step starts or
+    ends."""
+    if not scheme.stages:
+        return [not any(row) for row in scheme.a]
+    drifts = [kind == "drift" for kind, _ in scheme.stages]
+    return [
+        not any(drifts[:i]) or not any(drifts[i:])
+        for i, (kind, _) in enumerate(scheme.stages)
+        if kind not in ("drift", "held", *schemes.FRICTION)
+    ]
+
+
+def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     slow, fast = scene.system.slow, scene.system.fast
@@ -71,6 +92,7 @@ def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
     joined = not scene.system.is_separate
     made: dict[tuple[str, float], Met] = {}
     found = []
+    exact = _recorded(scheme) if recorded else [False] * len(kicks)
     for number, (kind, part) in enumerate(kicks):
         # an engine may take a step's kick at once, and what its force lacks with it
         whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
@@ -84,7 +106,9 @@ def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
             given = case.law["stiffness"]
             stiffness = given if near is None or case.straight else stiffness_at(scene, near, joined=joined)
         made[known] = Met(
-            magnitude=_force(case, acting.get(kind, scene.terms), None if case.straight else near, whole),
+            magnitude=_force(
+                case, acting.get(kind, scene.terms), None if case.straight else near, whole, exact[number]
+            ),
             stiffness=stiffness,
             joined=joined,
             q=near,
@@ -93,11 +117,11 @@ def _evaluations(case: Case, places: list[Reals] | None) -> list[Met]:
     return found
 
 
-def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float) -> Force:
+def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
     """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
     quantum."""
     how = case.trajectory.arithmetic
-    plain = case.judged.system.magnitude_of(terms, near)
+    plain = case.judged.system.magnitude_of(terms, near, exact=exact)
     count = pulls(case.scene, terms)
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)

@@ -26,7 +26,8 @@ def tolerance(case: Case) -> Verdict:
     value = float(np.max(case.norm(run.q - q, run.p - p)))
     # sizes of the true motion: those of one that explodes would excuse it
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
-    bound = tolerance_bound(Case(trajectory=true, scene=case.scene))
+    known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
+    bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
     moved = np.max(case.norm(q - case.scene.q, p - case.scene.p))
     if value <= bound and 0 < moved <= bound:
         return case.not_applicable("tolerance", "standing still would pass: it allows all of the motion")

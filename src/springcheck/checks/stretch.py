@@ -54,7 +54,8 @@ class Stretch:
 def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     """So many steps from states (f, n), with what their roundings may become."""
     if steps == 1:
-        end, bound = _one(case, q, p, near=case.trajectory.q[1:].astype(np.longdouble))
+        near = None if case.straight else case.trajectory.q[1:].astype(np.longdouble)
+        end, bound = _one(case, q, p, near=near)
         reach = np.maximum(np.abs(q), np.abs(end[0])), np.maximum(np.abs(p), np.abs(end[1]))
         q, p, of_q, of_p = *end, *bound
         return Stretch(
@@ -76,7 +77,7 @@ def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> 
     places: list[Reals] | None = [] if case.placed else None
     end = case.step(q, p, met=places, near=near)
     with np.errstate(all="ignore"):
-        return end, rounding.of_step(case, q, p, places)
+        return end, rounding.of_step(case, q, p, places, recorded=near is not None)
 
 
 def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:

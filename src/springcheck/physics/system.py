@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from springcheck.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.errors import SceneError
 from springcheck.physics import graph
-from springcheck.physics.exact.linear import Modes, normal_modes
+from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.term import Term
@@ -171,8 +171,8 @@ class System:
         """
         return self.magnitude_of(self.terms, near)
 
-    def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None) -> Force:
-        """The magnitude of some terms' force."""
+    def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None, *, exact: bool = False) -> Force:
+        """The magnitude of some terms' force; `exact` says that `near` are the positions to the last bit."""
         parts = tuple(terms)
         needs_velocity = not all(term.is_potential for term in parts)
 
@@ -180,7 +180,7 @@ class System:
             out = np.zeros_like(q)
             v = p / self.m if needs_velocity else p
             for term in parts:
-                term.add_rounding(q, v, out, near)
+                term.add_rounding(q, v, out, near, exact=exact)
             return out
 
         return total

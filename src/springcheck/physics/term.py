@@ -155,8 +155,14 @@ class Term:
             _scatter(np.add, out, self._places[0], pull)
         _scatter(np.subtract, out, self._places[-1], pull)
 
-    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None) -> None:
-        """Add what bounds the rounding of add_force at states of sizes q, v (see `System.magnitude`)."""
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        """Add what bounds the rounding of add_force at states of sizes q, v (see `System.magnitude`).
+
+        `exact` says that the force is taken at `near` itself: a law that feels a rounding of its position
+        more than that of its elongation may say less then.
+        """
         size = np.abs(_taken(q, self._places[-1][0]))
         if self.bodies == 2:
             size = size + np.abs(_taken(q, self._places[0][0]))

@@ -133,6 +133,18 @@ class Cosine(OnParticles):
         # the sine's own rounding, and that of its argument, which turns round and round
         return np.abs(depth * wave) * (1 + np.abs(wave) * size)
 
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        """Many turns away the argument's rounding is all there is, unless nothing is subtracted and the
+        product with `wave` is exact."""
+        whole = (self.at == 0) & (np.frexp(self.wave)[0] == 0.5)
+        if near is None or not exact or not np.any(whole):
+            return Term.add_rounding(self, q, v, out, near)
+        size = np.where(whole, 0, np.abs(np.take(q, self.i, axis=-1)) + np.abs(self.at))
+        self.scatter(np.abs(self.rounding(size, self.elongation(near), self.depth, self.wave)), out)
+        return None
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Morse(OnPairs):
@@ -208,7 +220,9 @@ class Damping(Term):
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         Term.add_force(self, v, q, out)
 
-    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None) -> None:
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
         Term.add_rounding(self, v, q, out, v)
 
     def scaled(self, factor: float | Floats) -> Any:

@@ -45,13 +45,15 @@ def step(
     `System.friction_rates`, left out where nothing is damped; `parts` are the forces of the slow and the fast
     springs, for the schemes that part them.  `met` takes the position (..., n) of each evaluation of the
     force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
-    solutions of an implicit stage the one there is found.
+    solutions of an implicit stage the one there is found; a force after the last drift is taken there, at the
+    position that an engine has rounded.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
         last = np.zeros_like(p)
-        for kind, c in scheme.stages:
+        drifts = [kind == "drift" for kind, _ in scheme.stages]
+        for number_, (kind, c) in enumerate(scheme.stages):
             ch = number(c, width) * h
             if kind == "drift":
                 q = q + ch * (p / m)
@@ -61,9 +63,11 @@ def step(
                 p = p if rate is None else p / (1 + ch * rate.astype(width))
             else:
                 if kind != "held":
+                    there = near is not None and not any(drifts[number_:])
+                    at = np.where(np.isfinite(near), near, q) if near is not None and there else q
                     if met is not None:
-                        met.append(q)
-                    last = acting(kind, force, parts)(q, p)
+                        met.append(at)
+                    last = acting(kind, force, parts)(at, p)
                 p = p + ch * last
         return q, p
     if not scheme.b:

@@ -6,6 +6,9 @@ and pairs on a Morse bond, have closed forms of their own (`wells`), by Jacobi's
 that of every group is.  Its error is some roundings of that width times the angle turned through: a phase
 of 1e6 is known to 1e-13, and to 1e-9 where `long double` is no wider than double (`arrays.ROUNDOFF`).
 
+Each comes with bounds of its own errors, which `validation/exact_check.py` holds against another route;
+`uncertainty` is what they come to.
+
 Times are taken as (number of steps) * h with the very double h that the engines were given: after 1e7
 steps a phase in double precision would be wrong by 1e-10.
 """
@@ -14,14 +17,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from springcheck.arrays import Extended, Integers
 from springcheck.physics.exact.elliptic import EPS
-from springcheck.physics.exact.linear import Modes
+from springcheck.physics.exact.normal import Modes
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
-__all__ = ["EPS", "Modes", "has_true_motion", "modes", "true_motion"]
+__all__ = ["EPS", "Modes", "has_true_motion", "modes", "true_motion", "uncertainty"]
 
 
 def modes(scene: Scene) -> Modes:
@@ -44,3 +49,24 @@ def true_motion(scene: Scene, steps: Integers, h: float) -> tuple[Extended, Exte
     if known is None:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
     return known(steps, h)
+
+
+def uncertainty(scene: Scene, duration: float) -> float:
+    """Bound of the error of `true_motion` from the start to a time [T], relative to the initial energy norm.
+
+    No error of an engine is known better than to this, and smaller ones are not reported.  It is inf where
+    the motion leaves the extended range, 0 where the scene rests.  ValueError as for `true_motion`.
+    """
+    system = scene.system
+    if system.solution is None:
+        raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
+    dq, dp = system.solution.doubt(duration)
+    with np.errstate(all="ignore"):
+        # the elongation of a spring is off by what both of its ends are
+        square = np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2
+        for group in system.free_groups:
+            square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration) if duration else 0
+        if square == 0 or system.norm.unit == 0:
+            return 0.0
+        found = float(np.sqrt(square) / system.norm.unit)
+    return found if found >= 0 else np.inf

@@ -24,6 +24,8 @@ class _Group:
     scene: Scene
     motion: Callable[[Scene, Extended], tuple[Extended, Extended]]
     """A scene and times t (f, 1) [T] -> q and p (f, s)."""
+    doubt: Callable[[Scene, np.longdouble], tuple[Extended, Extended]]
+    """A scene and a time [T] -> bounds of the errors of q and p up to then (s,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,12 +50,21 @@ class Solution:
                 q[:, group.particles], p[:, group.particles] = group.motion(group.scene, t)
         return q, p
 
+    def doubt(self, duration: float) -> tuple[Extended, Extended]:
+        """Bounds (n,) of the errors of q and p from the start to a time [T], which may lie before it."""
+        q, p = np.empty((2, self.n), dtype=np.longdouble)
+        with np.errstate(all="ignore"):
+            for group in self.groups:
+                q[group.particles], p[group.particles] = group.doubt(group.scene, np.longdouble(duration))
+        # infinite where the motion itself is; never no number
+        return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
+
 
 def solution(system: System) -> Solution | None:
     """The exact motion of a system, None where some particles have no closed form here."""
     everything = np.arange(system.n)
     if system.has_modes:
-        whole = _Group(particles=everything, scene=system.scene, motion=linear.motion)
+        whole = _Group(particles=everything, scene=system.scene, motion=linear.motion, doubt=linear.doubt)
         return Solution(n=system.n, groups=(whole,))
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
@@ -67,12 +78,12 @@ def solution(system: System) -> Solution | None:
                 part = system.part(chosen)
                 if not well.is_known(part):
                     return None
-                found.append(_Group(particles=chosen, scene=part, motion=well.motion))
+                found.append(_Group(particles=chosen, scene=part, motion=well.motion, doubt=well.doubt))
                 left[chosen] = False
         chosen = np.flatnonzero(left)
         if len(chosen):
             part = system.part(chosen)
             if not part.system.has_modes:
                 return None
-            found.append(_Group(particles=chosen, scene=part, motion=linear.motion))
+            found.append(_Group(particles=chosen, scene=part, motion=linear.motion, doubt=linear.doubt))
     return Solution(n=system.n, groups=tuple(found))

@@ -1,0 +1,161 @@
+"""Pairs on a Morse bond, by circular and hyperbolic functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from springcheck.arrays import Extended
+from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
+from springcheck.physics.exact.well import CANCELS, LAST, States, Well, one_each, wide
+from springcheck.physics.terms import Morse
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+
+def _is_bond(scene: Scene) -> bool:
+    """One bond each that pulls together."""
+    return one_each(scene) and all(
+        np.all((t.depth > 0) & (t.steepness != 0)) for t in scene.terms if isinstance(t, Morse)
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Bond:
+    """Relative motion of each bond: reduced mass, elongation, relative momentum, E / depth, and that less 1.
+
+    Near the bottom of the well the one is small, near dissociation the other: neither follows from the other.
+    """
+
+    mass: Extended
+    u: Extended
+    p: Extended
+    share: Extended
+    """m_a / (m_a + m_b)."""
+    energy: Extended
+    excess: Extended
+    w: Extended
+    """w**2 = 2 depth steepness**2 / mass."""
+    start: Extended
+    """Phase of the start from the inner turning point, an angle or beyond dissociation its hyperbolic kin."""
+    rate: Extended
+    """Of the phase."""
+
+
+def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
+    """Elongation, and momentum times the sum of both masses."""
+    return q[1] - q[0] - rest, m[0] * p[1] - m[1] * p[0]
+
+
+def _bond(scene: Scene, term: Morse) -> _Bond:
+    ends = term.a, term.b
+    m, q, p = ([wide(x[end]) for end in ends] for x in (scene.m, scene.q, scene.p))
+    total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
+    mass = m[0] * m[1] / total
+    u, pull = _relative(m, q, p, term.rest)
+    x, kinetic = np.exp(-a * u), (pull / total) ** 2 / (2 * mass * depth)
+    excess = kinetic + x * (x - 2)
+    near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
+    near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
+    near |= m[0] * np.abs(p[1]) + m[1] * np.abs(p[0]) > CANCELS * np.abs(pull)
+    if np.any(near):
+        j = np.flatnonzero(near)
+        u[j], pull[j], excess[j] = _of_bonds(
+            *([exactly(x[end[j]]) for end in ends] for x in (scene.m, scene.q, scene.p)),
+            *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
+        )
+    gap, p_ = np.expm1(-a * u), pull / total
+    energy = p_ * p_ / (2 * mass * depth) + gap * gap
+    w = np.abs(a) * np.sqrt(2 * depth / mass)
+    rate, z, dz = w * np.sqrt(np.abs(excess)), np.expm1(a * u), a * p_ / mass * np.exp(a * u)
+    safe = np.where(rate > 0, rate, 1)
+    root = np.sqrt(energy)
+    start = np.where(
+        excess < 0,
+        np.arctan2(-dz * excess / safe, energy + excess * z),
+        np.arcsinh(dz * excess / (safe * np.where(root > 0, root, 1))),
+    )
+    return _Bond(
+        mass=mass, u=u, p=p_, share=m[0] / total, energy=energy, excess=excess, w=w, start=start, rate=rate
+    )
+
+
+def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Extended, Extended, Extended]:
+    """Elongation, relative momentum times both masses, and E / depth - 1."""
+    with digits():
+        u, pull = _relative(m, q, p, rest)
+    with digits(ENOUGH):
+        x = np.exp(-a * u)
+        excess = pull * pull / (2 * m[0] * m[1] * (m[0] + m[1]) * depth) + x * (x - 2)
+        return extended(u), extended(pull), extended(excess)
+
+
+def _morse(scene: Scene, t: Extended) -> States:
+    """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
+
+    w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass goes straight on.
+    """
+    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    for term in scene.terms:
+        assert isinstance(term, Morse)
+        bond = _bond(scene, term)
+        z, dz = _stretched(bond, wide(term.steepness), t)
+        u, pull = np.log1p(z) / term.steepness, bond.mass * dz / (term.steepness * (1 + z))
+        ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
+        total = wide(scene.p[term.a]) + scene.p[term.b]
+        share = bond.share
+        qa, qb = wide(scene.q[term.a]), wide(scene.q[term.b])
+        centre = share * qa + (1 - share) * qb + total / (ma + mb) * t
+        length = term.rest + u
+        q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
+        p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
+    return q, p
+
+
+def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
+    """z = s - 1 and z' at times t.
+
+    At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
+    root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.
+    """
+    root, bound, edge = np.sqrt(bond.energy), bond.excess < 0, bond.excess == 0
+    phase = bond.rate * t + bond.start
+    turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
+    half, whole = (
+        np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
+        np.where(bound, np.sin(turn), np.sinh(run)),
+    )
+    size = np.where(edge, 1, np.abs(bond.excess))
+    z, dz = 2 * root * half * half / size - root / (root + 1), root * bond.rate * whole / size
+    # at the edge of dissociation a parabola
+    z0, dz0 = np.expm1(a * bond.u), a * bond.p / bond.mass * np.exp(a * bond.u)
+    z = np.where(edge, z0 + dz0 * t + bond.w**2 * t * t / 2, z)
+    return np.asarray(z), np.asarray(np.where(edge, dz0 + bond.w**2 * t, dz))
+
+
+def _morse_doubt(scene: Scene, t: np.longdouble) -> States:
+    q, p = np.empty((2, scene.n), dtype=np.longdouble)
+    for term in scene.terms:
+        assert isinstance(term, Morse)
+        bond, a = _bond(scene, term), np.abs(wide(term.steepness))
+        root = np.sqrt(bond.energy)
+        speed = np.sqrt(2 * term.depth * bond.energy / bond.mass)
+        time = np.abs(t) + np.abs(bond.start) / np.where(bond.rate > 0, bond.rate, 1) + 2 / bond.w
+        bound = bond.excess < 0
+        reach = np.where(
+            bound, -np.log(np.where(bound, -bond.excess, 1) / (1 + root)) / a, np.abs(bond.u) + speed * time
+        )
+        force = 2 * term.depth * a * (1 + root) * root
+        ends = term.a, term.b
+        drift = sum(np.abs(wide(scene.p[end])) for end in ends) / (scene.m[term.a] + scene.m[term.b])
+        far = sum(np.abs(wide(scene.q[end])) for end in ends) + np.abs(term.rest) + drift * np.abs(t)
+        for end in ends:
+            q[end] = LAST * (far + np.abs(bond.u) + reach + speed * time)
+            p[end] = LAST * (sum(np.abs(wide(scene.p[e])) for e in ends) + bond.mass * speed + force * time)
+    return q, p
+
+
+MORSE = Well(key="morse", terms=frozenset({"morse"}), is_known=_is_bond, motion=_morse, doubt=_morse_doubt)

@@ -1,0 +1,132 @@
+"""More digits for the few numbers that decide a motion and cancel: energies near a barrier, modes of very
+unlike size.
+
+They are `decimal` numbers of the standard library in arrays of objects: doubles are exact in them, and +,
+-, *, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and for
+extended precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from decimal import Context, Decimal, localcontext
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Extended
+
+Wide: TypeAlias = NDArray[np.object_]
+"""An array of Decimal numbers."""
+
+DIGITS = 420
+"""Of sums of products of doubles, which may differ by 300 decades, and of pi beside the largest angle."""
+
+ENOUGH = 57
+"""Of everything that stays within 30 decades of the largest number: three words of libmpdec."""
+
+
+@contextmanager
+def digits(count: int = DIGITS) -> Iterator[None]:
+    """Compute with so many digits."""
+    with localcontext(Context(prec=count, Emax=999_999, Emin=-999_999, traps=[])):
+        yield
+
+
+def exactly(x: Any) -> Wide:
+    """Doubles or extended numbers as they are."""
+    given = np.asarray(x)
+    out = np.empty(given.shape, dtype=object)
+    for i, value in np.ndenumerate(given):
+        high = float(value)
+        # what an extended number has beyond a double is a double, or 0
+        out[i] = (
+            Decimal(high) + Decimal(float(value - high)) if given.dtype == np.longdouble else Decimal(high)
+        )
+    return out
+
+
+def extended(x: Wide) -> Extended:
+    """Rounded to extended precision."""
+    return np.array([np.longdouble(f"{value:.30e}") for value in x.flat], np.longdouble).reshape(x.shape)
+
+
+@cache
+def pi(count: int = DIGITS) -> Decimal:
+    """Machin (1706): pi = 16 atan(1/5) - 4 atan(1/239)."""
+    with digits(count + 10):
+        return 16 * _arctangent(5) - 4 * _arctangent(239)
+
+
+def _arctangent(inverse: int) -> Decimal:
+    """atan(1/inverse) by its series."""
+    power = total = Decimal(1) / inverse
+    k = 1
+    while True:
+        power /= -inverse * inverse
+        k += 2
+        if total + power / k == total:
+            return total
+        total += power / k
+
+
+def sine_cosine(x: Decimal) -> tuple[Decimal, Decimal]:
+    """Sine and cosine of an angle of size 2 or less, to `ENOUGH` digits of their own size."""
+    with digits(ENOUGH):
+        away = pi() / 2 - abs(x)
+        if abs(away) < abs(x):
+            # near a quarter turn the cosine is as small as what is left of it
+            return _series(away, even=True).copy_sign(x), _series(away, even=False)
+        return _series(x, even=False), _series(x, even=True)
+
+
+def _series(x: Decimal, *, even: bool) -> Decimal:
+    """Cosine (even) or sine of a small angle."""
+    term = total = Decimal(1) if even else x
+    k = 0 if even else 1
+    while True:
+        term *= -x * x / ((k + 1) * (k + 2))
+        k += 2
+        if total + term == total:
+            return total
+        total += term
+
+
+def eigen(symmetric: Wide) -> tuple[Wide, Wide]:
+    """Eigenvalues (n,) and eigenvectors (n, n), columns, of a symmetric matrix, by Jacobi's rotations (1846).
+
+    Their errors are 10**-ENOUGH of the largest eigenvalue.  They start from vectors in double precision, and
+    take 1e-5 n**3 seconds.
+    """
+    n = len(symmetric)
+    size = np.max(np.abs(symmetric)) or Decimal(1)
+    limit = size * Decimal(10) ** (5 - ENOUGH)
+    with digits(ENOUGH):
+        _, start = np.linalg.eigh((symmetric / size).astype(np.float64))
+        turn = exactly(start)
+        for _ in range(3):
+            # Newton's iteration for the nearest orthogonal matrix: 1e-16, 1e-32, 1e-64, and beyond
+            turn = turn @ (3 * exactly(np.eye(n)) - turn.T @ turn) / 2
+        a = turn.T @ symmetric @ turn
+        rotated = True
+        while rotated:
+            rotated = False
+            for i in range(n - 1):
+                for j in np.flatnonzero(np.abs(a[i, i + 1 :]) > limit) + i + 1:
+                    rotated = True
+                    zeta = (a[j, j] - a[i, i]) / (2 * a[i, j])
+                    t = 1 / (abs(zeta) + (1 + zeta * zeta).sqrt()).copy_sign(zeta)
+                    cosine = 1 / (1 + t * t).sqrt()
+                    sine = cosine * t
+                    change = t * a[i, j]
+                    low, high = a[i, i] - change, a[j, j] + change
+                    for of in (a, turn):
+                        x, y = of[:, i].copy(), of[:, j].copy()
+                        of[:, i], of[:, j] = cosine * x - sine * y, sine * x + cosine * y
+                    a[i, j] = a[j, i] = Decimal(0)
+                    a[i, i], a[j, j] = low, high
+                    a[i], a[j] = a[:, i], a[:, j]
+    return np.diag(a).copy(), turn

@@ -1,0 +1,331 @@
+"""Normal modes of linear scenes.
+
+A linear scene falls apart into modes y'' = -w2 y - r y' + g, one for each eigenvector of
+M^-1/2 K M^-1/2.  Every scheme acts on each mode by itself too, which is why limits and shadow energies are
+read off here as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from springcheck.arrays import Extended, Integers, Reals
+from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
+from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.terms import Damping, Spring
+
+if TYPE_CHECKING:
+    from springcheck.physics.system import System
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
+    turn, the shares of exp(slow t) and exp(fast t) in its motion (see `_split`).
+
+    `sizes` are those whose last digits these four are known to.
+    """
+
+    u: Extended
+    v: Extended
+    slow: Extended
+    fast: Extended
+    sizes: tuple[Extended, Extended, Extended, Extended]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modes:
+    """Normal modes: q = M**-1/2 V y.  `vectors` is None where V is not kept: 1, or sines (`waves`).
+
+    w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2];
+    rate (n,): that of its friction, c/m [1/T].
+    """
+
+    w2: Extended
+    pull: Extended
+    rate: Extended
+    root_m: Extended
+    vectors: Extended | None
+    waves: bool = False
+    """Whether V is of sines, sqrt(2/(n+1)) sin(pi r j/(n+1)): a fast Fourier transform takes its place."""
+    start: Start
+    doubt: Extended
+    """Error of w2 (n,) [1/T2] beside its last digits, 0 where the sums that it comes from are exact."""
+
+    def into(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
+        """Mode coordinates y [M1/2 L] and velocities [M1/2 L/T] of states (..., n)."""
+        y, v = np.asarray(q, np.longdouble) * self.root_m, np.asarray(p, np.longdouble) / self.root_m
+        return self._turned(y, False), self._turned(v, False)
+
+    def out_of(self, y: Extended, v: Extended) -> tuple[Extended, Extended]:
+        """Positions and momenta of states in mode coordinates (..., n)."""
+        return self._turned(y, True) / self.root_m, self._turned(v, True) * self.root_m
+
+    def _turned(self, y: Extended, back: bool) -> Extended:
+        if self.waves:
+            return _sines(y)
+        if self.vectors is None:
+            return y
+        return y @ (self.vectors.T if back else self.vectors)
+
+    def spread(self, reach: Extended) -> Extended:
+        """|V| reach (n,): bound of what modes of these amplitudes add up to on each particle."""
+        if self.waves:
+            return _absolute_sines(reach)
+        return reach if self.vectors is None else np.abs(self.vectors) @ reach
+
+    def centre(self) -> Extended:
+        """Rest position of each mode, 0 for a mode that nothing holds (w2 = 0)."""
+        held = self.w2 != 0
+        return np.asarray(np.where(held, self.pull / np.where(held, self.w2, 1), 0))
+
+
+def _split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
+    """u'' = -w2 u - rate u' beyond critical damping, of any width: shares of exp(slow t) and exp(fast t) in
+    u, and a bound of their summands.  slow = -w2/(b + s), fast = -(b + s), s**2 = b**2 - w2, b = rate/2.
+    """
+    b = rate / 2
+    square = b * b - w2
+    s = np.sqrt(np.where(square > 0, square, 0 * b + 1))
+    fast, slow = -(b + s), -w2 / np.where(b + s == 0, 0 * b + 1, b + s)
+    size = (np.abs(v) + np.abs(fast) * np.abs(u)) / (2 * s)
+    return (v - fast * u) / (2 * s), (slow * u - v) / (2 * s), size
+
+
+SMALL = 32
+"""Particles up to which modes are found to high relative accuracy, 0.7 s at most."""
+
+FEW = 8
+"""Particles up to which that takes 15 ms, so that nobody asks whether it is needed."""
+
+GRADED = 2.0**10
+"""Ratio of squared frequencies from which it is needed."""
+
+
+def normal_modes(system: System) -> Modes:
+    """Normal modes of a linear system.
+
+    w2 and vectors are right to their last digits where no particle is joined to another, for a uniform
+    chain, and up to `SMALL` particles; elsewhere to n EPS max(w2), which `Modes.doubt` says.
+    ValueError: it has none, or they cannot be had (see `System.has_modes`).
+    """
+    if not system.has_modes:
+        raise ValueError(
+            f"scene {system.scene.name!r} has no normal modes here: it is not linear, friction couples them, "
+            "or more particles are joined than modes are computed for"
+        )
+    root_m = np.sqrt(system.m.astype(np.longdouble))
+    zero = np.zeros(system.n, dtype=np.longdouble)
+    pull: Extended = np.asarray(system.force(zero, zero) / root_m, np.longdouble)
+    rate, none = system.friction_rates, np.zeros_like(zero)
+    if system.is_separate:
+        found = _Basis(w2=system.hessian_diagonal(zero) / system.m, pull=pull, root_m=root_m, rate=rate)
+        return found.modes(system, doubt=np.asarray(system.rigidity * np.longdouble(EPS) / system.m))
+    if system.n > SMALL and system.is_uniform_chain:
+        w2 = _wave_frequencies(system)
+        found = _Basis(w2=w2, pull=_sines(pull), root_m=root_m, rate=rate, waves=True)
+        return found.modes(system, doubt=none)
+    scaled = np.asarray(system.hessian(zero) / root_m[:, None] / root_m, np.longdouble)
+    w2, vectors = _eigen(scaled)
+    largest = np.max(np.abs(w2))
+    # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
+    is_zero = np.abs(w2) <= 8 * system.n * EPS * largest
+    graded = np.count_nonzero(is_zero) > len(system.free_groups)
+    graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED < largest))
+    if system.n <= FEW or (system.n <= SMALL and graded):
+        return _precise(system)
+    w2 = np.where(is_zero, 0, w2)
+    pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
+    found = _Basis(w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors)
+    return found.modes(system, doubt=none + 4 * system.n * EPS * largest)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Basis:
+    """Modes as they are found, before the start is taken apart into them."""
+
+    w2: Extended
+    pull: Extended
+    rate: Extended
+    root_m: Extended
+    vectors: Extended | None = None
+    waves: bool = False
+
+    def modes(self, system: System, *, doubt: Extended, start: Start | None = None) -> Modes:
+        """With their start, from that of the scene where it is not given."""
+        parts = {name: getattr(self, name) for name in self.__slots__}
+        nothing = np.zeros_like(self.w2)
+        blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
+        found = Modes(**parts, doubt=doubt, start=start or blank)
+        return found if start else replace(found, start=_start(system, found))
+
+
+def _start(system: System, modes: Modes) -> Start:
+    """In extended precision; alone on the way to the top of a barrier in more digits."""
+    y, v = modes.into(system.scene.q, system.scene.p)
+    centre = modes.centre()
+    u = y - centre
+    slow, fast, size = _split(u, v, modes.w2, modes.rate)
+    if modes.vectors is not None or modes.waves:
+        whole = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) for x in (y, v))
+        size_u, size_v = next(whole) + np.abs(centre), next(whole)
+    else:
+        size_u, size_v = np.abs(y) + np.abs(centre), np.abs(v)
+    _, _, size = _split(size_u, size_v, modes.w2, modes.rate)
+    sizes = [size_u, size_v, size, size.copy()]
+    lost = (modes.w2 < 0) & (np.minimum(np.abs(slow), np.abs(fast)) * 16 < size)
+    if system.is_separate and np.any(lost):
+        chosen = np.flatnonzero(lost)
+        with digits():
+            part = system.part(chosen).system
+            k, pull, rate = _sums(part, np.diagonal)
+            m, q, p = (exactly(x) for x in (part.m, part.scene.q, part.scene.p))
+            root = np.sqrt(m)
+            for out, like, x in zip(
+                (slow, fast), sizes[2:], _split(root * (q - pull / k), p / root, k / m, rate), strict=False
+            ):
+                out[chosen] = extended(x)
+                like[chosen] = np.abs(out[chosen])
+    return Start(u=u, v=v, slow=slow, fast=fast, sizes=(sizes[0], sizes[1], sizes[2], sizes[3]))
+
+
+def _zeros(*shape: int) -> Any:
+    return exactly(np.zeros(shape))
+
+
+def _sums(system: System, of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
+    """Stiffness, the part of its matrix `of` which is wanted; force at 0 (n,) and rates of friction (n,)."""
+    zero = np.zeros(system.n, dtype=np.longdouble)
+    k, force, friction = (_zeros(*shape) for shape in ((system.n, system.n), (system.n,), (system.n,)))
+    for term in system.terms:
+        if isinstance(term, Damping):
+            np.add.at(friction, term.i, exactly(term.c))
+            continue
+        ends, row = term.particles, exactly(np.broadcast_to(term.curvature(zero), (len(term),)))
+        term.add_pull(row * -exactly(getattr(term, term.origin)), force)
+        for one in range(len(ends)):
+            for other in range(len(ends)):
+                np.add.at(k, (ends[one], ends[other]), row if one == other else -row)
+    return of(k), force, friction / exactly(system.m)
+
+
+def _precise(system: System) -> Modes:
+    """Modes in so many digits that stiff and soft ones of a small system keep all of theirs."""
+    with digits(ENOUGH):
+        k, force, rates = _sums(system, np.asarray)
+        m, q, p = (exactly(x) for x in (system.m, system.scene.q, system.scene.p))
+        root = np.sqrt(m)
+        w2, vectors = eigen(k / root[:, None] / root)
+        pull = vectors.T @ (force / root)
+        # a free translation: nothing holds it, and inner forces do not move it
+        is_zero = np.abs(w2) <= np.max(np.abs(w2)) * LEFT
+        w2 = np.where(is_zero, 0 * w2, w2)
+        pull = np.where(np.abs(pull) <= np.sum(np.abs(force / root)) * LEFT, 0 * pull, pull)
+        y, v = vectors.T @ (root * q), vectors.T @ (p / root)
+        u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
+        slow, fast, _ = _split(u, v, w2, np.max(rates))
+        parts = tuple(extended(x) for x in (u, v, slow, fast))
+        found = _Basis(
+            w2=extended(w2), pull=extended(pull), rate=system.friction_rates,
+            root_m=extended(root), vectors=extended(vectors),
+        )  # fmt: skip
+    u, v, slow, fast = parts
+    sizes = (np.abs(u), np.abs(v), np.abs(slow), np.abs(fast))
+    start = Start(u=u, v=v, slow=slow, fast=fast, sizes=sizes)
+    return found.modes(system, doubt=np.zeros_like(u), start=start)
+
+
+LEFT = Decimal(10) ** (12 - ENOUGH)
+"""What the rounding of `_precise` leaves of a 0."""
+
+
+def _drag(system: System, force: Extended) -> Extended:
+    """The part of a force (n,) that moves free groups as a whole, and all of it elsewhere, per root of mass.
+
+    Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
+    """
+    out: Extended = np.asarray(force / np.sqrt(system.m.astype(np.longdouble)))
+    for group in system.free_groups:
+        m, total = system.m[group].astype(np.longdouble), np.sum(force[group])
+        moves = abs(total) > len(group) * EPS * np.sum(np.abs(force[group]))
+        out[group] = np.sqrt(m) * total / np.sum(m) if moves else 0
+    return out
+
+
+PI = 4 * np.arctan(np.longdouble(1))
+
+
+def _wave_frequencies(system: System) -> Extended:
+    """Squared frequencies of a uniform chain between walls, slowest first (Lagrange 1788)."""
+    k = next(term.k[0] for term in system.terms if isinstance(term, Spring))
+    half = np.sin(PI * np.arange(1, system.n + 1) / (2 * (system.n + 1)))
+    return np.asarray(4 * k / system.m[0].astype(np.longdouble) * half * half)
+
+
+def _one_turn(n: int) -> Extended:
+    """sqrt(2/(n+1)) sin(pi j/(n+1)), j = 0 ... 2n + 1: all elements of V, by r j modulo a whole turn."""
+    return np.asarray(np.sin(PI * np.arange(2 * (n + 1)) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1)))
+
+
+MOST_EXACT = 4096
+"""Modes up to which |V| is summed element by element; beyond, every element counts as its largest value."""
+
+
+def _absolute_sines(reach: Extended) -> Extended:
+    """|V| reach (n,) for V of sines, or an upper bound of it for many modes: in memory of O(n)."""
+    n = len(reach)
+    if n > MOST_EXACT:
+        return np.full(n, np.sqrt(np.longdouble(2) / (n + 1)) * np.sum(reach))
+    r, sines = np.arange(1, n + 1), np.abs(_one_turn(n))
+    return np.array([sines[j * r % (2 * (n + 1))] @ reach for j in r])
+
+
+def _sines(y: Extended) -> Extended:
+    """y (..., n) V for V of sines, by the Fourier transform of its odd continuation."""
+    n = y.shape[-1]
+    none = np.zeros((*y.shape[:-1], 1), dtype=np.longdouble)
+    odd = np.concatenate([none, y, none, -y[..., ::-1]], axis=-1)
+    return np.asarray(-np.fft.rfft(odd, axis=-1).imag[..., 1 : n + 1] / np.sqrt(2 * np.longdouble(n + 1)))
+
+
+def _eigen(symmetric: Extended) -> tuple[Extended, Extended]:
+    """Eigenvalues and vectors in extended precision, by refinement of LAPACK's in double.
+
+    Ogita & Aishima, Japan J. Indust. Appl. Math. 35 (2018) 1007: in the basis of the approximate
+    vectors the matrix is nearly diagonal; one first-order rotation squares the error.  Within a cluster
+    of equal eigenvalues the small block is diagonalised instead.
+    """
+    _, start = np.linalg.eigh(symmetric.astype(np.float64))
+    vectors: Extended = start.astype(np.longdouble)
+    size = float(np.max(np.abs(symmetric))) or 1.0
+    for _ in range(4):
+        gram = vectors.T @ vectors
+        vectors = vectors @ (1.5 * np.eye(len(gram), dtype=np.longdouble) - 0.5 * gram)
+        inner = vectors.T @ symmetric @ vectors
+        values = np.diag(inner)
+        gap = values[None, :] - values[:, None]
+        close = np.abs(gap) <= 1e-9 * size
+        rotation = np.where(close, 0, inner / np.where(close, 1, gap))
+        vectors = vectors + vectors @ rotation
+        for block in _clusters(close):
+            off = inner[np.ix_(block, block)] - np.diag(values[block])
+            if len(block) > 1 and np.any(np.abs(off) > EPS * size):
+                shifted = inner[np.ix_(block, block)] - np.mean(values[block]) * np.eye(len(block))
+                _, turn = np.linalg.eigh(np.asarray(shifted / np.max(np.abs(shifted)), np.float64))
+                vectors[:, block] = vectors[:, block] @ turn.astype(np.longdouble)
+        if np.max(np.abs(rotation)) < 4 * len(gram) * EPS:
+            break
+    gram = vectors.T @ vectors
+    vectors = vectors @ (1.5 * np.eye(len(gram), dtype=np.longdouble) - 0.5 * gram)
+    return np.diag(vectors.T @ symmetric @ vectors).copy(), vectors
+
+
+def _clusters(close: np.ndarray) -> list[Integers]:
+    """Runs of neighbouring (sorted) eigenvalues that lie close together."""
+    breaks = np.flatnonzero(~np.diagonal(close, offset=1)) + 1
+    return [np.asarray(block) for block in np.split(np.arange(len(close)), breaks)]

@@ -1,0 +1,121 @@
+"""Pendulums, swinging and rotating, by Jacobi's elliptic functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from springcheck.arrays import Extended
+from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
+from springcheck.physics.exact.elliptic import argument, jacobi
+from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide
+from springcheck.physics.terms import Cosine
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+
+def _swings(scene: Scene) -> bool:
+    return one_each(scene) and all(np.all(t.depth != 0) for t in scene.terms if isinstance(t, Cosine))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Swing:
+    """Pendulums of a term: half the angle from below, in (-pi/2, pi/2], its sine and cosine, its rate in
+    units of w, and R**2 = m = 1 - m1 = E / 2 depth, all (s,)."""
+
+    length: Extended
+    mass: Extended
+    w: Extended
+    half: Extended
+    sine: Extended
+    cosine: Extended
+    rate: Extended
+    m: Extended
+    m1: Extended
+
+
+def _swing(scene: Scene, term: Cosine) -> _Swing:
+    i, wave, depth = term.i, wide(term.wave), np.abs(wide(term.depth))
+    mass, p = wide(scene.m[i]), wide(scene.p[i])
+    # upside down, the pendulum hangs from the other side
+    turned = np.where(term.depth < 0, PI / 2, 0)
+    angle = wave * (wide(scene.q[i]) - term.at) / 2 + turned
+    half = angle - PI * np.round(angle / PI)
+    rate = p / (2 * np.sqrt(mass * depth))
+    sine, cosine = np.sin(half), np.cos(half)
+    m1 = (cosine - rate) * (cosine + rate)
+    size = wave * (np.abs(wide(scene.q[i])) + np.abs(term.at)) / 2 + turned
+    near = (size > CANCELS * np.minimum(cosine, np.abs(half))) | (cosine**2 + rate**2 > CANCELS * np.abs(m1))
+    for j in np.flatnonzero(near):
+        one = scene.m[i[j]], scene.q[i[j]], scene.p[i[j]], term.depth[j], term.wave[j], term.at[j]
+        half[j], sine[j], cosine[j], m1[j] = _of_swing(*(exactly(x)[()] for x in one))
+    return _Swing(
+        length=1 / wave, mass=mass, w=np.sqrt(depth / mass) * wave, half=half, sine=sine, cosine=cosine,
+        rate=rate, m=sine * sine + rate * rate, m1=m1,
+    )  # fmt: skip
+
+
+def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extended:
+    """Half the angle, its sine and cosine, and m1 of one pendulum."""
+    with digits():
+        angle = wave * (q - at) / 2 + (pi() / 2 if depth < 0 else 0)
+        half = angle - pi() * (angle / pi()).to_integral_value()
+        sine, cosine = sine_cosine(half)
+        m1 = cosine * cosine - p * p / (4 * m * abs(depth))
+        return extended(np.array([half, sine, cosine, m1], dtype=object))
+
+
+def _pendulum(scene: Scene, t: Extended) -> States:
+    """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
+
+    R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
+    """
+    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    for term in scene.terms:
+        assert isinstance(term, Cosine)
+        found = _swing(scene, term)
+        a, r = _swung(found, t)
+        q[:, term.i] = scene.q[term.i] + found.length * (2 * (a - found.half))
+        p[:, term.i] = found.mass * found.length * 2 * found.w * r
+    return q, p
+
+
+def _pendulum_doubt(scene: Scene, t: np.longdouble) -> States:
+    q, p = np.empty((2, scene.n), dtype=np.longdouble)
+    for term in scene.terms:
+        assert isinstance(term, Cosine)
+        found = _swing(scene, term)
+        root = np.sqrt(found.m)
+        size = 2 * found.length * np.minimum(root, PI / 2)
+        speed = 2 * found.length * found.w * root
+        time = np.abs(t) + latency(found.m1 / np.maximum(found.m, 1)) / found.w
+        force = found.mass * found.w**2 * np.minimum(size, found.length)
+        q[term.i] = LAST * (np.abs(scene.q[term.i]) + size + speed * time)
+        p[term.i] = LAST * (found.mass * speed + force * time)
+    return q, p
+
+
+def _swung(found: _Swing, t: Extended) -> States:
+    """Half the angle, and its rate in units of w, at times t."""
+    s, c, r, m, m1 = found.sine, found.cosine, found.rate, found.m, found.m1
+    over = m1 < 0
+    # over the top the modulus is 1/m, and the arguments run sqrt(m) times as fast
+    fast = np.where(over, np.sqrt(m), 1)
+    safe = np.where(m > 0, m, 1)
+    modulus, other = np.where(over, 1 / safe, m), np.where(over, -m1 / safe, m1)
+    phase = argument(np.where(over, np.sign(r) * s, s), np.where(over, c, r), modulus, other)
+    at = jacobi(found.w * t * fast + phase, modulus, other)
+    root = np.sqrt(m)
+    swing = np.arctan2(root * at.sn, at.dn)
+    return (
+        np.asarray(np.where(over, np.sign(r) * at.am, swing)),
+        np.asarray(np.where(over, np.sign(r) * root * at.dn, root * at.cn)),
+    )
+
+
+COSINE = Well(
+    key="cosine", terms=frozenset({"cosine"}), is_known=_swings, motion=_pendulum, doubt=_pendulum_doubt
+)

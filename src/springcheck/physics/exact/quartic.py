@@ -1,0 +1,195 @@
+"""Springs that harden or soften, and double wells: u'' = -k u - b u**3, by Jacobi's elliptic functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Extended
+from springcheck.physics.exact.digits import digits, exactly, extended
+from springcheck.physics.exact.elliptic import argument, jacobi
+from springcheck.physics.exact.well import CANCELS, LAST, States, Well, latency, wide
+from springcheck.physics.terms import Quartic, WallSpring
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Duffing:
+    """u'' = -k u - b u**3 of unit masses (k, b per mass), all (n,); E is the energy of the start.
+
+    root = sqrt(k**2 + 4 b E) = k + b A**2 at a turning point A; minus = root - k; plus = root + k.
+    The motion is that of an elliptic function of parameter m = 1 - m1, of amplitude A and argument w t.
+    """
+
+    k: Extended
+    b: Extended
+    u: Extended
+    v: Extended
+    pull: Extended
+    """k + b u**2 of the start."""
+    energy: Extended
+    """4 E."""
+    root: Extended
+    minus: Extended
+    plus: Extended
+    amplitude: Extended
+    w: Extended
+    m: Extended
+    m1: Extended
+
+    def __getitem__(self, which: NDArray[np.bool_]) -> _Duffing:
+        return _Duffing(**{name: getattr(self, name)[which] for name in self.__slots__})
+
+
+def _gathered(scene: Scene, of: Callable[[Any], Any]) -> tuple[Any, ...]:
+    """m, k, b, q, at, p of each particle (n,), in numbers made by `of`."""
+    k, b, at = (of(np.zeros(scene.n)) for _ in range(3))
+    for term in scene.terms:
+        if isinstance(term, Quartic):
+            term.scatter(of(term.b), b)
+            at[term.i] = of(term.at)
+        elif isinstance(term, WallSpring):
+            term.scatter(of(term.k), k)
+    return of(scene.m), k, b, of(scene.q), at, of(scene.p)
+
+
+def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
+    """k + b u**2, and m**3 root**2 and 4 m**2 E of unit masses: what may cancel."""
+    x = k + b * u * u
+    return x, m * x * x + 2 * b * p * p, 2 * p * p + m * (2 * k + b * u * u) * u * u
+
+
+def _duffing(scene: Scene) -> tuple[_Duffing, Extended] | None:
+    """The wells and their centres, or None where one has several centres, or no turning point."""
+    m, k, b, q, at, p = _gathered(scene, wide)
+    for term in scene.terms:
+        if isinstance(term, Quartic | WallSpring) and np.any(term.at != at[term.i]):
+            return None
+    u = q - at
+    sums = _sums(m, k, b, u, p)
+    m_, k_, b_, q_, at_, p_ = _gathered(scene, lambda x: np.abs(wide(x)))
+    sizes = _sums(m_, k_, b_, q_ + at_, p_)
+    near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
+    if np.any(near):
+        chosen = np.flatnonzero(near)
+        with digits():
+            m_, k_, b_, q_, at_, p_ = _gathered(scene.system.part(chosen), exactly)
+            for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
+                out[chosen] = extended(x)
+    x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2
+    k, b = k / m, b / m
+    if not np.all((b > 0) | ((k > 0) & (square >= 0) & (x >= 0))):
+        return None
+    root = np.sqrt(square)
+    # root**2 - k**2 is 4 b E, so that of plus and minus the one that cancels follows from the other
+    large = root + np.abs(k)
+    small = b * energy / np.where(large > 0, large, 1)
+    minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
+    parts = {"k": k, "b": b, "u": u, "v": p / m, "pull": x, "energy": energy}
+    parts |= {"root": root, "minus": minus, "plus": plus}
+    return _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
+
+
+def _orbit(
+    b: Extended, root: Extended, minus: Extended, plus: Extended, energy: Extended
+) -> dict[str, Extended]:
+    """A, w, m and m1: of sn below the barriers of a softening spring, of dn when caught in one of two wells,
+    of cn elsewhere (Byrd & Friedman, Handbook of Elliptic Integrals, 1971)."""
+    soft = b <= 0
+    caught = ~soft & (plus < 0)
+    rest = ~soft & (root == 0)
+    over = np.where(rest, 1, root)
+    m, m1 = np.where(rest, 0, minus / (2 * over)), np.where(rest, 1, plus / (2 * over))
+    amplitude, w = np.sqrt(minus / np.where(soft, -1, b)), np.sqrt(root)
+    broad, deep = np.where(soft, plus, 1), np.where(caught, minus, 1)
+    # A**2 = 4 E / plus, a sum where minus / b would be a quotient of small numbers
+    amplitude = np.where(soft, np.sqrt(np.abs(energy) / broad), amplitude)
+    w = np.where(soft, np.sqrt(broad / 2), np.where(caught, np.sqrt(deep / 2), w))
+    m = np.where(soft, -minus / broad, np.where(caught, 2 * root / deep, m))
+    m1 = np.where(soft, 2 * root / broad, np.where(caught, -plus / deep, m1))
+    return {"amplitude": amplitude, "w": w, "m": m, "m1": m1}
+
+
+def _has_turning_points(scene: Scene) -> bool:
+    return _duffing(scene) is not None
+
+
+def _known(scene: Scene) -> tuple[_Duffing, Extended]:
+    found = _duffing(scene)
+    if found is None:
+        raise ValueError(f"scene {scene.name!r}: a particle has several centres, or no turning point")
+    return found
+
+
+def _stiffening(scene: Scene, t: Extended) -> States:
+    """cn, dn or sn, by what holds the particle."""
+    well, at = _known(scene)
+    u, v = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    softening = well.b <= 0
+    # the sign of the energy: beside |k| it may be lost in the root
+    caught = ~softening & (well.plus < 0)
+    for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
+        if np.any(which):
+            u[:, which], v[:, which] = law(well[which], t)
+    return u + at, v * scene.m
+
+
+def _stiffening_doubt(scene: Scene, t: np.longdouble) -> States:
+    well, at = _known(scene)
+    # at the bottom of the potential
+    fastest = np.where(
+        (well.k < 0) & (well.b > 0), well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2
+    )
+    a, speed = well.amplitude, np.sqrt(fastest)
+    time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
+    q = LAST * (np.abs(at) + a + speed * time)
+    p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
+    return np.asarray(q), np.asarray(p * scene.m)
+
+
+def _cn(well: _Duffing, t: Extended) -> States:
+    """Across the middle of a stiffening well: u = A cn(w t + phase), w**2 = root."""
+    amplitude, w, m, m1 = well.amplitude, well.w, well.m, well.m1
+    cosine = well.u / np.where(amplitude > 0, amplitude, 1)
+    turn = w * np.sqrt(m1 + m * cosine * cosine)
+    # on the top of the barrier nothing turns: it is reached after an infinite time
+    sine = np.where(turn > 0, -well.v / np.where(turn > 0, turn, 1), 1)
+    at = jacobi(t * w + argument(sine, well.u, m, m1), m, m1)
+    return np.asarray(amplitude * at.cn), np.asarray(-amplitude * w * at.sn * at.dn)
+
+
+def _dn(well: _Duffing, t: Extended) -> States:
+    """Caught in one of two wells: u = +-A dn(w t + phase), w**2 = (root - k)/2."""
+    m, m1, w = well.m, well.m1, well.w
+    amplitude = np.copysign(well.amplitude, well.u)
+    # of twice am(phase) sine and cosine are rational in the start
+    y, x = -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.pull
+    # half of that angle, without the angle: what is small of the two follows from the other
+    large = np.sqrt((well.root + np.abs(x)) / 2)
+    small = np.abs(y) / (2 * np.where(large > 0, large, 1))
+    sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)
+    at = jacobi(t * w + argument(np.copysign(sine, y), cosine, m, m1), m, m1)
+    return np.asarray(amplitude * at.dn), np.asarray(-amplitude * w * m * at.sn * at.cn)
+
+
+def _sn(well: _Duffing, t: Extended) -> States:
+    """Below the barriers of a softening spring: u = A sn(w t + phase), w**2 = (k + root)/2."""
+    m, m1, w = well.m, well.m1, well.w
+    dn = np.sqrt((well.root + well.pull) / well.plus)
+    at = jacobi(t * w + argument(well.u, well.v / (w * np.where(dn > 0, dn, 1)), m, m1), m, m1)
+    return np.asarray(well.amplitude * at.sn), np.asarray(well.amplitude * w * at.cn * at.dn)
+
+
+QUARTIC = Well(
+    key="quartic",
+    terms=frozenset({"quartic", "wall-spring"}),
+    is_known=_has_turning_points,
+    motion=_stiffening,
+    doubt=_stiffening_doubt,
+)

@@ -1,0 +1,52 @@
+"""What every closed form of a well needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from springcheck.arrays import Extended
+from springcheck.physics.exact.elliptic import EPS
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+States: TypeAlias = tuple[Extended, Extended]
+PI = 4 * np.arctan(np.longdouble(1))
+
+CANCELS = 16
+"""Sums that are smaller than their summands by this factor are taken in more digits."""
+
+LAST = 64 * EPS
+"""Roundings of a closed form, relative to each size that it is made of; `validation/exact_check.py` finds
+at most a tenth of them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Well:
+    """A closed form: for particles on which a term `key` acts, and nothing but `terms`."""
+
+    key: str
+    terms: frozenset[str]
+    is_known: Callable[[Scene], bool]
+    motion: Callable[[Scene, Extended], States]
+    doubt: Callable[[Scene, np.longdouble], States]
+    """Bounds (n,) of the errors of `motion` in q and p, from the start to a time."""
+
+
+def wide(x: Any) -> Extended:
+    """Doubles in extended precision."""
+    return np.asarray(x, np.longdouble)
+
+
+def one_each(scene: Scene) -> bool:
+    """Whether one term alone acts on each particle."""
+    return bool(np.all(scene.system.pulls == 1))
+
+
+def latency(m1: Extended) -> Extended:
+    """Bound of F(phi | m) up to a quarter turn, for any phi that numbers of this width can tell from it."""
+    return np.asarray(2 + np.log(16 / np.maximum(np.abs(m1), EPS**4)) / 2)
