@@ -132,8 +132,37 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """The relative change of each parameter from which on a check fails; None where it says nothing of it."""
+
+    stiffness: float | None = None
+    """Of every force of the potential."""
+    step: float | None = None
+    friction: float | None = None
+
+    def __str__(self) -> str:
+        """The same in words, or nothing."""
+        known = [(name, getattr(self, name)) for name in self.__slots__]
+        said = [f"{name} off by {x:.1e}" for name, x in known if x is not None]
+        return f"would see a {', a '.join(said)}" if said else ""
+
+    @classmethod
+    def least(cls, several: Iterable[Limits]) -> Limits:
+        """Of several checks, or of one on several pieces of a run, that of the one that sees most."""
+        every = [(x.stiffness, x.step, x.friction) for x in several]
+        found = ([x for x in column if x is not None] for column in zip(*every, strict=True))
+        return cls(**{name: min(x, default=None) for name, x in zip(cls.__slots__, found, strict=False)})
+
+
+NOT_KNOWN = Limits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """One number against one bound.  `passed` is None where the check does not apply."""
+    """One number against one bound.  `passed` is None where the check does not apply.
+
+    Value and bound are finite numbers wherever a check applies, and NaN where it does not.
+    """
 
     method: str
     check: str
@@ -143,6 +172,8 @@ class Verdict:
     passed: bool | None
     why: str
     """The bound's reason, or why the check does not apply."""
+    sees: Limits = NOT_KNOWN
+    """What the check would have seen in this run."""
 
     def __repr__(self) -> str:
         if self.passed is None:

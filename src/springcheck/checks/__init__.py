@@ -30,7 +30,7 @@ from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import CONTRACTED, arithmetic, fastest, first_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory, Verdict
+from springcheck.trajectory import Limits, Trajectory, Verdict
 
 __all__ = [
     "ALL", "CHECKS", "CONTRACTED", "TELLING", "THOROUGH", "Bench", "Case", "Check", "Experiment", "Run",
@@ -122,10 +122,14 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
     out: list[Verdict] = []
     for same in zip(*pieces, strict=True):
         judged = [verdict for verdict in same if verdict.passed is not None]
-        verdict = max(judged, key=_badness) if judged else same[0]
-        failed = next((x for x in same if x.passed is False), verdict)
+        if not judged:
+            out.append(same[0])
+            continue
+        verdict = max(judged, key=_badness)
+        sees = Limits.least(one.sees for one in judged)
         # where it fails first is what is looked for, and how badly at the worst
-        out.append(replace(verdict, why=failed.why) if failed.check == verdict.check else verdict)
+        failed = next((one for one in judged if one.passed is False), verdict)
+        out.append(replace(verdict, why=failed.why, sees=sees))
     return out
 
 

@@ -19,7 +19,7 @@ from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.stepping import Slope
-from springcheck.trajectory import Trajectory, Verdict
+from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -304,11 +304,13 @@ class Case:
         """Roundings along one step."""
         return schemes.roundings(self.scheme)
 
-    def verdict(self, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
+    def verdict(
+        self, check: str, value: float, bound: float, unit: str, why: str, sees: Limits = NOT_KNOWN
+    ) -> Verdict:
         """Passed only if the value is a number within the bound."""
         if unit == "roundings" and not WIDE:
             why += "; the reference rounds like the engine here, which a rounding of both allows for"
-        return verdicts.within(self.trajectory.label, check, value, bound, unit, why)
+        return verdicts.within(self.trajectory.label, check, value, bound, unit, why, sees)
 
     def not_applicable(self, check: str, why: str) -> Verdict:
         """Reported as what it is, never as passed."""

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import WIDE, Extended, Floats
+from springcheck.arrays import WIDE, Extended, Floats, Integers, Reals
+from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import STILL, closed_or_not
@@ -41,6 +42,10 @@ def closed_form(case: Case) -> Verdict:
     worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
         return case.not_applicable("closed-form", f"{STILL} the motion")
+
+    def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
+        return np.where(late[at], case.norm.size(*case.modes.out_of(*change)) / allowed[at], 0)
+
     return case.verdict(
         "closed-form",
         float(distance[worst] / unit[worst]),
@@ -48,6 +53,7 @@ def closed_form(case: Case) -> Verdict:
         "roundings",
         f"roundings of {case.steps[worst]} steps, carried on by the map: {_how(case)}"
         + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
+        sight.of_modes(case, part),
     )
 
 
@@ -116,12 +122,23 @@ def shadow_energy(case: Case) -> Verdict:
         drowned = energy <= limit * scale
     if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & ~drowned):
         return case.not_applicable("shadow-energy", "rounding may be as large as the energy")
+
+    def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
+        (u, v), (du, dv) = right, change
+        of_u, of_v = (
+            form[:, 0] * (2 * u + du) + form[:, 1] * v,
+            form[:, 1] * (u + du) + form[:, 2] * (2 * v + dv),
+        )
+        most = np.max(np.abs(of_u * du + of_v * dv), axis=1)
+        return np.where(late[at], most / (limit * scale)[at], 0)
+
     return case.verdict(
         "shadow-energy",
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
         f"roundings of {case.steps[worst]} steps: {_how(case)}" + _untold(case, drowned, "energy"),
+        sight.of_modes(case, part),
     )
 
 
@@ -176,6 +193,14 @@ def frequency(case: Case) -> Verdict:
     if angle >= abs(expected):
         return case.not_applicable("frequency", f"{STILL} the whole turn")
     limit = float(angle / abs(expected))
+
+    def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
+        # the change of the last frame's phase, at right angles to its place on the ellipse
+        (u, v), (du, dv) = ((x[-1, j], y[-1, j]) for x, y in (right, change))
+        x, y = _on_circle(form, u, v)
+        dx, dy = _on_circle(form, du, dv)
+        return np.asarray(abs(x * dy - y * dx) / (x * x + y * y) / angle)
+
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     return case.verdict(
         "frequency",
@@ -183,6 +208,7 @@ def frequency(case: Case) -> Verdict:
         limit,
         "relative",
         f"the closed form's bound as an angle; the scheme itself is off the true frequency by {true:.2e}",
+        sight.of_modes(case, part),
     )
 
 
@@ -193,9 +219,14 @@ _LOW_TWO_PI = 2.4492935982947064e-16
 def _phase(form: Extended, u: np.longdouble, v: np.longdouble) -> np.longdouble:
     if not (np.isfinite(u) and np.isfinite(v)):
         return np.longdouble(np.nan)
-    x = np.sqrt(np.abs(form[0] - form[1] ** 2 / (4 * form[2]))) * u
-    y = np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
+    x, y = _on_circle(form, u, v)
     return np.longdouble(np.arctan2(-y, x))
+
+
+def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.longdouble, np.longdouble]:
+    """Coordinates in which a step is a rotation."""
+    x = np.sqrt(np.abs(form[0] - form[1] ** 2 / (4 * form[2]))) * u
+    return x, np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
 
 
 @check("moment", family="motion", needs="nothing that holds a particle")

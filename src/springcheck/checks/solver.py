@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.arrays import Extended, Floats
+from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import fastest
@@ -38,6 +39,7 @@ def tolerance(case: Case) -> Verdict:
         "of the start",
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
         f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times",
+        sight.of_exact(case, lambda change: case.norm(*change) / bound),
     )
 
 

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import Floats, Reals
+from springcheck.arrays import Floats, Integers, Reals
+from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import check
+from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics.system import MOST_JOINED
-from springcheck.trajectory import Verdict
+from springcheck.trajectory import Limits, Verdict
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has
@@ -80,7 +82,19 @@ def step_defect(case: Case) -> Verdict:
         first = case.steps[int(np.argmin(told)) + 1]
         why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
     why = _beyond_range(case, off) or why + _where(case, off)
-    return case.verdict("step-defect", float(seen[worst]), float(bound), "roundings", why)
+    return case.verdict("step-defect", float(seen[worst]), float(bound), "roundings", why, _sees(case, told))
+
+
+def _sees(case: Case, told: NDArray[np.bool_]) -> Limits:
+    """What the roundings allowed in each degree of freedom would not have hidden."""
+    ahead = case.ahead
+    assert ahead is not None
+    most = [case.roundings * x for x in (ahead.of_q, ahead.of_p)]
+
+    def part(at: Integers, change: States) -> Reals:
+        return np.asarray([off / of[at] for off, of in zip(change, most, strict=True)])
+
+    return sight.of_steps(case, told, part)
 
 
 def first_off(case: Case) -> int | None:
@@ -152,7 +166,9 @@ def _by_norm(case: Case) -> Verdict:
         return case.not_applicable("step-defect", f"{STILL} any step")
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
     why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why + _where(case, off)
-    return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why)
+    unit = case.allowance_of_stretches[: len(bound)] * bound
+    sees = sight.of_steps(case, told, lambda at, change: case.norm.size(*change) / unit[at])
+    return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why, sees)
 
 
 STILL = "standing still would pass: rounding may be as large as"

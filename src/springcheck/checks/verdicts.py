@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.trajectory import Verdict
+from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
 
 BEYOND = 2.0**511
 """Stands for every value that fails and is no number or larger: a verdict and its ratio are numbers."""
 
 
-def within(method: str, check: str, value: float, bound: float, unit: str, why: str) -> Verdict:
+def within(
+    method: str, check: str, value: float, bound: float, unit: str, why: str, sees: Limits = NOT_KNOWN
+) -> Verdict:
     """Passed only if the value is a number within the bound.  A bound that is infinite says nothing.
 
     The verdict's value and bound are finite numbers: `BEYOND` stands for a value that is none, and fails.
@@ -32,6 +34,7 @@ def within(method: str, check: str, value: float, bound: float, unit: str, why: 
         unit=unit,
         passed=passed,
         why=why,
+        sees=sees,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import h5py
@@ -15,7 +15,7 @@ from springcheck.errors import StoreError
 from springcheck.store import access, digests
 from springcheck.store.access import Scalar
 from springcheck.store.layout import RESERVED, write_attributes
-from springcheck.trajectory import Comparison, Verdict
+from springcheck.trajectory import NOT_KNOWN, Comparison, Limits, Verdict
 
 _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""
@@ -147,8 +147,12 @@ def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
             "unit": [v.unit for v in verdicts],
             "passed": np.array([_PASSED[v.passed] for v in verdicts], dtype=np.int8),
             "why": [v.why for v in verdicts],
+            **{f"sees_{name}": _limits(verdicts, name) for name in _LIMITS},
         },
-        attributes={"about": "passed: 1 yes, 0 no, -1 the check does not apply"},
+        attributes={
+            "about": "passed: 1 yes, 0 no, -1 the check does not apply; sees_...: the relative change of the "
+            "parameter from which on the check fails, NaN where it says nothing of it"
+        },
     )
 
 
@@ -160,10 +164,34 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     if len({len(column) for column in (*texts, value, bound, passed)}) > 1 or set(passed) - {-1, 0, 1}:
         raise StoreError("the table of verdicts is none of ours: its columns do not fit together")
     back = {number: passed for passed, number in _PASSED.items()}
+    # stores of before have no limits
+    known = [_column(table, f"sees_{name}", "f") for name in _LIMITS if f"sees_{name}" in table.columns]
+    sees = [Limits(**dict(zip(_LIMITS, map(_or_none, row), strict=True))) for row in zip(*known, strict=True)]
+    if known and (len(known) < len(_LIMITS) or len(sees) != len(value)):
+        raise StoreError("the table of verdicts is none of ours: its limits do not fit together")
+    sees = sees or [NOT_KNOWN] * len(value)
     return tuple(
-        Verdict(value=float(x), bound=float(y), passed=back[int(z)], **dict(zip(names, row, strict=True)))
-        for *row, x, y, z in zip(*texts, value, bound, passed, strict=True)
+        Verdict(
+            value=float(x),
+            bound=float(y),
+            passed=back[int(z)],
+            sees=one,
+            **dict(zip(names, row, strict=True)),
+        )
+        for *row, x, y, z, one in zip(*texts, value, bound, passed, sees, strict=True)
     )
+
+
+_LIMITS = tuple(field.name for field in fields(Limits))
+
+
+def _limits(verdicts: Sequence[Verdict], name: str) -> np.ndarray:
+    found = [getattr(v.sees, name) for v in verdicts]
+    return np.array([np.nan if x is None else x for x in found], dtype=np.float64)
+
+
+def _or_none(x: float) -> float | None:
+    return None if np.isnan(x) else float(x)
 
 
 _NUMBERS = {"value": "f", "bound": "f", "passed": "i"}

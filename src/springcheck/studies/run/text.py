@@ -15,7 +15,7 @@ from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text import Lines, Row, Table, plain, seconds, table
-from springcheck.trajectory import Comparison, Verdict
+from springcheck.trajectory import Comparison, Limits, Verdict
 
 
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
@@ -30,7 +30,8 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
     out: Lines = []
     if found.verdicts:
         out += [plain(), plain("Largest value of each check, as a fraction of its bound:")]
-        out += [*matrices(found.verdicts), *failures(found.verdicts), *unjudged(found.verdicts)]
+        out += [*matrices(found.verdicts), *sights(found.verdicts)]
+        out += [*failures(found.verdicts), *unjudged(found.verdicts)]
         if verdicts:
             out.append(verdicts_table(found.verdicts))
     if found.comparison is not None:
@@ -49,7 +50,7 @@ def _report(report: Report) -> Lines:
     ]
     out += _same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
-    out += matrices(report.verdicts)
+    out += [*matrices(report.verdicts), *sights(report.verdicts)]
     out += failures(report.verdicts)
     out += unjudged(report.verdicts)
     out += left_out(report.left_out)
@@ -157,6 +158,19 @@ def _cell(verdict: Verdict | None) -> Text:
     return plain(text if verdict.passed else text + "!", "" if verdict.passed else "bold red")
 
 
+def sights(verdicts: Sequence[Verdict]) -> Lines:
+    """What would have been seen of every method, by the check that sees most of it."""
+    methods = dict.fromkeys(v.method for v in verdicts if v.passed)
+    best = {name: Limits.least(v.sees for v in verdicts if v.passed and v.method == name) for name in methods}
+    known = {name: sees.stiffness for name, sees in best.items() if sees.stiffness is not None}
+    if not known:
+        return []
+    keen, dull = (how(known, key=lambda name: known[name]) for how in (min, max))
+    said = f"A stiffness off by {known[keen]:.1e} would be seen in {keen}"
+    others = f", by {known[dull]:.1e} in {dull} and in all between" if dull != keen else ""
+    return [plain(said + others, "dim")]
+
+
 def failures(verdicts: Iterable[Verdict]) -> Lines:
     """Every failed verdict with value, bound, ratio and why."""
     out: Lines = []
@@ -183,7 +197,8 @@ def verdict_line(v: Verdict) -> str:
     """Value, bound, ratio and why."""
     if v.passed is None:
         return f"not applicable: {v.why}"
-    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.why}"
+    seen = f"; {v.sees}" if str(v.sees) else ""
+    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.why}{seen}"
 
 
 def verdicts_table(verdicts: Iterable[Verdict]) -> Table:

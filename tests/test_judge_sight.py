@@ -1,0 +1,108 @@
+"""What a verdict says that it would have seen: an engine that is off by three limits fails, by a tenth of one
+passes; and the limits are kept and shown wherever verdicts are."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, schemes, store
+from springcheck.cli import main
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic
+from springcheck.studies.faults import clean
+from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
+
+VALIDATION = Path(__file__).parent.parent / "validation"
+sys.path.insert(0, str(VALIDATION))
+_spec = importlib.util.spec_from_file_location("detection", VALIDATION / "detection.py")
+assert _spec is not None
+assert _spec.loader is not None
+detection = importlib.util.module_from_spec(_spec)
+sys.modules["detection"] = detection
+_spec.loader.exec_module(detection)
+
+Need = Callable[[str], None]
+
+WELL = clean.scene(
+    np.array([1.3]), (Quartic(i=np.array([0]), b=np.array([2.3]), at=np.zeros(1)),), np.array([0.9]),
+    np.array([0.4]), step=0.05, steps=30,
+)  # fmt: skip
+SCENES: dict[str, Scene] = {
+    "h w = 0.002": detection.spring(0.002, 30),
+    "h w = 0.3": detection.spring(0.3, 30),
+    "h w = 1.9": detection.spring(1.9, 30),
+    "damped": detection.spring(0.1, 30, damped=True),
+    "every 10 steps": replace(detection.spring(0.2, 60), every=10),
+    "chain": replace(scenefile.load_scene("chain"), steps=20),
+    "well": WELL,
+    "well, every 6 steps": replace(WELL, every=6),
+}
+
+
+@pytest.mark.parametrize("name", ["semi-implicit-euler", "velocity-verlet", "rk4", "implicit-euler"])
+@pytest.mark.parametrize("where", SCENES)
+def test_three_limits_fail_and_a_tenth_of_one_passes(where: str, name: str) -> None:
+    tried, wrong = detection.wrong(SCENES[where], schemes.SCHEMES[name])
+    assert wrong == []
+    assert tried >= 2
+
+
+def test_limits_are_as_small_as_rounding_allows() -> None:
+    sees = detection.least(detection.spring(0.1, 200), "velocity-verlet")
+    assert 1e-16 < sees.stiffness < 1e-14
+    assert 1e-16 < sees.step < 1e-14
+    assert sees.friction is None
+    assert detection.least(detection.spring(0.1, 200, damped=True), "velocity-verlet").friction < 1e-11
+
+
+def test_an_adaptive_solver_s_tolerance_says_what_it_hides(need: Need) -> None:
+    need("sundials:bdf")
+    scene = replace(detection.spring(0.1, 60), tolerance=1e-8)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, "sundials:bdf"))}
+    limit = found["tolerance"].sees.stiffness
+    assert limit is not None
+    assert 1e-9 < limit < 1e-2
+    wrong = springcheck.simulate(scene.system.scaled(1 + 3 * limit), "sundials:bdf")
+    (seen,) = checks.judge(scene, wrong, [checks.tolerance])
+    assert seen.passed is False
+
+
+def verdict(**limits: float | None) -> Verdict:
+    return Verdict(
+        method="m", check="c", value=1.0, bound=2.0, unit="", passed=True, why="", sees=Limits(**limits)
+    )
+
+
+def test_of_the_pieces_of_a_run_the_one_that_sees_most_counts() -> None:
+    (found,) = checks.worst([[verdict(stiffness=3e-13)], [verdict(stiffness=1e-14, step=2e-9)]])
+    assert found.sees == Limits(stiffness=1e-14, step=2e-9)
+    assert Limits.least([]) == NOT_KNOWN
+    assert str(found.sees) == "would see a stiffness off by 1.0e-14, a step off by 2.0e-09"
+    assert str(NOT_KNOWN) == ""
+
+
+def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.h5"
+    asked = ["run", "spring-uneven", "-o", str(path), "--method", "own:*euler"]
+    assert main(asked) == 0
+    assert "would be seen in own:" in capsys.readouterr().out
+    found = [v for v in store.verdicts(path) if v.check == "step-defect"]
+    assert all(v.sees.stiffness is not None and v.sees.stiffness < 1e-13 for v in found)
+    assert main(["inspect", str(path), "--verdicts"]) == 0
+    assert "would see a stiffness off by" in capsys.readouterr().out
+    assert main(["inspect", str(path), "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    sees = {v["check"]: v["sees"] for v in shown["run"]["verdicts"]} if "run" in shown else None
+    sees = sees or {v["check"]: v["sees"] for v in shown["verdicts"]}
+    assert sees["step-defect"]["stiffness"] < 1e-13
+    assert sees["start"] == {"stiffness": None, "step": None, "friction": None}

@@ -1,0 +1,124 @@
+"""What the judge would see by h w: the smallest relative error of stiffness, step and friction that fails.
+
+    python validation/detection.py [STEPS]
+
+One particle on a spring, every step recorded, an engine in extended precision whose states are rounded once
+a step.  Each limit is the least of those that the verdicts of the right run say (`Verdict.sees`), and each is
+put to the test: an engine that is off by three limits must fail, one that is off by a tenth must pass.  It
+prints a table of the limits; exit status 1 where one of them is wrong.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from arguments import arguments
+from springcheck import checks, schemes
+from springcheck.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.physics.terms import Damping
+from springcheck.studies.faults import clean, steppers
+from springcheck.trajectory import Limits, Trajectory
+
+TURNS = (0.001, 0.01, 0.1, 0.5, 1.0, 1.5, 1.9)
+METHODS = (
+    "explicit-euler", "semi-implicit-euler", "velocity-verlet", "forest-ruth", "rk4", "implicit-euler",
+    "implicit-midpoint",
+)  # fmt: skip
+FACTORS = ((3.0, False), (0.1, True))
+"""Limits by which an engine is off, and whether it passes."""
+
+
+def planted(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
+    """A run in extended precision, rounded once a step, whose stiffness, step or friction is off by x."""
+    system, off = scene.system, np.longdouble(x)
+    h = np.longdouble(scene.step) * (1 + off * (name == "step"))
+    more = {True: 1 + off * (name == "stiffness"), False: 1 + off * (name == "friction")}
+
+    def force_of(terms: Iterable[Term]) -> Any:
+        parts = [(system.force_of([term]), more[term.is_potential]) for term in terms]
+        return lambda q, p: sum((force(q, p) * factor for force, factor in parts), np.zeros_like(q))
+
+    def stiffness(q: Any) -> tuple[Any, bool]:
+        # it only steers the iteration
+        return system.hessian(q), True
+
+    rate = system.friction_rates * more[False] if system.is_damped else None
+
+    def step(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
+        a, b = schemes.step(
+            scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=h, m=scene.m,
+            force=force_of(scene.terms), stiffness=stiffness if scheme.implicit else None, rate=rate,
+            parts=(force_of(system.slow), force_of(system.fast)),
+        )  # fmt: skip
+        return np.asarray(a, np.float64), np.asarray(b, np.float64)
+
+    return steppers.record(scene, scheme, step)
+
+
+def wrong(
+    scene: Scene, scheme: schemes.Scheme, only: Iterable[str] = Limits.__slots__
+) -> tuple[int, list[str]]:
+    """How many limits the verdicts of the right run state, and those of them that do not hold."""
+    tried, out = 0, []
+    for verdict in checks.judge(scene, planted(scene, scheme)):
+        (check,) = (one for one in checks.CHECKS if one.name == verdict.check)
+        for name in only:
+            limit = getattr(verdict.sees, name)
+            if limit is None or not verdict.passed:
+                continue
+            tried += 1
+            for factor, passes in FACTORS:
+                (found,) = checks.judge(scene, planted(scene, scheme, name, factor * limit), [check])
+                if found.passed is not passes:
+                    seen = f"{found.value:.3g} of {found.bound:.3g}"
+                    out.append(f"{scheme.name}: {check.name}: {name} off by {factor:g} x {limit:.2g}: {seen}")
+    return tried, out
+
+
+def spring(hw: float, steps: int, *, damped: bool = False) -> Scene:
+    """One particle on a spring, no number of it round."""
+    m, k = np.array([3.7]), np.array([2.9])
+    terms: tuple[Term, ...] = (clean.walls(k, np.array([0.1])),)
+    if damped:
+        terms += (Damping(i=np.array([0]), c=np.array([0.03])),)
+    step = float(hw / np.sqrt(k[0] / m[0]))
+    return clean.scene(m, terms, np.array([0.3]), np.array([0.7]), step=step, steps=steps)
+
+
+def least(scene: Scene, name: str) -> Limits:
+    """The least limits of all verdicts on the right run of a scheme."""
+    run = planted(scene, schemes.SCHEMES[name])
+    return Limits.least(v.sees for v in checks.judge(scene, run) if v.passed)
+
+
+if __name__ == "__main__":
+    asked = arguments(__doc__, steps=1000)
+    for name in ("stiffness", "step"):
+        print(f"| {name}, h w = | {' | '.join(f'{hw:g}' for hw in TURNS)} |")
+        print(f"|---|{'---|' * len(TURNS)}")
+        for method in METHODS:
+            cells = []
+            for hw in TURNS:
+                limit = getattr(least(spring(hw, asked.steps), method), name)
+                cells.append("-" if limit is None else f"{limit:.0e}")
+            print(f"| {method} | {' | '.join(cells)} |", flush=True)
+        print()
+    tried = 0
+    failed: list[str] = []
+    for method in METHODS:
+        for hw in TURNS:
+            for damped in (False, True):
+                scene = replace(spring(hw, min(asked.steps, 60), damped=damped), quantities=("q", "p"))
+                count, found = wrong(scene, schemes.SCHEMES[method])
+                tried, failed = tried + count, failed + found
+    print(f"{tried} limits tried, at 3 and at 0.1 of each: {len(failed)} wrong")
+    for line in failed:
+        print(" ", line)
+    sys.exit(bool(failed))
