@@ -102,7 +102,6 @@ def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "would see a stiffness off by" in capsys.readouterr().out
     assert main(["inspect", str(path), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    sees = {v["check"]: v["sees"] for v in shown["run"]["verdicts"]} if "run" in shown else None
-    sees = sees or {v["check"]: v["sees"] for v in shown["verdicts"]}
+    sees = {v["check"]: v["sees"] for v in shown["verdicts"]}
     assert sees["step-defect"]["stiffness"] < 1e-13
     assert sees["start"] == {"stiffness": None, "step": None, "friction": None}

@@ -38,7 +38,8 @@ LARGEST = 2.0**-5
 """Relative change up to which effects are as large as it is small."""
 
 LOOKED_AT = 64
-"""Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
+NUMBERS = 1 << 16
+"""Frames, and of many particles numbers, at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
@@ -68,11 +69,12 @@ def change_of(steps: int) -> float:
     return CHANGE / max(1.0, 2.0 * steps)
 
 
-def rows(count: int, told: NDArray[np.bool_] | None = None) -> Integers:
+def rows(case: Case, count: int, told: NDArray[np.bool_] | None = None) -> Integers:
     """Some of so many rows, or of those that are told, at equal distances, the last among them."""
     chosen = np.arange(count) if told is None else np.flatnonzero(told)
-    if len(chosen) > LOOKED_AT:
-        chosen = chosen[np.linspace(0, len(chosen) - 1, LOOKED_AT).round().astype(int)]
+    most = max(2, min(LOOKED_AT, NUMBERS // case.scene.n))
+    if len(chosen) > most:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(int)]
     return np.asarray(chosen)
 
 
@@ -105,7 +107,7 @@ def of_steps(
     case: Case, told: NDArray[np.bool_], part: Callable[[Integers, States], Reals | np.floating]
 ) -> Limits:
     """The limits of the steps from each frame to the next, of those that are told (f-1,)."""
-    at = rows(len(told), told)
+    at = rows(case, len(told), told)
     change = change_of(case.trajectory.every)
 
     def motion(name: str) -> States | None:
@@ -117,7 +119,7 @@ def of_steps(
 
 def of_exact(case: Case, part: Part) -> Limits:
     """The limits of a check of the exact solution."""
-    at = rows(len(case.steps))
+    at = rows(case, len(case.steps))
     # an anharmonic solution is known to a few roundings of a double at worst
     change = change_of(int(case.steps[-1])) if case.scene.system.is_linear else 2.0**-14
 
@@ -149,7 +151,7 @@ def _ends(case: Case, at: Integers) -> States:
 def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.floating]) -> Limits:
     """The limits of a check of normal modes: `part(rows, right, change)` says how many bounds a change of
     the closed-form motion about the centres is, in mode coordinates (r, n)."""
-    at = rows(len(case.steps))
+    at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
     y, v = case.modes.into(case.scene.q, case.scene.p)
