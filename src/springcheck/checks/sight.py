@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Integers, Reals
+from springcheck.arrays import ROUNDOFF, Extended, Integers, Reals
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
@@ -31,15 +31,17 @@ CHANGE = 2.0**-20
 """Relative change of which the quotients are taken, over the phase of the motion: what is left out of them is
 this fraction."""
 
-ROUNDING = np.longdouble(2.0**-58)
+ROUNDING = np.longdouble(64 * ROUNDOFF)
 """Of a motion in extended precision: a change that is not well above it is not known."""
 
 LARGEST = 2.0**-5
 """Relative change up to which effects are as large as it is small."""
 
 LOOKED_AT = 64
+"""Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
+
 NUMBERS = 1 << 16
-"""Frames, and of many particles numbers, at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
+"""Positions of which it is worked out at most, of very many particles at fewer frames."""
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
