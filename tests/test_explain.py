@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,12 +10,14 @@ import pytest
 from springcheck import checks, engines, explain, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
+from springcheck.identify.meanings import MEANINGS
 from springcheck.physics import scenefile
+from springcheck.studies.faults.table import FAULTS
 
 
 @pytest.mark.parametrize("check", checks.ALL, ids=lambda check: check.name)
 def test_a_check_says_its_sentence_and_what_it_needs(check: checks.Check) -> None:  # type: ignore[type-arg]
-    said = " ".join(explain.lines(check.name))
+    said = " ".join(explain.check_lines(check))
     assert " ".join(check.sentence.split()) in said
     assert check.needs in said
 
@@ -37,6 +40,49 @@ def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:
     for engine in engines.names():
         for method in engines.engine(engine).methods:
             assert next(explain.lines(f"{engine}:{method}")).startswith(f"{engine}:{method}: ")
+
+
+def test_a_check_says_what_it_must_reject_and_what_it_passes() -> None:
+    said = " ".join(explain.lines("shadow-energy"))
+    assert "Must reject, and is held to it: start-momentum of 1e-12, friction of 1e-12" in said
+    missed = said.partition("Does not see")[2]
+    assert "skipped-step" in missed
+    assert "friction" not in missed
+
+
+@pytest.mark.parametrize(
+    ("name", "seen", "missed"),
+    [("stiffness", "step-defect", "energies"), ("single-in-name", "arithmetic", "step-defect")],
+)
+def test_a_fault_says_which_checks_see_it(name: str, seen: str, missed: str) -> None:
+    said = " ".join(explain.lines(name))
+    fault = next(fault for fault in FAULTS if fault.name == name)
+    assert fault.about in said
+    by = re.search(r"Recorded states are rejected by: (.*) and passed by: (.*)", said)
+    assert by
+    assert seen in by[1]
+    assert missed not in by[1]
+    assert missed in by[2]
+    if fault.size is not None:
+        limit = re.search(r"Smallest size that is seen on this spring: (\S+), by", said)
+        assert limit
+        assert 1e-16 < float(limit[1]) < 1e-13
+
+
+@pytest.mark.parametrize("name", MEANINGS)
+def test_a_finding_says_formula_reach_and_limits(name: str) -> None:
+    said = " ".join(explain.meaning_lines(MEANINGS[name]))
+    assert MEANINGS[name].formula in said
+    assert "Does not see: " in said
+
+
+def test_findings_of_identify_have_their_words() -> None:
+    assert {"old-force", "halves-swapped", "exact-behind", "velocity-offset", "not-told-apart"} <= set(
+        MEANINGS
+    )
+    # a word of two meanings has both
+    said = " ".join(explain.lines("determinant"))
+    assert "a check of the map" in said
 
 
 @pytest.mark.parametrize("name", ["rk5", "own:rk5", "nothing:euler", ""])

@@ -17,7 +17,7 @@ HOME = Path(springcheck.__file__).parent
 ROWS = [
     "interrupts", "errors", "slips", "workers", "arrays", "stats", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
-    "doors", "figures", "studies", "inspect", "plot", "page", "explain", "listing", "api", "output",
+    "doors", "figures", "studies", "explain", "inspect", "plot", "page", "listing", "api", "output",
     "commands", "cli", "__main__",
 ]  # fmt: skip
 

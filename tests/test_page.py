@@ -92,7 +92,8 @@ def test_it_asks_for_nothing_and_is_small(content: page.Content) -> None:
     assert len(text.encode()) < 500_000
     for tag, attributes in Tags(text).tags:
         assert tag not in {"link", "img", "iframe", "object", "embed", "base", "form"}
-        assert not {"src", "href", "srcset", "action"} & set(attributes), tag
+        assert not {"src", "srcset", "action"} & set(attributes), tag
+        assert (attributes.get("href") or "#").startswith("#")
     assert re.findall(r"https?://[^\s\"'<]+", text) == ["http://www.w3.org/2000/svg"]
     assert "@import" not in text
     assert set(re.findall(r"url\([^)]*\)", text)) == {"url(#${clip})"}
@@ -107,6 +108,14 @@ def test_tables_have_headers_and_every_verdict_its_reason(spring: Path, content:
     verdicts = store.verdicts(spring)
     assert text.count('class="why"') == len(verdicts) > 0
     assert "equal bit for bit" in text or "differ by at most" in text
+
+
+def test_every_check_is_explained_where_its_name_leads(content: page.Content) -> None:
+    tags = Tags(page.html(content))
+    leads = {attributes["href"] for tag, attributes in tags.tags if tag == "a"}
+    there = {"#" + str(attributes.get("id")) for tag, attributes in tags.tags if tag == "details"}
+    assert leads <= there
+    assert {"#check-" + check for check in ("step-defect", "energies")} <= leads
 
 
 def test_a_failed_verdict_is_open_and_named(content: page.Content) -> None:

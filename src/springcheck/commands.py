@@ -222,8 +222,8 @@ COMMANDS = (
         _argument("scene", metavar="SCENE"),
         _argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
     )),
-    Command("explain", "what a check looks at, what a scheme does", _explain, (
-        _argument("word", metavar="NAME", help="a check, a scheme, or a method as engine:method"),
+    Command("explain", "a check, scheme, fault or finding in words", _explain, (
+        _argument("word", metavar="NAME", help="a check, a scheme, a method as engine:method, a fault, or a finding of identify"),
     ), engines=True),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
         _argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities"),

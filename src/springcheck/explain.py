@@ -1,4 +1,5 @@
-"""`springcheck explain`: a check, a scheme or a method in words, all of them from the objects themselves."""
+"""`springcheck explain`: a check, a scheme, a method, a fault or a finding in words, from the objects
+themselves.  What a check sees of the faults, and from which size, is measured while one waits."""
 
 from __future__ import annotations
 
@@ -7,11 +8,15 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
 from springcheck import checks, engines, schemes
 from springcheck.errors import SpringcheckError, nearest
+from springcheck.identify.meanings import MEANINGS, Meaning
 from springcheck.schemes import SCHEMES, Scheme
+from springcheck.studies.faults.seeded import Fault
+from springcheck.studies.faults.table import FAULTS
 
 WIDTH = 100
 """Columns of a line."""
@@ -30,25 +35,47 @@ STAGES = {
 
 
 def lines(name: str) -> Iterator[str]:
-    """What a name stands for.  SpringcheckError where it stands for nothing."""
-    known = {check.name: check for check in checks.ALL}
-    if name in known:
-        return _check(known[name])
-    if ":" in name:
-        return _method(name)
-    if name not in SCHEMES:
+    """What a name stands for, all of it.  SpringcheckError where it stands for nothing."""
+    found = [part for part in (_checks(name), _schemes(name), _faults(name), _findings(name)) if part]
+    if not found:
         methods = [
             f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
         ]
-        near = nearest(name, (*known, *SCHEMES, *methods))
+        faults = [fault.name for fault in FAULTS]
+        near = nearest(name, (*_CHECKS, *SCHEMES, *methods, *faults, *MEANINGS))
         raise SpringcheckError(
-            f"{name!r} is no check, no scheme and no method{near}; "
-            f"`springcheck list` names checks and methods, schemes are {', '.join(SCHEMES)}"
+            f"{name!r} is no check, scheme, method, fault or finding{near}; `springcheck list` names checks "
+            f"and methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; "
+            f"schemes are {', '.join(SCHEMES)}"
         )
-    return scheme_lines(SCHEMES[name])
+    return chain(found[0], *(chain([""], part) for part in found[1:]))
 
 
-def _check(check: Any) -> Iterator[str]:
+_CHECKS = {check.name: check for check in checks.ALL}
+
+
+def _checks(name: str) -> Iterator[str] | None:
+    check = _CHECKS.get(name)
+    return chain(check_lines(check), _seen(check)) if check else None
+
+
+def _schemes(name: str) -> Iterator[str] | None:
+    if ":" in name:
+        return _method(name)
+    return scheme_lines(SCHEMES[name]) if name in SCHEMES else None
+
+
+def _findings(name: str) -> Iterator[str] | None:
+    return meaning_lines(MEANINGS[name]) if name in MEANINGS else None
+
+
+def _faults(name: str) -> Iterator[str] | None:
+    fault = next((fault for fault in FAULTS if fault.name == name), None)
+    return _fault(fault) if fault else None
+
+
+def check_lines(check: Any) -> Iterator[str]:
+    """What holds where a check passes, how, and for what it applies; what it must reject."""
     yield f"{check.name}, a check of the {check.family}"
     first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n")
     yield from _folded(first)
@@ -57,6 +84,53 @@ def _check(check: Any) -> Iterator[str]:
         yield from rest.strip("\n").splitlines()
     yield ""
     yield from _folded(f"Applies to: {check.needs}")
+    held = [fault for fault in FAULTS if check.name in fault.caught_by]
+    if held:
+        names = (fault.name + ("" if fault.size is None else f" of {fault.size:.0e}") for fault in held)
+        yield from _folded(f"Must reject, and is held to it: {', '.join(names)}")
+
+
+def _seen(check: Any) -> Iterator[str]:
+    """The faults that a check of recorded states passes, measured now."""
+    from springcheck.studies.faults import measure
+
+    if check.name not in measure.RECORDED:
+        return
+    passed = [fault.name for fault in FAULTS if measure.Probe(fault).passed(check.name, fault.size)]
+    if passed:
+        yield from _folded(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
+
+
+def _fault(fault: Fault) -> Iterator[str]:
+    from springcheck.studies.faults import measure
+
+    yield f"{fault.name}: {fault.about}"
+    yield from _folded(
+        f"A fault: {fault.scheme} on a {fault.scene}, broken on purpose"
+        + ("" if fault.size is None else f"; its size in the table is {fault.size:.0e}")
+    )
+    probe = measure.Probe(fault)
+    verdicts = {name: probe.passed(name, fault.size) for name in measure.RECORDED}
+    yield from _folded(f"Must be rejected by: {', '.join(fault.caught_by)}")
+    seen = [name for name, passed in verdicts.items() if passed is False]
+    yield from _folded(f"Recorded states are rejected by: {', '.join(seen) or 'none'}")
+    passing = [name for name, passed in verdicts.items() if passed]
+    yield from _folded(f"and passed by: {', '.join(passing) or 'none'}")
+    if fault.size is not None and seen:
+        limits = {name: limit for name in seen if (limit := probe.limit(name)) is not None}
+        if limits:
+            name = min(limits, key=lambda one: limits[one])
+            yield f"Smallest size that is seen on this {fault.scene}: {limits[name]:.1e}, by {name}"
+
+
+def meaning_lines(meaning: Meaning) -> Iterator[str]:
+    """A finding of `springcheck identify`."""
+    yield from _folded(f"{meaning.name}, a finding of identify: {meaning.title}")
+    yield f"  {meaning.formula}"
+    yield from _folded(f"Sees: {meaning.sees}")
+    yield from _folded(f"Does not see: {meaning.misses}")
+    if meaning.source:
+        yield from _folded(f"Source: {meaning.source}")
 
 
 def _method(name: str) -> Iterator[str]:
@@ -102,4 +176,4 @@ def _sum(row: Sequence[Fraction]) -> str:
 
 
 def _folded(text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH)
+    return textwrap.wrap(text, WIDTH, break_on_hyphens=False)

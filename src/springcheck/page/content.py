@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import compare, schemes, store
+from springcheck import checks, compare, explain, schemes, store
 from springcheck.compare import EXACT, Same
 from springcheck.errors import SpringcheckError
 from springcheck.page.sections import Section, sections
@@ -58,6 +58,8 @@ class Content:
     summary: Summary
     not_trusted: tuple[Finding, ...]
     methods: tuple[Passed, ...]
+    explained: Mapping[str, tuple[str, ...]]
+    """Of the checks among the verdicts: what each looks at, in lines."""
     same: tuple[Same, ...] | None
     """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
     comparison: Comparison | None
@@ -99,6 +101,11 @@ def gather(path: Path) -> Content:
         summary=summary,
         not_trusted=tuple(store.doubts(path)),
         methods=tuple(_methods(summary, verdicts)),
+        explained={
+            check.name: tuple(explain.check_lines(check))
+            for check in checks.ALL
+            if any(verdict.check == check.name for verdict in verdicts)
+        },
         same=_same(path, scene, comparison) if scene else None,
         comparison=comparison,
         sha256=_digest(path) if path.is_file() else "",

@@ -200,3 +200,9 @@ motion();
 selfCheck();
 live();
 banks();
+
+// a link to what is folded opens it
+addEventListener("hashchange", () => {
+  const there = document.getElementById(location.hash.slice(1));
+  if (there && there.tagName === "DETAILS") there.open = true;
+});

@@ -57,7 +57,7 @@ HALVINGS = 4
 """Of a decade: limits are known to a factor 10**(1/16) = 1.15."""
 
 
-class _Probe:
+class Probe:
     """One fault on its scene, judged at any size; what is computed once is kept."""
 
     def __init__(self, fault: Fault) -> None:
@@ -69,7 +69,7 @@ class _Probe:
 
     def passed(self, check: str, size: float | None) -> bool | None:
         """Whether the fault of this size passes a check; None where that does not apply."""
-        if check in _RECORDED:
+        if check in RECORDED:
             if size not in self._recorded:
                 run = self._fault.run(self._scene, size=size)
                 self._recorded[size] = {v.check: v.passed for v in checks.judge(self._scene, run)}
@@ -108,14 +108,14 @@ class _Probe:
         return high
 
 
-_RECORDED = {check.name: check for check in checks.CHECKS}
+RECORDED = {check.name: check for check in checks.CHECKS}
 _EXPERIMENTS: dict[str, Experiment] = {check.name: check for check in checks.THOROUGH}
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:
     """What the checks say of a fault at its size in the table, and down to which size they see it."""
-    probe = _Probe(fault)
-    names = (*_RECORDED, *_EXPERIMENTS)
+    probe = Probe(fault)
+    names = (*RECORDED, *_EXPERIMENTS)
     rejected = tuple(name for name in names if probe.passed(name, fault.size) is False)
     found: dict[str, float] = {}
     if limits and fault.size is not None:
