@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from springcheck.identify.families import FAULTS, FORMULAS
+from springcheck.identify.families import FAULTS
 
 GEOMETRIC = "Hairer, Lubich & Wanner, Geometric Numerical Integration (2006)"
 
@@ -85,7 +85,7 @@ _FAULTS = tuple(
         misses=f"other mistakes of the same map.  What to do: {one.remedy}",
     )
     for one in FAULTS
-    if one.formula in FORMULAS
+    if one.formula
 )
 
 MEANINGS = {one.name: one for one in (*_KNOWN, *_FAULTS)}
