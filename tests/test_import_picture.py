@@ -95,7 +95,7 @@ FOREIGN = {"openmm", "ase", "sksundae", "numba", "matplotlib", "scipy"}
         ("import springcheck.cli", FOREIGN | {"h5py", "numpy", "rich", "msgspec", "jinja2"}),
         ("from springcheck.cli import main; main(['list'])", FOREIGN | {"h5py", "rich", "jinja2"}),
         ("from springcheck.cli import main; main(['show', 'spring'])", FOREIGN | {"h5py", "rich", "jinja2"}),
-        ("from springcheck.cli import main; main(['explain', 'step'])", FOREIGN | {"h5py", "rich", "jinja2"}),
+        ("from springcheck.cli import main; main(['explain', 'rk4'])", FOREIGN | {"h5py", "rich", "jinja2"}),
         ("import springcheck; springcheck.simulate(springcheck.load_scene('spring'), 'own:euler')", FOREIGN),
     ],
 )

@@ -9,14 +9,16 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from springcheck import checks, engines, schemes
 from springcheck.errors import SpringcheckError, nearest
-from springcheck.identify.meanings import MEANINGS, Meaning
 from springcheck.schemes import SCHEMES, Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
+
+if TYPE_CHECKING:
+    from springcheck.identify.meanings import Meaning
 
 WIDTH = 100
 """Columns of a line."""
@@ -36,19 +38,25 @@ STAGES = {
 
 def lines(name: str) -> Iterator[str]:
     """What a name stands for, all of it.  SpringcheckError where it stands for nothing."""
-    found = [part for part in (_checks(name), _schemes(name), _faults(name), _findings(name)) if part]
-    if not found:
-        methods = [
-            f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
-        ]
-        faults = [fault.name for fault in FAULTS]
-        near = nearest(name, (*_CHECKS, *SCHEMES, *methods, *faults, *MEANINGS))
-        raise SpringcheckError(
-            f"{name!r} is no check, scheme, method, fault or finding{near}; `springcheck list` names checks "
-            f"and methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; "
-            f"schemes are {', '.join(SCHEMES)}"
-        )
-    return chain(found[0], *(chain([""], part) for part in found[1:]))
+    found = _checks(name) or _schemes(name)
+    if found:
+        return found
+    # heavier to import, and rarely asked for
+    from springcheck.identify.meanings import MEANINGS
+
+    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
+    parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
+    if parts:
+        return chain(parts[0], *(chain([""], part) for part in parts[1:]))
+    methods = [
+        f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
+    ]
+    near = nearest(name, (*_CHECKS, *SCHEMES, *methods, *(fault.name for fault in FAULTS), *MEANINGS))
+    raise SpringcheckError(
+        f"{name!r} is no check, scheme, method, fault or finding{near}; `springcheck list` names checks and "
+        f"methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; schemes are "
+        f"{', '.join(SCHEMES)}"
+    )
 
 
 _CHECKS = {check.name: check for check in checks.ALL}
@@ -63,15 +71,6 @@ def _schemes(name: str) -> Iterator[str] | None:
     if ":" in name:
         return _method(name)
     return scheme_lines(SCHEMES[name]) if name in SCHEMES else None
-
-
-def _findings(name: str) -> Iterator[str] | None:
-    return meaning_lines(MEANINGS[name]) if name in MEANINGS else None
-
-
-def _faults(name: str) -> Iterator[str] | None:
-    fault = next((fault for fault in FAULTS if fault.name == name), None)
-    return _fault(fault) if fault else None
 
 
 def check_lines(check: Any) -> Iterator[str]:
