@@ -223,7 +223,7 @@ COMMANDS = (
         _argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
     )),
     Command("explain", "a check, scheme, fault or finding in words", _explain, (
-        _argument("word", metavar="NAME", help="a check, a scheme, a method as engine:method, a fault, or a finding of identify"),
+        _argument("word", metavar="NAME", help="a check, scheme, engine:method, fault or finding"),
     ), engines=True),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
         _argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities"),
