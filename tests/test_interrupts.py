@@ -219,6 +219,31 @@ def test_an_interrupt_waits_where_files_must_not_be_left_half_done() -> None:
     assert signalled(body, signal.SIGTERM) == (130, "done\n", "springcheck: interrupted\n")
 
 
+COMMITTED = """from springcheck import store
+    from springcheck.physics import scenefile
+    from springcheck.store import adopt
+    import os, signal
+    settled = adopt.settled
+    def once(folder):
+        os.kill(os.getpid(), signal.SIGINT)
+        settled(folder)
+    adopt.settled = once
+    journal = store.open_new("s.h5", "run")
+    journal.commit(scenefile.load_scene("spring"))"""
+
+
+@posix
+def test_a_commit_that_has_replaced_the_store_takes_its_journal_away(tmp_path: Path) -> None:
+    """An interrupt between the two would leave a complete store beside a journal that says it is not."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(body=COMMITTED)],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["s.h5"]
+    assert store.summary(tmp_path / "s.h5").complete
+
+
 @posix
 def test_a_signal_that_the_shell_has_ignored_stays_ignored() -> None:
     body = READY + "time.sleep(0.2)"

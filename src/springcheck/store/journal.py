@@ -21,6 +21,7 @@ from urllib.parse import quote, unquote
 
 import h5py
 
+from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning
 from springcheck.physics.scene import Scene
 from springcheck.store import adopt, files, layout, merge, reading, records, seal, tables
@@ -249,12 +250,14 @@ class Journal:
             except BaseException:
                 _give_up(temporary, self.run)
                 raise
-            files.put(temporary, self.path)
-            adopt.settled(self.folder)
-            for part in found.parts:
-                part.unlink(missing_ok=True)
-            if final:
-                self._end()
+            # whole once begun, in milliseconds: no interrupt leaves a complete store beside its journal
+            with interrupts.held():
+                files.put(temporary, self.path)
+                adopt.settled(self.folder)
+                for part in found.parts:
+                    part.unlink(missing_ok=True)
+                if final:
+                    self._end()
 
     def _end(self) -> None:
         """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
@@ -270,7 +273,7 @@ class Journal:
     def close(self) -> None:
         """Give the lock back; what is finished stays for the next one."""
         if self.folder.is_dir():
-            with contextlib.suppress(OSError):
+            with interrupts.held(), contextlib.suppress(OSError):
                 empty = {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}
                 # after a checkpoint the collection holds what is finished, and the journal is how it is known
                 if empty and Parts.of(self.path, self.run).collection is None:
