@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, cli, engines, interrupts, simulate, store, workers
+from springcheck import checks, cli, engines, interrupts, listing, simulate, store, workers
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -137,10 +137,10 @@ def test_an_error_after_the_interrupt_is_the_interrupt(
 ) -> None:
     """As where NumPy turns an interrupted import into an ImportError, or HDF5 into a RuntimeError."""
 
-    def fails(_: object) -> int:
+    def fails() -> None:
         raise SpringcheckError("cannot be imported")
 
-    monkeypatch.setattr(cli, "_list", fails)
+    monkeypatch.setattr(listing, "listing", fails)
     assert cli.main(["list"]) == 2
     monkeypatch.setattr(interrupts._State, "seen", True)
     assert cli.main(["list"]) == interrupts.STATUS
