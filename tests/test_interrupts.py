@@ -219,6 +219,27 @@ def test_an_interrupt_waits_where_files_must_not_be_left_half_done() -> None:
     assert signalled(body, signal.SIGTERM) == (130, "done\n", "springcheck: interrupted\n")
 
 
+CAUGHT = """
+import os, signal, sys, time
+from springcheck import __main__, listing
+def deaf():
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+listing.listing = deaf
+sys.argv[1:] = ["list"]
+sys.exit(__main__.main())
+"""
+
+
+@posix
+def test_the_one_line_is_said_where_a_library_s_messages_are_still_caught() -> None:
+    """The signal may come between the catching of standard error and the place that gives it back."""
+    done = subprocess.run([sys.executable, "-c", CAUGHT], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "springcheck: interrupted; nothing is kept\n"
+
+
 COMMITTED = """from springcheck import store
     from springcheck.physics import scenefile
     from springcheck.store import adopt

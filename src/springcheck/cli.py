@@ -94,8 +94,7 @@ def _readable(options: argparse.Namespace) -> Iterator[None]:
 
 def _interrupted(what: str) -> int:
     """Say what Ctrl-C has left; returns the exit status."""
-    print(f"springcheck: interrupted; {what}", file=sys.stderr)
-    interrupts.announce("")
+    interrupts.say(f"interrupted; {what}")
     return INTERRUPTED
 
 

@@ -32,7 +32,8 @@ class _State:
     held = 0
     message = "interrupted"
     errors = 2
-    """Standard error as it was: a library's messages may be caught while the signal comes."""
+    """Standard error as it was: a library's messages may be caught while the signal comes; 2 until `install`
+    keeps another."""
 
 
 def install() -> None:
@@ -68,6 +69,12 @@ def seen() -> bool:
 def announce(message: str) -> None:
     """What is said of an interrupt from here on, in one line; nothing once it has been said."""
     _State.message = message
+
+
+def say(message: str) -> None:
+    """Say once what an interrupt has left, where standard error was before a library's was caught."""
+    _State.message = message
+    _say()
 
 
 def finish() -> None:
@@ -118,12 +125,16 @@ def _watch(wakeup: int) -> None:
 
 
 def _say() -> None:
-    if not _State.message:
+    message, _State.message = _State.message, ""
+    if not message:
+        return
+    if _State.errors == 2:
+        sys.stderr.write(f"springcheck: {message}\n")
         return
     # a progress bar may have hidden the cursor
     shown = "\x1b[?25h" if os.isatty(_State.errors) else ""
     try:
-        os.write(_State.errors, f"{shown}springcheck: {_State.message}\n".encode(errors="backslashreplace"))
+        os.write(_State.errors, f"{shown}springcheck: {message}\n".encode(errors="backslashreplace"))
     except OSError:
         return
 
