@@ -14,7 +14,7 @@ from springcheck.physics.scene import Scene
 from springcheck.trajectory import Comparison, Trajectory
 
 EXACT = "exact"
-"""The label of the true motion among the others."""
+"""The label of the exact solution among the others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ class Same:
 
 
 def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
-    """Compare trajectories, or pieces of them over the same frames, with each other and the true motion."""
+    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one."""
     norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
     longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)

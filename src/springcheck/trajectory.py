@@ -115,7 +115,7 @@ def _library(name: str) -> Any:
 class Comparison:
     """Largest difference of each pair of trajectories over all frames, (l, l), symmetric.
 
-    In units of the start (`Norm`); NaN where one of the two runs did not complete.
+    Relative to the initial energy norm (`Norm`); NaN where one of the two runs did not complete.
     """
 
     labels: tuple[str, ...]

@@ -56,10 +56,10 @@ def order(bench: Bench) -> Verdict:
     return _order(bench, "order", SPRING, "spring")
 
 
-@check("order, well", family="law", needs="a fixed step and quartic wells")
+@check("order, well", family="law", needs="a fixed step and quartic potentials")
 def order_anharmonic(bench: Bench) -> Verdict:
-    """In a quartic well, where order cannot lie, the error falls with the scheme's power of the step."""
-    return _order(bench, "order-anharmonic", WELL, "quartic well")
+    """In a quartic potential, where order cannot lie, the error falls with the scheme's power of the step."""
+    return _order(bench, "order-anharmonic", WELL, "quartic potential")
 
 
 def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:

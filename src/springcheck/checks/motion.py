@@ -233,7 +233,7 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
 def momentum(case: Case) -> Verdict:
     """Nothing outside pulls, so the total momentum stays."""
     if any(term.bodies == 1 for term in case.scene.terms):
-        return case.not_applicable("momentum", "walls or wells take up momentum")
+        return case.not_applicable("momentum", "walls and fixed potentials take up momentum")
     if not case.scheme.one_step:
         return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
     run = case.trajectory

@@ -22,10 +22,10 @@ def tolerance(case: Case) -> Verdict:
     if case.scheme.one_step or run.tolerance is None:
         return case.not_applicable("tolerance", "a method of fixed step has no tolerance")
     if not exact.has_true_motion(case.scene):
-        return case.not_applicable("tolerance", "the true motion of this scene has no closed form")
+        return case.not_applicable("tolerance", "the exact solution of this scene has no closed form")
     q, p = exact.true_motion(case.scene, case.steps, run.step)
     value = float(np.max(case.norm(run.q - q, run.p - p)))
-    # sizes of the true motion: those of one that explodes would excuse it
+    # sizes of the exact solution: those of one that explodes would excuse it
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
     bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
@@ -36,7 +36,7 @@ def tolerance(case: Case) -> Verdict:
         "tolerance",
         value,
         bound,
-        "of the start",
+        "initial energy norms",
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
         f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times",
         sight.of_exact(case, lambda change: case.norm(*change) / bound),
@@ -44,7 +44,7 @@ def tolerance(case: Case) -> Verdict:
 
 
 def tolerance_bound(case: Case) -> float:
-    """What an adaptive solver's errors may add up to, in units of the start.
+    """What an adaptive solver's errors may add up to, relative to the initial energy norm.
 
     CVODE and IDA keep the weighted root mean square of the 2n local errors below 1, each weighed by the
     tolerance times its size and its amplitude; all of it may lie in the component that counts most.  The
@@ -180,7 +180,7 @@ def _stiff(case: Case) -> Extended:
 
 
 def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
-    """The largest local error at states (f, n) that passes, in tolerances and in units of the start."""
+    """The largest local error at states (f, n) that passes, in tolerances times the initial energy norm."""
     scene = case.judged
     # extended: the squares of large states leave the range of a double
     of_q, of_p = (x.astype(np.longdouble) for x in scene.system.amplitudes)

@@ -48,7 +48,7 @@ def closed_or_not(case: Case) -> str | None:
         return "a mode under a constant pull has no closed form here"
     determinant = schemes.rotation(case.matrices).determinant
     if np.any(determinant <= 0):
-        return "the step turns area over: it has no phase"
+        return "the step reverses orientation (det <= 0): it has no phase"
     if np.any(determinant < CONTRACTED):
         return "friction contracts area more in one step than the reference has digits for"
     return None

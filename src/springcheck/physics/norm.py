@@ -1,4 +1,4 @@
-"""The size of an error: the square root of an energy, in units of the start's."""
+"""The size of an error: the square root of an energy, relative to that of the start."""
 
 from __future__ import annotations
 

@@ -264,7 +264,7 @@ class System:
 
     @cached_property
     def rigidity(self) -> Floats:
-        """The same from the terms' rigidities at rest alone (n,) [M/T2]."""
+        """The same from the terms' absolute curvature at rest alone (n,) [M/T2]."""
         out = np.zeros(self.n)
         for term in self.terms:
             term.scatter(term.rigidity * term.bodies, out)

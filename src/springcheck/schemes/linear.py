@@ -103,7 +103,7 @@ class Rotation:
 def rotation(matrices: Extended) -> Rotation:
     """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2).
 
-    Where the determinant is not positive a step turns area over and has neither.
+    Where the determinant is not positive a step reverses orientation and has neither.
     """
     a, b = matrices[:, 0, 0], matrices[:, 0, 1]
     c, d = matrices[:, 1, 0], matrices[:, 1, 1]
@@ -114,7 +114,7 @@ def rotation(matrices: Extended) -> Rotation:
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    # where area is turned over (determinant <= 0) there is no such growth
+    # a step that reverses orientation (determinant <= 0) has no such growth
     hyperbolic = (minus < 0) & (determinant > 0)
     growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
     return Rotation(
@@ -147,7 +147,7 @@ def propagate(
     j = np.asarray(steps).astype(np.longdouble)[:, None]
     d = np.ones_like(turn.determinant) if area_preserving else turn.determinant
     if np.any(d <= 0):
-        raise ValueError("a step that turns area over has no phase")
+        raise ValueError("a step that reverses orientation (det <= 0) has no phase")
     sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
     x, g = turn.angle, turn.growth
     one = np.ones_like(x)
@@ -205,8 +205,8 @@ def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Flo
     half = (matrices[:, 0, 0] + matrices[:, 1, 1]) / 2
     split = np.sqrt(np.maximum(half * half - turn.determinant, 0))
     larger = half + np.where(half < 0, -split, split)
-    # where area turns over or vanishes the eigenvalues are real and of unlike sign: powers are bounded by
-    # the larger one, x**i (1 + 2 |M - x| / |x - y|), instead of by the root of the determinant
+    # where orientation is reversed (det <= 0) the eigenvalues are real and of unlike sign: powers are bounded
+    # by the larger one, x**i (1 + 2 |M - x| / |x - y|), instead of by the root of the determinant
     over = turn.determinant <= 0
     root = np.where(over, np.abs(larger), np.sqrt(np.abs(turn.determinant)))
     root = np.where(root > 0, root, 1)

@@ -210,7 +210,7 @@ def of_comparison(comparison: Comparison) -> Table:
         name="comparison",
         columns={"labels": list(comparison.labels), "max_difference": comparison.max_difference},
         units={"max_difference": "1"},
-        attributes={"about": "largest difference over all frames, in units of the start"},
+        attributes={"about": "largest difference over all frames, relative to the initial energy norm"},
         signal="max_difference",
         log=("max_difference",),
     )

@@ -1,4 +1,4 @@
-"""The exact motion of linear scenes: without friction circular functions for w2 > 0, hyperbolic ones for
+"""The exact solution of linear scenes: without friction circular functions for w2 > 0, hyperbolic ones for
 w2 < 0, a parabola for w2 = 0; with friction the same, decaying.
 """
 

@@ -53,7 +53,7 @@ def solve(label: Label, spec: Spec) -> Cell:
 
 
 def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]:
-    """Global error at the end and its bound, both in units of the start, and why there are none."""
+    """Global error at the end and its bound, over the initial energy norm, and why there are none."""
     q, p = np.stack([scene.q, done.q]), np.stack([scene.p, done.p])
     if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.system.rigidity)):
         # nothing moves, and nothing may

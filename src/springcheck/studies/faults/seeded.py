@@ -381,7 +381,7 @@ def claims_single(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajecto
 
 
 def adaptive(error: Callable[[float, float], float]) -> Make:
-    """The true motion, too slow by `error(tolerance, size)` of its time."""
+    """The exact solution, too slow by `error(tolerance, size)` of its time."""
 
     def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
         steps = np.arange(scene.frames) * scene.every

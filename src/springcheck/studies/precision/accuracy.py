@@ -1,4 +1,4 @@
-"""How far a run is from the true motion, taken as it streams by: nothing of it is kept but a few numbers.
+"""How far a run is from the exact solution, taken as it streams by: nothing of it is kept but a few numbers.
 
 Error, phase and energy are three answers.  A symplectic method keeps its energy while its phase runs
 away (Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so none of them stands for another.
@@ -25,7 +25,7 @@ CARRIES = 1e-3
 hardly moves, the rounding of the others is a large angle."""
 
 FRAMES = 4096
-"""Most frames at which a run is compared with the true motion.  They stand closer than a 250th of a
+"""Most frames at which a run is compared with the exact solution.  They stand closer than a 250th of a
 period as long as the run has fewer than 16, and every finer step meets the same instants."""
 
 
@@ -33,7 +33,7 @@ period as long as the run has fewer than 16, and every finer step meets the same
 class Accuracy:
     """Errors of one run, over its whole trajectory unless it says otherwise.
 
-    `largest` and `end` are in the energy norm (`System.norm`), in units of the start; `phase` is the
+    `largest` and `end` are relative to the initial energy norm (`System.norm`); `phase` is the
     angle [rad] that a mode is ahead (> 0) or behind where that is largest, None where nothing turns;
     `energy` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
     `rounding` is the largest distance from the scheme's own motion in exact arithmetic, None where that
@@ -49,7 +49,7 @@ class Accuracy:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truth:
-    """The true motion of a scene, and what is worth computing once for all runs of it."""
+    """The exact solution of a scene, and what is worth computing once for all runs of it."""
 
     scene: Scene
     norm: Norm
@@ -72,15 +72,15 @@ class Truth:
 
 
 def truth(scene: Scene) -> Truth:
-    """Prepare the true motion of a scene.
+    """Prepare the exact solution of a scene.
 
     Raises:
         SceneError: no closed form of it is known, or the scene rests, so that errors have no unit.
     """
     if not exact.has_true_motion(scene):
         raise SceneError(
-            f"scene {scene.name}: its true motion is not known, so errors cannot be measured; "
-            "a study of precision needs springs, or stiffening wells without couplings"
+            f"scene {scene.name}: no closed form of its exact solution is known, so errors "
+            "cannot be measured; a study of precision needs springs, or quartic potentials without couplings"
         )
     norm = scene.system.norm
     if not norm.unit > 0:
@@ -168,7 +168,7 @@ class Errors:
         )
 
     def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
-        """Mode coordinates in which the true motion turns clockwise on circles, (f, n) each."""
+        """Mode coordinates in which the exact solution turns clockwise on circles, (f, n) each."""
         modes = self._truth.turning
         y, v = modes.into(q, p)
         return np.sqrt(np.abs(modes.w2)) * (y - modes.centre()), v

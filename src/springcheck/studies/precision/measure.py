@@ -2,7 +2,7 @@
 
 Every method of fixed step takes the same duration T in N steps of the double h = T/N, N doubling from the
 edge of stability until the error turns up again on its rounding, or the time budget ends.  An adaptive
-solver's tolerance falls instead.  What is compared with the true motion and what is timed are separate
+solver's tolerance falls instead.  What is compared with the exact solution and what is timed are separate
 runs.  Timed runs record nothing; methods take turns, so that a machine that slows down slows all alike.
 
 The design follows the work-precision diagrams of DiffEqDevTools (SciML): one warm-up, the minimum of the
@@ -75,7 +75,7 @@ def study(
     for the budget.
 
     Raises:
-        SceneError: the true motion of the scene is not known, or nothing moves in it.
+        SceneError: the exact solution of the scene is not known, or nothing moves in it.
     """
     known = truth(scene)
     sweeps = [begin(scene, label, known) for label in labels]

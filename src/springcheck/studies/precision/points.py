@@ -119,7 +119,7 @@ POINTS: Rows[Point] = Rows(
     signal="max_error",
     axes=("run_seconds",),
     log=("run_seconds", "max_error"),
-    about="error against run time; errors in units of the start; -1 and NaN: not known",
+    about="error against run time; errors relative to the initial energy norm; -1 and NaN: not known",
     extra=_run_seconds,
 )
 """A table for each method, its points from coarse to fine; the attribute `study_seconds`: what the study

@@ -41,7 +41,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
         out += [plain(f"  {point.method} at {_where(point)}: {point.said}") for point in rest]
     out += [
         plain(),
-        plain("The cheapest way to an error (largest, of the start):"),
+        plain("The cheapest way to an error (largest, relative to the initial energy norm):"),
         _cheapest(study.cheapest),
     ]
     if getattr(options, "points", False):

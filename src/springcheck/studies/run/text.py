@@ -35,14 +35,18 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
         if verdicts:
             out.append(verdicts_table(found.verdicts))
     if found.comparison is not None:
-        out += [plain(), plain("Largest differences, in units of the start:"), _comparison(found.comparison)]
+        out += [plain(), plain("Largest differences, relative to the initial energy norm:")]
+        out.append(_comparison(found.comparison))
     return out
 
 
 def _report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [_headline(report), plain(), _runs(report.runs)]
-    out.append(plain("error: farthest from the true motion; energy: (H - H0)/|H0| where largest", "dim"))
+    out += [
+        plain("error: largest distance from the exact solution, relative to the initial energy norm", "dim"),
+        plain("energy: (H - H0)/|H0| where it is largest", "dim"),
+    ]
     out += [
         plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
         for run in report.runs
@@ -103,9 +107,9 @@ def _same_motions(report: Report) -> Lines:
         return []
     out: Lines = [plain(), plain("The same motion, to rounding or tolerance:")]
     for same in report.same:
-        names = " = ".join("true motion" if label == "exact" else label for label in same.labels)
+        names = " = ".join("exact solution" if label == "exact" else label for label in same.labels)
         out.append(plain(f"  {names}"))
-        far = f"differ by at most {same.difference:.1e} of the start ({same.allowed:.1e} allowed)"
+        far = f"differ by at most {same.difference:.1e} (rounding or tolerance allow {same.allowed:.1e})"
         out.append(plain(f"    {far if same.difference else 'equal bit for bit'}"))
     return out
 
@@ -219,9 +223,7 @@ def _repeat(one: Repeat) -> Text:
     why = f"; {', '.join(one.changed)}" if one.changed else ""
     if one.as_written:
         why = "; equal bit for bit to what was written: the store was changed since"
-    return plain(
-        f"{one.method}: NOT equal, differs by up to {one.difference:.1e} of the start{why}", "bold red"
-    )
+    return plain(f"{one.method}: NOT equal, differs by up to {one.difference:.1e}{why}", "bold red")
 
 
 def _next(report: Report) -> Text:

@@ -162,7 +162,7 @@ def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
     true = modes.into(*exact.true_motion(found, np.array([steps]), found.step))
     here = modes.into(np.asarray(q), np.asarray(p))
     y, v = (here[i][j] - true[i][0, j] for i in range(2))
-    # the mass in honey has its slow motion in q alone: its momentum is slaved to it
+    # the slow motion of an overdamped mass is in q alone: its momentum follows from it
     if found.system.is_damped:
         return float(abs(y) / np.max(np.abs(modes.into(found.q, found.p)[0])))
     start = modes.into(found.q, found.p)
