@@ -407,8 +407,36 @@ def test_no_point_of_the_front_is_beaten_and_every_other_is() -> None:
 def test_the_cheapest_way_is_the_fastest_that_is_good_enough() -> None:
     points = made_up([1e-1, 1e-3, 1e-5, 1e-5], seconds=[1.0, 5.0, 3.0, 2.0])
     assert fits.cheapest(points, 1e-1) is points[0]
-    assert fits.cheapest(points, 1e-2) is points[3]
+    assert fits.cheapest(points, 1e-4) is points[3]
     assert fits.cheapest(points, 1e-6) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "least"), [("own:semi-implicit-euler", 1e-2, 998), ("openmm:verlet", 1e-4, 1886)]
+)
+def test_the_least_number_of_steps_between_two_points_is_the_one_that_a_search_finds(
+    name: str, target: float, least: int, need: Callable[[str], None]
+) -> None:
+    label = engines.parse(name)
+    need(name)
+    scene = scenes.load_scene("spring")
+    known = accuracy.truth(scene)
+
+    def measured(steps: int) -> Point:
+        one = replace(scene, step=known.duration / steps, steps=steps, every=1, quantities=("q", "p"))
+        errors = accuracy.Errors(known, one.step, 1, scheme=SCHEMES[engines.method(label).scheme])
+        run = simulate.play(one, label, errors)
+        return Point(
+            method=name, step=one.step, tolerance=None, steps=steps, outcome="complete",
+            accuracy=errors.result, force_calls=run.force_calls, run_repeats=(1e-8 * steps,),
+        )  # fmt: skip
+
+    coarse = 704 if target == 1e-2 else 1408
+    found = fits.cheapest([measured(coarse), measured(2 * coarse)], target)
+    assert found is not None
+    assert (found.steps, found.force_calls) == (least, least)
+    assert found.message == f"between {coarse} and {2 * coarse} steps"
+    assert measured(least).error <= target < measured(least - 1).error
 
 
 def test_a_scene_whose_coarsest_run_would_never_end_is_told(tmp_path: Path) -> None:

@@ -27,8 +27,8 @@ its standard error):
     openmm:euler               1.0021(5e-04)   1.0015(4e-04)   - (fewer than four points below 2e-2)
     openmm:semi-implicit-euler 0.9999(2e-05)   1.0001(2e-05)   0.9963(9e-04)
 
-    cheapest for an error of 1e-2    own:semi-implicit-euler, 1408 force calls, 12 us    (spring)
-                             1e-4    openmm:verlet, 2816 force calls, 0.36 ms
+    cheapest for an error of 1e-2    own:semi-implicit-euler, 998 force calls, 8.5 us    (spring)
+                             1e-4    openmm:verlet, 1886 force calls, 0.24 ms
                              1e-6    sundials:adams at 1e-10, 292 force calls, 1.1 ms
                              1e-12   sundials:adams at 1e-15, 447 force calls, 1.7 ms
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.engines.contract import Arithmetic, Method
 from springcheck.stats import line
+from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import Point
 
 ASYMPTOTIC = 2e-2
@@ -157,6 +159,39 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
-    """The fastest point whose error is within the target, or None."""
-    reaching = [point for point in points if point.error <= target and not np.isnan(point.seconds)]
+    """The fastest way to an error within the target, or None.
+
+    Where a sweep passes the target from one number of steps to the next, it is the least number in between,
+    by a power law through both points (see `_between`); elsewhere a point as it was measured.
+    """
+    timed = [point for point in points if not np.isnan(point.seconds)]
+    reaching = [point for point in timed if point.error <= target]
+    for before, after in pairwise(timed):
+        if before.method == after.method and before.error > target >= after.error:
+            reaching.append(_between(before, after, target))
     return min(reaching, key=lambda point: point.seconds) if reaching else None
+
+
+def _between(before: Point, after: Point, target: float) -> Point:
+    """The point at the least number of steps whose error is within the target, by log error over log steps.
+
+    What grows with the steps is interpolated alike; `after` itself where nothing does (adaptive solvers).
+    """
+    if not (before.steps and after.steps and before.force_calls and after.force_calls and after.accuracy):
+        return after
+    if not (before.steps < after.steps and before.seconds <= after.seconds and after.error > 0):
+        return after
+    share = np.log(before.error / target) / np.log(before.error / after.error)
+    steps = int(np.ceil(before.steps * (after.steps / before.steps) ** share))
+    # the rounded number of steps takes its own share of calls and seconds
+    share = np.log(steps / before.steps) / np.log(after.steps / before.steps)
+    calls = before.force_calls * (after.force_calls / before.force_calls) ** share
+    return replace(
+        after,
+        steps=steps,
+        step=None if after.step is None else after.step * after.steps / steps,
+        force_calls=round(calls),
+        run_repeats=(before.seconds * (after.seconds / before.seconds) ** share,),
+        accuracy=Accuracy(largest=target, end=np.nan, phase=None, energy=np.nan, rounding=None),
+        message=f"between {before.steps} and {after.steps} steps",
+    )

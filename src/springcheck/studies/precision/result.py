@@ -51,7 +51,10 @@ class MethodSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """The cheapest point within an error, or None where no method reaches it."""
+    """The cheapest way to an error, or None where no method reaches it.
+
+    Its message says between which numbers of steps it is interpolated; it has none where it was measured.
+    """
 
     target: float
     point: Point | None
@@ -139,4 +142,5 @@ def _method(method: MethodSummary) -> dict[str, Any]:
 def _answer(answer: Answer) -> dict[str, Any]:
     names = ("method", "step", "tolerance", "steps", "max_error", "run_seconds", "force_calls")
     known = answer.point.document() if answer.point else {}
-    return {"error": answer.target, **{name: known.get(name) for name in names}}
+    found = {"error": answer.target, **{name: known.get(name) for name in names}}
+    return found | {"interpolated": (answer.point.message or None) if answer.point else None}

@@ -74,10 +74,11 @@ def _cheapest(answers: Sequence[Answer]) -> Table:
             _where(answer.point),
             seconds(answer.point.seconds),
             str(answer.point.force_calls),
+            answer.point.message,
         )
         for answer in answers
     ]
-    return table(("error", "method", "at", "run", "force calls"), rows)
+    return table(("error", "method", "at", "run", "force calls", "interpolated"), rows)
 
 
 def _where(point: Point) -> str:
