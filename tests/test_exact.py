@@ -323,3 +323,16 @@ def test_no_error_below_that_of_the_exact_solution_is_reported() -> None:
     tally = _Tally(scene)
     tally.add(run)
     assert tally.error >= known > 1e-15
+
+
+def test_what_takes_more_digits_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    from springcheck.physics.exact import pendulum
+
+    calls = []
+    once = pendulum._of_swing
+    monkeypatch.setattr(pendulum, "_of_swing", lambda *x: calls.append(1) or once(*x))
+    scene = on_the_way_to_the_top("pendulum")
+    for count in range(3):
+        exact.true_motion(scene, np.array([count]), scene.step)
+        exact.uncertainty(scene, count * scene.step)
+    assert len(calls) == 1

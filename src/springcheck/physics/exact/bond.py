@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
 
-def _is_bond(scene: Scene) -> bool:
+def _bonds(scene: Scene) -> list[tuple[Morse, _Bond]] | None:
     """One bond each that pulls together."""
-    return one_each(scene) and all(
-        np.all((t.depth > 0) & (t.steepness != 0)) for t in scene.terms if isinstance(t, Morse)
-    )
+    terms = [term for term in scene.terms if isinstance(term, Morse)]
+    if not one_each(scene) or not all(np.all((t.depth > 0) & (t.steepness != 0)) for t in terms):
+        return None
+    return [(term, _bond(scene, term)) for term in terms]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,15 +94,13 @@ def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Ex
         return extended(u), extended(pull), extended(excess)
 
 
-def _morse(scene: Scene, t: Extended) -> States:
+def _morse(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: Extended) -> States:
     """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
 
     w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass goes straight on.
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
-    for term in scene.terms:
-        assert isinstance(term, Morse)
-        bond = _bond(scene, term)
+    for term, bond in bonds:
         z, dz = _stretched(bond, wide(term.steepness), t)
         u, pull = np.log1p(z) / term.steepness, bond.mass * dz / (term.steepness * (1 + z))
         ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
@@ -136,11 +135,10 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     return np.asarray(z), np.asarray(np.where(edge, dz0 + bond.w**2 * t, dz))
 
 
-def _morse_doubt(scene: Scene, t: np.longdouble) -> States:
+def _morse_doubt(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: np.longdouble) -> States:
     q, p = np.empty((2, scene.n), dtype=np.longdouble)
-    for term in scene.terms:
-        assert isinstance(term, Morse)
-        bond, a = _bond(scene, term), np.abs(wide(term.steepness))
+    for term, bond in bonds:
+        a = np.abs(wide(term.steepness))
         root = np.sqrt(bond.energy)
         speed = np.sqrt(2 * term.depth * bond.energy / bond.mass)
         time = np.abs(t) + np.abs(bond.start) / np.where(bond.rate > 0, bond.rate, 1) + 2 / bond.w
@@ -158,4 +156,4 @@ def _morse_doubt(scene: Scene, t: np.longdouble) -> States:
     return q, p
 
 
-MORSE = Well(key="morse", terms=frozenset({"morse"}), is_known=_is_bond, motion=_morse, doubt=_morse_doubt)
+MORSE = Well(key="morse", terms=frozenset({"morse"}), prepare=_bonds, motion=_morse, doubt=_morse_doubt)

@@ -20,7 +20,7 @@ ROUNDINGS = 32
 """Roundings of a motion in extended precision, of each of its summands and of its phase."""
 
 
-def motion(scene: Scene, t: Extended) -> tuple[Extended, Extended]:
+def motion(scene: Scene, _: None, t: Extended) -> tuple[Extended, Extended]:
     """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
     found = scene.system.modes
     start, centre = found.start, found.centre()
@@ -133,7 +133,7 @@ def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended
     return u + v * gone + law.pull * t * t * fallen, v * np.exp(-x) + law.pull * gone
 
 
-def doubt(scene: Scene, t: np.longdouble) -> tuple[Extended, Extended]:
+def doubt(scene: Scene, _: None, t: np.longdouble) -> tuple[Extended, Extended]:
     """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
 
     A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken from.

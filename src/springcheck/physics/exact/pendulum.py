@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
 
-def _swings(scene: Scene) -> bool:
-    return one_each(scene) and all(np.all(t.depth != 0) for t in scene.terms if isinstance(t, Cosine))
+def _swings(scene: Scene) -> list[tuple[Cosine, _Swing]] | None:
+    terms = [term for term in scene.terms if isinstance(term, Cosine)]
+    if not one_each(scene) or any(np.any(term.depth == 0) for term in terms):
+        return None
+    return [(term, _swing(scene, term)) for term in terms]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,26 +71,22 @@ def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extende
         return extended(np.array([half, sine, cosine, m1], dtype=object))
 
 
-def _pendulum(scene: Scene, t: Extended) -> States:
+def _pendulum(scene: Scene, swings: list[tuple[Cosine, _Swing]], t: Extended) -> States:
     """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
 
     R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
-    for term in scene.terms:
-        assert isinstance(term, Cosine)
-        found = _swing(scene, term)
+    for term, found in swings:
         a, r = _swung(found, t)
         q[:, term.i] = scene.q[term.i] + found.length * (2 * (a - found.half))
         p[:, term.i] = found.mass * found.length * 2 * found.w * r
     return q, p
 
 
-def _pendulum_doubt(scene: Scene, t: np.longdouble) -> States:
+def _pendulum_doubt(scene: Scene, swings: list[tuple[Cosine, _Swing]], t: np.longdouble) -> States:
     q, p = np.empty((2, scene.n), dtype=np.longdouble)
-    for term in scene.terms:
-        assert isinstance(term, Cosine)
-        found = _swing(scene, term)
+    for term, found in swings:
         root = np.sqrt(found.m)
         size = 2 * found.length * np.minimum(root, PI / 2)
         speed = 2 * found.length * found.w * root
@@ -117,5 +116,5 @@ def _swung(found: _Swing, t: Extended) -> States:
 
 
 COSINE = Well(
-    key="cosine", terms=frozenset({"cosine"}), is_known=_swings, motion=_pendulum, doubt=_pendulum_doubt
+    key="cosine", terms=frozenset({"cosine"}), prepare=_swings, motion=_pendulum, doubt=_pendulum_doubt
 )

@@ -116,20 +116,9 @@ def _orbit(
     return {"amplitude": amplitude, "w": w, "m": m, "m1": m1}
 
 
-def _has_turning_points(scene: Scene) -> bool:
-    return _duffing(scene) is not None
-
-
-def _known(scene: Scene) -> tuple[_Duffing, Extended]:
-    found = _duffing(scene)
-    if found is None:
-        raise ValueError(f"scene {scene.name!r}: a particle has several centres, or no turning point")
-    return found
-
-
-def _stiffening(scene: Scene, t: Extended) -> States:
+def _stiffening(scene: Scene, found: tuple[_Duffing, Extended], t: Extended) -> States:
     """cn, dn or sn, by what holds the particle."""
-    well, at = _known(scene)
+    well, at = found
     u, v = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     softening = well.b <= 0
     # the sign of the energy: beside |k| it may be lost in the root
@@ -140,8 +129,8 @@ def _stiffening(scene: Scene, t: Extended) -> States:
     return u + at, v * scene.m
 
 
-def _stiffening_doubt(scene: Scene, t: np.longdouble) -> States:
-    well, at = _known(scene)
+def _stiffening_doubt(scene: Scene, found: tuple[_Duffing, Extended], t: np.longdouble) -> States:
+    well, at = found
     # at the bottom of the potential
     fastest = np.where(
         (well.k < 0) & (well.b > 0), well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2
@@ -189,7 +178,7 @@ def _sn(well: _Duffing, t: Extended) -> States:
 QUARTIC = Well(
     key="quartic",
     terms=frozenset({"quartic", "wall-spring"}),
-    is_known=_has_turning_points,
+    prepare=_duffing,
     motion=_stiffening,
     doubt=_stiffening_doubt,
 )

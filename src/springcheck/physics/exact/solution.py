@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,10 @@ class _Group:
 
     particles: Integers
     scene: Scene
-    motion: Callable[[Scene, Extended], tuple[Extended, Extended]]
-    """A scene and times t (f, 1) [T] -> q and p (f, s)."""
-    doubt: Callable[[Scene, np.longdouble], tuple[Extended, Extended]]
-    """A scene and a time [T] -> bounds of the errors of q and p up to then (s,)."""
+    found: Any
+    """What was worked out once (see `Well.prepare`); modes are kept by the system."""
+    motion: Callable[[Scene, Any, Extended], tuple[Extended, Extended]]
+    doubt: Callable[[Scene, Any, np.longdouble], tuple[Extended, Extended]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,11 +43,11 @@ class Solution:
         t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
         if len(self.groups) == 1:
             with np.errstate(all="ignore"):
-                return self.groups[0].motion(self.groups[0].scene, t)
+                return self.groups[0].motion(self.groups[0].scene, self.groups[0].found, t)
         q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
-                q[:, group.particles], p[:, group.particles] = group.motion(group.scene, t)
+                q[:, group.particles], p[:, group.particles] = group.motion(group.scene, group.found, t)
         return q, p
 
     def doubt(self, duration: float) -> tuple[Extended, Extended]:
@@ -55,7 +55,9 @@ class Solution:
         q, p = np.empty((2, self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
-                q[group.particles], p[group.particles] = group.doubt(group.scene, np.longdouble(duration))
+                q[group.particles], p[group.particles] = group.doubt(
+                    group.scene, group.found, np.longdouble(duration)
+                )
         # infinite where the motion itself is; never no number
         return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
 
@@ -64,7 +66,9 @@ def solution(system: System) -> Solution | None:
     """The exact motion of a system, None where some particles have no closed form here."""
     everything = np.arange(system.n)
     if system.has_modes:
-        whole = _Group(particles=everything, scene=system.scene, motion=linear.motion, doubt=linear.doubt)
+        whole = _Group(
+            particles=everything, scene=system.scene, found=None, motion=linear.motion, doubt=linear.doubt
+        )
         return Solution(n=system.n, groups=(whole,))
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
@@ -76,14 +80,19 @@ def solution(system: System) -> Solution | None:
             chosen = np.flatnonzero(system.acting.get(well.key, nothing) & ~other)
             if len(chosen):
                 part = system.part(chosen)
-                if not well.is_known(part):
+                ready = well.prepare(part)
+                if ready is None:
                     return None
-                found.append(_Group(particles=chosen, scene=part, motion=well.motion, doubt=well.doubt))
+                found.append(
+                    _Group(particles=chosen, scene=part, found=ready, motion=well.motion, doubt=well.doubt)
+                )
                 left[chosen] = False
         chosen = np.flatnonzero(left)
         if len(chosen):
             part = system.part(chosen)
             if not part.system.has_modes:
                 return None
-            found.append(_Group(particles=chosen, scene=part, motion=linear.motion, doubt=linear.doubt))
+            found.append(
+                _Group(particles=chosen, scene=part, found=None, motion=linear.motion, doubt=linear.doubt)
+            )
     return Solution(n=system.n, groups=tuple(found))

@@ -31,10 +31,12 @@ class Well:
 
     key: str
     terms: frozenset[str]
-    is_known: Callable[[Scene], bool]
-    motion: Callable[[Scene, Extended], States]
-    doubt: Callable[[Scene, np.longdouble], States]
-    """Bounds (n,) of the errors of `motion` in q and p, from the start to a time."""
+    prepare: Callable[[Scene], Any]
+    """What is worked out once for all times: constants of the motion; None where it is not known."""
+    motion: Callable[[Scene, Any, Extended], States]
+    """A scene, what was worked out of it, and times t (f, 1) [T] -> q and p (f, n)."""
+    doubt: Callable[[Scene, Any, np.longdouble], States]
+    """The same and one time -> bounds (n,) of the errors of q and p from the start to then."""
 
 
 def wide(x: Any) -> Extended:
