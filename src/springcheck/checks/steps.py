@@ -12,6 +12,7 @@ from springcheck.arrays import Floats, Integers, Reals
 from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import check
+from springcheck.checks.drag import drag
 from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch
 from springcheck.engines.contract import Arithmetic
@@ -82,7 +83,10 @@ def step_defect(case: Case) -> Verdict:
         first = case.steps[int(np.argmin(told)) + 1]
         why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
     why = _beyond_range(case, off) or why + _where(case, off)
-    return case.verdict("step-defect", float(seen[worst]), float(bound), "roundings", why, _sees(case, told))
+    value, most = float(seen[worst]), float(bound)
+    if (slow := drag(case, told)) and not np.any(off) and not slow[0] <= slow[1]:
+        value, most, why = slow
+    return case.verdict("step-defect", value, most, "roundings", why, _sees(case, told))
 
 
 def _sees(case: Case, told: NDArray[np.bool_]) -> Limits:
