@@ -2,7 +2,7 @@
 
 Claim: the exact solution of every scene lies within the error that springcheck states for it.
 
-Command: python validation/exact_check.py --scenes 10000      (--seed S, --kind NAME; 40 minutes of one core)
+Command: python validation/exact_check.py --scenes 10000      (--seed S, --kind NAME; 20 minutes)
 
 Expected: one line a kind: scenes, the largest error in units of the stated one (below 1), the median and the
 largest of the stated ones relative to the start.
