@@ -213,3 +213,22 @@ def test_a_stepper_of_a_module_is_judged_from_the_command_line(capsys: pytest.Ca
     assert "mass is left out" in document(capsys)["statement"]
     assert main(["identify", "--stepper", "student_4c1:none"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_what_cannot_be_judged_is_exit_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # a noise of the size of a fixed-point force, five steps to a frame, could as well be one
+    monkeypatch.chdir(tmp_path)
+    noise = np.random.default_rng(5).standard_normal(1001) * 2.0**-33
+    m, k, h, q, p, rows = 3.7, 2.9, 0.1, 0.3, 0.7, []
+    for i in range(1000):
+        rows.append((h * i, q, p))
+        p += h / 2 * (-k * q + noise[i])
+        q += h * p / m
+        p += h / 2 * (-k * q + noise[i + 1])
+    np.savetxt("x.csv", rows[::5], fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    assert main(["identify", "x.csv", "--mass", str(m)]) == 2
+    text = " ".join(capsys.readouterr().out.split())
+    assert "but whether it fits cannot be judged" in text
+    assert "noise or a systematic error of that size cannot be excluded" in text

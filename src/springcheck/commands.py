@@ -135,8 +135,8 @@ def _identify(options: Namespace) -> int:
         output.document({**document, "not_trusted": doubts})
     else:
         output.show([line for label, one in found.items() for line in text.identification(label, one)])
-    fits = all(one.fits or one.verdict == "adaptive" for one in found.values())
-    return 0 if fits and not doubts else 1
+    fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())
+    return 1 if doubts or not fits else 2 if any(one.undecided for one in found.values()) else 0
 
 
 def _judge(options: Namespace) -> int:

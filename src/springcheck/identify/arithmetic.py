@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.arrays import Extended, Floats
-from springcheck.identify import coarse
+from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
@@ -33,6 +33,8 @@ class Defect:
     ulp: float
     precision: str
     note: str = ""
+    certain: bool = True
+    """Whether the arithmetic itself shows, and not only an error of its size."""
 
 
 def misses(match: Match, found: Map) -> Extended:
@@ -94,9 +96,12 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     # states between two frames lie on the same orbit: either component may be as large as the whole
     lengths = np.sqrt(np.sum(z**2, axis=1))
     size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * (lengths[:-1] + lengths[1:])[:, None]
-    # a solution is evaluated at times, and their rounding turns the phase
+    # a solution is evaluated at times, and their rounding turns the phase; of steps that are differences of
+    # rounded times only the sum over a frame shows
     turned = [
-        np.sqrt(abs(match.a)) * record.clock / 2.0**-52 if scheme.flow else 0.0
+        np.sqrt(abs(match.a)) * record.clock * match.stride / 2.0**-52
+        if scheme.flow or (match.stride > 1 and record.slips is not None)
+        else 0.0
         for match, scheme in zip(matches, schemes, strict=True)
     ]
     size += np.array(turned)[:, None, None] * np.max(lengths)
@@ -128,7 +133,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         coarse_file = _largest(missing, slack * half + 2.0**-24 * rebuilt) <= 1
     out = []
     for i, match in enumerate(matches):
-        precision, note = "", ""
+        precision, note, certain = "", "", True
         if plain[i]:
             precision, note = "double", _written(record, "")
         elif _is_rebuilt(match, missing[i], size[i], difference[i]):
@@ -136,17 +141,28 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
             note = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
         elif record.fine:
             if visible and not schemes[i].flow:
-                precision, note = coarse.kinematic(record, j, found, match) or coarse.sized(
-                    record, j, found, match, signed[i]
-                )
+                precision, note, certain = _coarse(record, j, found, match, signed[i])
         elif stored[i]:
             precision = _stored(record, found)
         elif coarse_file[i]:
             texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
             # one orbit, rounded once, leaves no room for more than that
             precision = texts[0] if texts else "" if found.once else "single"
-        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note))
+        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, certain=certain))
     return out
+
+
+def _coarse(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
+    """Precision of coarse forces, a note, and whether it is certain; "" where none explains the misses."""
+    seen = coarse.kinematic(record, j, found, match)
+    if seen is not None:
+        return *seen, record.mass is not None
+    name, note = coarse.sized(record, j, found, match, signed)
+    names = quantised.FORCES if name == "mixed" else [name] if name else []
+    for each in names:
+        if quantised.reproduced(record, j, found, match, each, coarse.QUANTUM, coarse.EXCESS):
+            return each, "states are double, and the steps redone with such forces are those recorded", True
+    return (name, note, False) if name and coarse.white(found, match, signed) else ("", "", True)
 
 
 def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats) -> bool:

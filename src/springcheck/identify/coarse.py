@@ -64,9 +64,6 @@ def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> t
     if match.scheme not in SCHEMES:
         return "", ""
     missing = np.abs(signed)
-    biased = cut_off(found, match)
-    if not irregular(signed, np.concatenate([biased, np.ones((len(biased), 1))], axis=1)):
-        return "", ""
     kicks, steps = reach(found, match)
     z = found.z.astype(np.float64)
     position = found.size[0].astype(np.float64) + abs(float(found.centre[0]))
@@ -133,8 +130,10 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
         return "", ""
     single = np.spacing(np.abs(forces.values).astype(np.float32)).astype(np.float64)
     fixed = np.full(len(forces.values), QUANTUM)
+    mass = 1.0 if record.mass is None else float(record.mass[j])
     for name, quantum, factor, note in (
         ("mixed", single, 1.0, "single-precision numbers"),
+        ("mixed", single, mass / float(np.float32(mass)), "single-precision numbers, and so is the mass"),
         ("fixed-point force", fixed, 1.0, "whole multiples of 2**-32, a 64-bit fixed-point sum"),
         (
             "fixed-point force",
@@ -160,18 +159,20 @@ OUTLIER = 6.0
 """Largest error of bounded rounding over the root mean square of its neighbours': 1.7 where uniform."""
 
 LAGS = range(2, 26)
-"""Frames at whose distance errors are correlated; neighbours share a force in some schemes."""
+"""Frames at whose distance errors are correlated, a quarter of all at most; neighbours share a force in some
+schemes."""
 
 
-def irregular(missing: Floats, bias: Floats | None = None) -> bool:
+def irregular(missing: Floats, bias: Floats | None = None, lags: range = LAGS) -> bool:
     """Whether what frames miss (f, c) is white, as rounding is, once it is freed of a bias (f, b).
 
     What goes with position, velocity, their powers, time, parity or a neighbour comes back after some
     frames; the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
     """
-    if len(missing) < 4 * LAGS.stop:
+    lags = range(lags.start, min(lags.stop, len(missing) // 4))
+    if not lags:
         return True
-    limit = float(chdtri(len(LAGS), 1e-7))
+    limit = float(chdtri(len(lags), 1e-7))
     for row in missing.T:
         x = row - np.mean(row) if bias is None else row - bias @ np.linalg.lstsq(bias, row, rcond=None)[0]
         total = float(x @ x)
@@ -181,9 +182,15 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
         blocks = np.array_split(np.abs(x), 8)
         if any(np.max(b) > OUTLIER * np.sqrt(np.mean(b**2)) for b in blocks if len(b) > 2 * OUTLIER):
             return False
-        if len(x) * sum((float(x[k:] @ x[:-k]) / total) ** 2 for k in LAGS) > limit:
+        if len(x) * sum((float(x[k:] @ x[:-k]) / total) ** 2 for k in lags) > limit:
             return False
     return True
+
+
+def white(found: Map, match: Match, signed: Floats) -> bool:
+    """Whether what single frames miss (f - 1, 2) is irregular but for the bias of cutting off."""
+    biased = cut_off(found, match)
+    return irregular(signed, np.concatenate([biased, np.ones((len(biased), 1))], axis=1))
 
 
 def cut_off(found: Map, match: Match) -> Floats:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.arrays import Extended, Floats
+from springcheck.identify.coarse import irregular
 from springcheck.identify.evidence import Evidence, distance, matched, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
-from springcheck.identify.search import distinct, search
+from springcheck.identify.search import FEW, distinct, search
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import misfit, wrong_map
 
@@ -207,15 +208,20 @@ def _alternation(e: Evidence) -> list[Explanation]:
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
-    joints = search([e.found], [e.terms], range(1, 2), far=True)
-    joints += search([e.found], [e.terms], range(1, 2), distinct(damped=True), far=True)
+    joints = search([e.found], [e.terms], FEW, far=True)
+    joints += search([e.found], [e.terms], FEW, distinct(damped=True), far=True)
     distances = {x: distance(e.found, x.parts[0]) for x in joints}
     exact = [x for x in joints if x.scheme == "exact"]
     if not exact:
         return []
     near = min(exact, key=lambda x: distances[x])
-    others = min((d for x, d in distances.items() if x.scheme != "exact" and not x.damped), default=math.inf)
+    # without friction every scheme is far from a damped motion, and says nothing of its steps
+    alike = [(x, d) for x, d in distances.items() if x.scheme != "exact" and x.damped <= near.damped]
+    others = min((d for x, d in alike if x.stride == 1), default=math.inf)
     residual = float(np.max(e.found.residual))
+    # the error of a solver scatters: one that is the same in every frame may be that of fixed steps
+    if distances[near] > 30 * residual and min(d for _, d in alike) < 0.1 * distances[near]:
+        return []
     if (
         distances[near] > max(0.3 * others, 4 * residual)
         or distances[near] > 0.05
@@ -375,6 +381,13 @@ def _noise(e: Evidence, size: float) -> Explanation:
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
+    if not irregular(e.misses, lags=range(1, 26)):
+        return Explanation(
+            cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
+            f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
+            remedy="look for several errors at once, and take them out one by one",
+            misfit=size,
+        )
     return Explanation(
         cause=f"Noise: what one map leaves over is irregular, {size:.1e} of the state's size in each frame, "
         f"in {where}, and has no quanta of a known arithmetic",

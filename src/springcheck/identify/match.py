@@ -265,7 +265,12 @@ def _best(
         physical &= (values[:, 1] > 0) | held[x.which]
     masses: Any = target.log_masses(x, values)
     at = np.flatnonzero(physical)
-    order = at[np.lexsort((chi2[at], x.turns[at], chi2[at] > most(freedom), x.s[at], x.which[at], x.of[at]))]
+    refused = chi2 > most(freedom)
+    # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
+    close = (
+        np.where(refused | (freedom > 2), chi2, np.abs(values[:, 0])) if target.terms.mass_unknown else chi2
+    )
+    order = at[np.lexsort((close[at], x.turns[at], refused[at], x.s[at], x.which[at], x.of[at]))]
     seen: set[tuple[int, str, int]] = set()
     for i in order.tolist():
         name, stride = every.families[x.which[i]].name, int(x.s[i])

@@ -109,7 +109,9 @@ def identify_arrays(
         return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
     joints = list(explained)
     if stated is not None:
-        joints = [x for x in joints if not disagreements(record, moving, x, stated)] or joints
+        joints = [x for x in joints if not disagreements(record, moving, x, stated)] or [
+            x for x in joints if stated_stiffness(record, moving, x, stated, explained[x][0].precision)[0]
+        ] or joints  # fmt: skip
     if stride is not None and stride > 0:
         # a step that divides the interval leaves the flow, which has none, and schemes of that stride
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
@@ -247,20 +249,25 @@ def _known(
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
     )
+    law = f" with {first.law}" if first.law and len(candidates) == 1 else " with friction" if damped else ""
     if scheme == "held-force":
         n, kicks = _whole_substeps(plainest)
         order = "kick, then drift" if kicks else "drift, then kick"
         statement = f"Semi-implicit Euler whose force is held over {n} substeps ({order}){steps}"
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
-        by = (
-            f" with {first.law}" if first.law and len(candidates) == 1 else " with friction" if damped else ""
-        )
-        statement = f"{title(scheme)}{also}{by}{steps}: {precision} arithmetic explains every step"
+        statement = f"{title(scheme)}{also}{law}{steps}: {precision} arithmetic explains every step"
     else:
         names = list(dict.fromkeys(x.scheme for x in candidates))
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         statement = f"Several schemes fit, which the states do not tell apart: {', '.join(names[:4])}{more}"
+    undecided = any(not d.certain for d in explained[plainest]) and stated_fits
+    if undecided:
+        statement = (
+            f"{title(scheme or plainest.scheme)}{law}{steps}, and errors of the force of the size of "
+            f"{precision} arithmetic: noise or a systematic error of that size cannot be excluded"
+        )
+        notes.append("what would show the arithmetic: every step recorded, and the mass")
     if explanations:
         statement = f"{explanations[0].cause}"
     return Identification(
@@ -279,7 +286,8 @@ def _known(
         symplectic_defect=symplectic,
         defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()),
         precision=precision,
-        fits=stated_fits,
+        fits=stated_fits and not undecided,
+        undecided=undecided,
         nearest=scheme,
         difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
@@ -371,6 +379,7 @@ def _unknown(
         defect_ulp=residual / 2.0**-52,
         precision="unknown",
         fits=False,
+        undecided=False,
         nearest=nearest,
         difference=off,
         notes=tuple(dict.fromkeys(notes)),

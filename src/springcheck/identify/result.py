@@ -85,6 +85,9 @@ class Identification:
     fits: bool
     """Whether a known scheme explains every step to the rounding of a known arithmetic, and what was stated
     (mass, stiffness, step) agrees with it."""
+    undecided: bool
+    """Whether the scheme is known, but errors of its force have the size of a known arithmetic and nothing
+    shows that they are not noise or a systematic error.  `fits` is False then."""
     nearest: str | None
     """The scheme itself, or where none fits the one whose entries are closest; None where several fit."""
     difference: tuple[float, ...]

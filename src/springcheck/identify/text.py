@@ -37,6 +37,8 @@ def identification(label: str, found: Identification) -> Lines:
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
     misfit = ", but what is stated does not fit" if found.candidates and not found.fits else ""
+    if found.undecided:
+        misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
     if found.explanations:
         # the diagnosis is the headline, and what to do stands below it
@@ -52,7 +54,8 @@ def identification(label: str, found: Identification) -> Lines:
     for name, text in rows:
         if text and "nan" not in text:
             out += hanging(f"  {name + ':':24}", text)
-    for note in found.notes:
+    notes = [found.statement, *found.notes] if found.undecided else found.notes
+    for note in notes:
         out += hanging("  note: ", note)
     return out
 

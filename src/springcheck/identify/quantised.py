@@ -1,0 +1,165 @@
+"""Forces cut off at multiples of a quantum, carried out: what frames many steps apart show of them.
+
+Between frames several steps apart single forces cannot be read, but the steps can be redone from each
+recorded frame with forces that are cut off.  Where that brings the misses down to the rounding of states, it
+is those forces; noise of the same size, or an error that goes with anything else, stays as large as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+
+from springcheck.arrays import Floats
+from springcheck.identify.families import FAMILIES, Family
+from springcheck.identify.fit import Map
+from springcheck.identify.match import Match
+from springcheck.identify.record import Record
+from springcheck.schemes import SCHEMES, number
+
+EXPLAINED = 0.3
+"""Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
+unlike forces more than all is left, 1.4 of it."""
+
+HOPELESS = 0.9
+"""The same after three steps of refinement, beyond which it will not fall any more."""
+
+REFINED = 12
+"""Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
+
+Force: TypeAlias = Callable[[float, Floats], Floats]
+"""k and q (f,) -> -k q as an arithmetic has it, both k and the result in quanta, powers of 2."""
+
+
+def _single(k: float, q: Floats) -> Floats:
+    return (-k * q).astype(np.float32).astype(np.float64)
+
+
+def _all_single(k: float, q: Floats) -> Floats:
+    return (np.float32(-k) * q.astype(np.float32)).astype(np.float64)
+
+
+def _cut(k: float, q: Floats) -> Floats:
+    return np.trunc(-k * q)
+
+
+def _rounded(k: float, q: Floats) -> Floats:
+    return np.rint(-k * q)
+
+
+def _floor(k: float, q: Floats) -> Floats:
+    return np.floor(-k * q)
+
+
+def _then_cut(inner: Force) -> Force:
+    return lambda k, q: np.trunc(inner(k, q))
+
+
+FORCES: dict[str, tuple[Force, ...]] = {
+    "fixed-point force": (_cut, _rounded, _floor),
+    "mixed": (_single, _all_single, _then_cut(_single), _then_cut(_all_single)),
+}
+
+
+def reproduced(
+    record: Record, j: int, found: Map, match: Match, precision: str, quantum: float, excess: float
+) -> bool:
+    """Whether forces of a precision, carried out, explain what frames miss.  `quantum` is that of sums in
+    fixed point [force], which may be too large by the share `excess`."""
+    family = FAMILIES[match.family]
+    if record.mass is None or found.slips is not None or family.held or family.flow:
+        return False
+    if family.scheme not in SCHEMES or SCHEMES[family.scheme].implicit:
+        return False
+    mass, h = float(record.mass[j]), float(record.interval) / match.stride
+    # about the equilibrium; velocities as lengths
+    q = (found.z[:, 0] * found.size[0]).astype(np.float64)
+    v = (found.z[:, 1] * found.size[1] / record.interval).astype(np.float64) * h
+    kick = h * h / mass * quantum
+
+    def missed(values: Floats, cut: Force | None, factor: float = 1.0, *, leaps: bool = False) -> Floats:
+        a, g = values
+
+        def pull(x: Floats) -> Floats:
+            return -a * x if cut is None else kick * factor * cut(a / kick, x)
+
+        x, y = q[:-1], v[:-1]
+        if leaps:
+            # stored half a step early, and half a kick of the exact force added where it was read
+            y = y + a * x / 2
+            for _ in range(match.stride):
+                y = y + pull(x)
+                x = x + y
+            y = y - a * x / 2
+        else:
+            for _ in range(match.stride):
+                x, y = _step(family, x, y, pull, g)
+        return np.concatenate([q[1:] - x, v[1:] - y])
+
+    free = [0, 1] if family.damped else [0]
+    start = np.array([match.a, match.g])
+    rows = missed(start, None).reshape(2, -1)
+    size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
+    scale = np.broadcast_to(1 / size, rows.shape).ravel()
+    before = float(np.sqrt(np.mean((rows.ravel() * scale) ** 2)))
+    slopes = []
+    for i in free:
+        shift = np.zeros(2)
+        shift[i] = 1e-6 * match.a if i == 0 else 1e-6
+        slopes.append((missed(start + shift, None) - missed(start - shift, None)) / (2 * shift[i]))
+    columns = np.stack(slopes, axis=1) * scale[:, None]
+    single = mass / float(np.float32(mass))
+    factors = [x * y for x in (1.0, 1.0 + excess) for y in dict.fromkeys((1.0, single))]
+    ways = (False, True) if family.name == "velocity-verlet" else (False,)
+    for leaps, cut, factor in product(ways, FORCES[precision], factors):
+        values = start.copy()
+        for turn in range(REFINED):
+            left = missed(values, cut, factor, leaps=leaps) * scale
+            share = float(np.sqrt(np.mean(left**2))) / before
+            if share <= EXPLAINED:
+                return True
+            if not share < (HOPELESS if turn > 2 else np.inf):
+                break
+            weight = np.ones(len(left))
+            if 2 * turn > REFINED:
+                # few are left that are cut to the wrong side, and those are outliers
+                weight = 1 / (1 + (left / (np.median(np.abs(left)) + 0.1 * before)) ** 2)
+            values[free] -= np.linalg.lstsq(columns * weight[:, None], left * weight, rcond=None)[0]
+    return False
+
+
+def _step(
+    family: Family, q: Floats, v: Floats, pull: Callable[[Floats], Floats], g: float
+) -> tuple[Floats, Floats]:
+    """One step on (q, v h), with h**2 F/m from `pull` and the friction gamma h."""
+    inside = 0.0 if family.stages else g
+    if family.stability[0]:
+        scheme = SCHEMES[family.scheme]
+        slopes: list[tuple[Floats, Floats]] = []
+        for row in scheme.a:
+            x, y = q, v
+            for share, (dx, dy) in zip(row, slopes, strict=False):
+                x, y = x + float(share) * dx, y + float(share) * dy
+            slopes.append((y, pull(x) - inside * y))
+        for share, (dx, dy) in zip(scheme.b, slopes, strict=True):
+            q, v = q + float(share) * dx, v + float(share) * dy
+    for kind, part in family.stages:
+        c = float(number(part, np.longdouble))
+        if kind == "drift":
+            q = q + c * v
+        elif kind == "kick":
+            v = v + c * pull(q)
+        elif kind == "friction":
+            v = v * np.exp(-c * g)
+        elif kind == "explicit":
+            v = v + c * (pull(q) - g * v)
+        elif kind == "implicit":
+            v = (v + c * pull(q)) / (1 + c * g)
+        elif kind == "centred":
+            v = ((1 - c * g / 2) * v + c * pull(q)) / (1 + c * g / 2)
+        else:
+            v = v + c * (pull(q) - g * (v - c * pull(q)) / (1 - c * g))
+    return q, v
