@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 from springcheck.trajectory import Verdict
 
-Subject_contra = TypeVar("Subject_contra", contravariant=True)
+
+class Subject(Protocol):
+    """What is judged: a `Case`, or a `Bench`."""
+
+    def not_applicable(self, check: str, why: str) -> Verdict:
+        """The verdict of a check that does not apply."""
+        ...
+
+
+Subject_contra = TypeVar("Subject_contra", bound=Subject, contravariant=True)
 
 Family: TypeAlias = Literal["record", "motion", "repeat", "map", "law"]
 """Facts of the record, to the bit; the recorded motion; two runs against each other, to the bit; the one-step
@@ -28,13 +37,20 @@ class Check(Generic[Subject_contra]):
     sentence: str
     """What holds where it passes."""
     judge: Callable[[Subject_contra], Verdict]
+    unless: Callable[[Any], str | None]
+    """Why it does not apply to a subject, or None; `judge` may find further reasons."""
 
     def __call__(self, subject: Subject_contra) -> Verdict:
-        return self.judge(subject)
+        why_not = self.unless(subject)
+        return subject.not_applicable(self.name, why_not) if why_not else self.judge(subject)
 
 
 def check(
-    short: str, *, family: Family, needs: str
+    short: str,
+    *,
+    family: Family,
+    needs: str,
+    unless: Callable[[Any], str | None] = lambda subject: None,
 ) -> Callable[[Callable[[Subject_contra], Verdict]], Check[Subject_contra]]:
     """Make a check of a function: its name and the first line of its docstring are the check's own."""
 
@@ -46,6 +62,7 @@ def check(
             needs=needs,
             sentence=(judge.__doc__ or "").partition("\n")[0],
             judge=judge,
+            unless=unless,
         )
 
     return made

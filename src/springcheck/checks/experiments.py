@@ -29,12 +29,9 @@ def _no_matrix(bench: Bench) -> str | None:
     return None
 
 
-@check("matrix", family="map", needs="a linear scene of few particles")
+@check("matrix", family="map", needs="a linear scene of few particles", unless=_no_matrix)
 def propagator(bench: Bench) -> Verdict:
     """The one-step matrix, recovered from single steps, is the scheme's."""
-    why_not = _no_matrix(bench)
-    if why_not:
-        return bench.not_applicable("propagator", why_not)
     case, _ = bench.copies
     if why_no_step := _no_step(case):
         return bench.verdict("propagator", float("inf"), float(case.roundings), "roundings", why_no_step)
@@ -90,12 +87,9 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     return scaled(ideal), scaled(departure), scaled(allowed), scale
 
 
-@check("det", family="map", needs="a linear scene of few particles")
+@check("det", family="map", needs="a linear scene of few particles", unless=_no_matrix)
 def determinant(bench: Bench) -> Verdict:
     """The one-step matrix changes area by the scheme's factor, to rounding."""
-    why_not = _no_matrix(bench)
-    if why_not:
-        return bench.not_applicable("determinant", why_not)
     if why_no_step := _no_step(bench.copies[0]):
         return bench.verdict("determinant", float("inf"), 0.0, "relative", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
@@ -120,12 +114,9 @@ def determinant(bench: Bench) -> Verdict:
     )
 
 
-@check("sympl", family="map", needs="a symplectic scheme and no friction")
+@check("sympl", family="map", needs="a symplectic scheme and no friction", unless=_no_matrix)
 def symplecticity(bench: Bench) -> Verdict:
     """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
-    why_not = _no_matrix(bench)
-    if why_not:
-        return bench.not_applicable("symplecticity", why_not)
     if not bench.scheme.symplectic:
         return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
     if bench.scene.system.is_damped:

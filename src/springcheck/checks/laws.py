@@ -167,7 +167,7 @@ def predicted_drift(run: Trajectory) -> float:
     return float(h * np.longdouble(1.0 / run.step) - 1)
 
 
-def _walk(bench: Bench, check: str) -> str | None:
+def _walk(bench: Bench) -> str | None:
     scheme = bench.scheme
     if not scheme.one_step or not scheme.symplectic or not scheme.stages:
         return "only a splitting keeps a shadow energy that its own arithmetic does not solve for"
@@ -176,12 +176,9 @@ def _walk(bench: Bench, check: str) -> str | None:
     return None
 
 
-@check("bias", family="law", needs="a symplectic splitting in double precision")
+@check("bias", family="law", needs="a symplectic splitting in double precision", unless=_walk)
 def rounding_bias(bench: Bench) -> Verdict:
     """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
-    why_not = _walk(bench, "rounding-bias")
-    if why_not:
-        return bench.not_applicable("rounding-bias", why_not)
     if any(_is_short(bench, h) for h in (ODD, EVEN)):
         return bench.verdict("rounding-bias", float("inf"), 0.0, "a step", SHORT)
     found = [_drift(bench, h) for h in (ODD, EVEN)]
@@ -222,12 +219,9 @@ def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
     return float(np.mean(each)), se, predicted_drift(run)
 
 
-@check("growth", family="law", needs="a symplectic splitting in double precision")
+@check("growth", family="law", needs="a symplectic splitting in double precision", unless=_walk)
 def rounding_growth(bench: Bench) -> Verdict:
     """The shadow energy's rounding grows no faster than a random walk, with the square root of the steps."""
-    why_not = _walk(bench, "rounding-growth")
-    if why_not:
-        return bench.not_applicable("rounding-growth", why_not)
     scene = ensemble(ODD)
     run = bench.once(scene)
     if _is_short(bench, ODD):

@@ -24,12 +24,9 @@ def growth_bound(case: Case) -> tuple[Floats, Floats]:
         return bound, np.asarray(unit / case.norm.unit, np.float64)
 
 
-@check("closed", family="motion", needs="normal modes that a step turns")
+@check("closed", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
 def closed_form(case: Case) -> Verdict:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
-    why_not = closed_or_not(case)
-    if why_not:
-        return case.not_applicable("closed-form", why_not)
     y, v = case.closed_states
     q, p = case.modes.out_of(y + case.modes.centre(), v)
     distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
@@ -85,12 +82,9 @@ def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
     return f"; says nothing from step {case.steps[late[-1] + 1]} on, where that may be all of the {what}"
 
 
-@check("shadow", family="motion", needs="normal modes that a step turns")
+@check("shadow", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
 def shadow_energy(case: Case) -> Verdict:
     """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
-    why_not = closed_or_not(case)
-    if why_not:
-        return case.not_applicable("shadow-energy", why_not)
     run = case.trajectory
     form = schemes.invariant(case.matrices, h=run.step)
     turn = schemes.rotation(case.matrices)
@@ -147,12 +141,9 @@ def _rest(case: Case) -> Floats:
     return np.asarray(q, np.float64)
 
 
-@check("freq", family="motion", needs="a mode that oscillates without friction")
+@check("freq", family="motion", needs="a mode that oscillates without friction", unless=closed_or_not)
 def frequency(case: Case) -> Verdict:
     """The phase turns by the scheme's own frequency, to rounding."""
-    why_not = closed_or_not(case)
-    if why_not:
-        return case.not_applicable("frequency", why_not)
     if case.scene.system.is_damped:
         return case.not_applicable("frequency", "a phase that decays is seen in the closed form")
     turn = schemes.rotation(case.matrices)

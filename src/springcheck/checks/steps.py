@@ -55,12 +55,9 @@ def closed_or_not(case: Case) -> str | None:
     return None
 
 
-@check("step", family="motion", needs="a fixed step and two frames")
+@check("step", family="motion", needs="a fixed step and two frames", unless=no_map)
 def step_defect(case: Case) -> Verdict:
     """Each step is the scheme's own step, to rounding."""
-    why_not = no_map(case)
-    if why_not:
-        return case.not_applicable("step-defect", why_not)
     run = case.trajectory
     if case.ahead is None:
         return _by_norm(case)
@@ -246,12 +243,9 @@ def fastest(case: Case) -> float:
     return float(rates_met(case, case.trajectory.q)[-1])
 
 
-@check("arith", family="motion", needs="an arithmetic coarser than double precision")
+@check("arith", family="motion", needs="an arithmetic coarser than double precision", unless=no_map)
 def arithmetic(case: Case) -> Verdict:
     """The size of the step defect is that of the arithmetic the method says it has."""
-    why_not = no_map(case)
-    if why_not:
-        return case.not_applicable("arithmetic", why_not)
     named = case.trajectory.arithmetic
     plain = Arithmetic()
     if named.state <= plain.state and named.force <= plain.force and not named.quantum:

@@ -6,8 +6,8 @@ well as one state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cached_property
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -151,13 +151,17 @@ class System:
     def force_of(self, terms: Iterable[Term]) -> Force:
         """The force of some terms on the scene's particles."""
         parts = tuple(terms)
+        return self._sum(parts, [term.add_force for term in parts])
+
+    def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
+        """What these functions of (q, v, out), one a term, add up to, as a function of (q, p)."""
         needs_velocity = not all(term.is_potential for term in parts)
 
         def total(q: Reals, p: Reals) -> Reals:
             out = np.zeros_like(q)
             v = p / self.m if needs_velocity else p
-            for term in parts:
-                term.add_force(q, v, out)
+            for add in added:
+                add(q, v, out)
             return out
 
         return total
@@ -174,16 +178,7 @@ class System:
     def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None, *, exact: bool = False) -> Force:
         """The magnitude of some terms' force; `exact` says that `near` are the positions to the last bit."""
         parts = tuple(terms)
-        needs_velocity = not all(term.is_potential for term in parts)
-
-        def total(q: Reals, p: Reals) -> Reals:
-            out = np.zeros_like(q)
-            v = p / self.m if needs_velocity else p
-            for term in parts:
-                term.add_rounding(q, v, out, near, exact=exact)
-            return out
-
-        return total
+        return self._sum(parts, [partial(term.add_rounding, near=near, exact=exact) for term in parts])
 
     def strongest(self, q: Reals, terms: Iterable[Term] | None = None) -> Reals:
         """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""

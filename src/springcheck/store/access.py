@@ -170,13 +170,15 @@ def attributes(node: Any) -> dict[str, Any]:
     count = h5py.h5a.get_num_attrs(node.id)
     if count > MOST_ATTRIBUTES:
         raise refuse(node, f"has {count} attributes, more than any of ours")
+    # to open one by its number, libhdf5 makes a table of all of them each time
+    names: list[bytes] = []
+    h5py.h5a.iterate(node.id, names.append)
     found: dict[str, Any] = {}
-    for i in range(count):
-        known = h5py.h5a.open(node.id, index=i)
-        name = known.name if isinstance(known.name, str) else known.name.decode("utf-8", "backslashreplace")
+    for raw in names:
+        name = raw.decode("utf-8", "backslashreplace")
         if not is_name(name):
             raise refuse(node, "has an attribute whose name is no text, or too long")
-        found[name] = _value(node, known, name)
+        found[name] = _value(node, h5py.h5a.open(node.id, raw), name)
     return found
 
 

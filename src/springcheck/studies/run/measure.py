@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from argparse import Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -291,6 +290,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
 
     `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
     """
+    import tempfile
+
     known = {run.label: run for run in keeper.summary(path).runs}
     chosen = [label for label in known if not methods or any(fnmatchcase(label, m) for m in methods)]
     if not known:
