@@ -189,3 +189,28 @@ def test_one_particle_is_drawn_beside_the_others_figures(
     }
     assert main(["plot", "chain.h5", "--particle", "3"]) == 2
     assert "particles 0 to 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fields", [("a",), ("a", "b")])
+def test_a_cell_of_an_ensemble_that_explodes_does_not_set_its_scale(fields: tuple[str, ...]) -> None:
+    from types import SimpleNamespace
+
+    from springcheck.studies.ensemble import figure
+
+    x = np.arange(1.0, 7.0)
+    for error in ([1e-3, 1e-2, 0.1, 1.0, 1e107, 1e300], [-1.0, 0.0, 1e-9, 1.0, 1e107, 1e300]):
+        cells = {"own:euler": {"a": x, "b": x[::-1], "max_error": np.array(error)}}
+        found = SimpleNamespace(fields=fields, grid=False)
+        picture = figure.picture(found, cells, "max_error")  # type: ignore[arg-type]
+        picture.draw_without_rendering()
+        limits = [axes.get_ylim()[1] for axes in picture.axes]
+        assert len(fields) == 2 or error[0] < 0 or max(limits) <= 1e3
+
+
+def test_a_coarse_atlas_has_no_gaps_between_its_cells() -> None:
+    from springcheck.studies.extremes import figure
+
+    gap = np.nan
+    row = np.array([0, gap, gap, 1, gap, gap, 2, gap, gap, gap, gap, gap, gap])
+    np.testing.assert_array_equal(figure._filled(row)[:9], [0, 0, 1, 1, 1, 2, 2, 2, 2])
+    assert np.isnan(figure._filled(row)[9:]).all()

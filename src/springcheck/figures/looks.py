@@ -13,7 +13,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from springcheck import schemes
+from springcheck import engines, schemes
+from springcheck.errors import MethodError
 
 Line: TypeAlias = str | tuple[int, tuple[float, ...]]
 
@@ -99,6 +100,22 @@ def mark(engine: str) -> tuple[str, str]:
 def engine(label: str) -> str:
     """The engine of a method's label."""
     return label.partition(":")[0]
+
+
+def scheme_of(label: str) -> str:
+    """The scheme of a method; its label where its engine is not known here."""
+    try:
+        return engines.method(engines.parse(label)).scheme
+    except MethodError:
+        return label
+
+
+def by_scheme(labels: Iterable[str]) -> dict[str, list[str]]:
+    """Labels by their schemes."""
+    found: dict[str, list[str]] = {}
+    for label in labels:
+        found.setdefault(scheme_of(label), []).append(label)
+    return found
 
 
 def title(scheme: str) -> str:

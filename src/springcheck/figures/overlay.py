@@ -115,10 +115,15 @@ def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> 
 
 def legend(figure: Figure, groups: Sequence[Group], *extra: Line2D) -> None:
     """One entry for each scheme, with the marks of its engines; `extra` lines first."""
+    scheme_legend(figure, {x.scheme: [run.label for run in x.members] for x in groups}, *extra)
+
+
+def scheme_legend(figure: Figure, methods: Mapping[str, Sequence[str]], *extra: Line2D) -> None:
+    """The same of labels by scheme."""
     handles = list(extra)
-    for group in groups:
-        look = looks.look(group.scheme)
-        label = f"{group.title}\n{looks.members(run.label for run in group.members)}"
+    for scheme, labels in methods.items():
+        look = looks.look(scheme)
+        label = f"{looks.title(scheme)}\n{looks.members(labels)}"
         handles.append(Line2D([], [], color=look.color, linestyle=look.linestyle, label=label))
     figure.legend(
         handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6

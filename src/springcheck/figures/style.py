@@ -1,7 +1,6 @@
 """One style for every figure: legible in print and for the colour-blind, as PNG and SVG.
 
-Colours are those of Okabe & Ito (2008), told apart by people with any colour vision; line style and
-marker change with the colour, so that a grey print can be read too.
+Colours, lines and marks of schemes and engines are in `looks`.
 """
 
 from __future__ import annotations
@@ -20,10 +19,6 @@ from matplotlib.text import Text
 
 from springcheck.errors import StoreError, plain
 from springcheck.store import files
-
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 
 LONGEST_LINE = 120
 """Characters of a line of text, and of a file's name."""
@@ -54,12 +49,6 @@ def style() -> Iterator[None]:
     """Draw inside this context."""
     with mpl.rc_context(_RC):
         yield
-
-
-def look(i: int) -> dict[str, Any]:
-    """Colour and line style of the i-th line; where the colours begin again the lines are others."""
-    again, colour = divmod(i, len(COLOURS))
-    return {"color": COLOURS[colour], "linestyle": LINES[(colour + 3 * again) % len(LINES)]}
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:

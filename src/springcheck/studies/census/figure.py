@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springcheck.figures.style import look, save, style
+from springcheck.figures import looks
+from springcheck.figures.style import save, style
 from springcheck.studies.census.result import Census, title
 
 MOST_NAMES = 3
@@ -27,14 +28,29 @@ def portrait(census: Census, axes: Axes | None = None) -> Figure:
     turn = np.linspace(0, 2 * np.pi, 400)
     axes.plot(np.cos(turn), np.sin(turn), color="#bbbbbb", linewidth=4, label="exact", zorder=1)
     groups = census.grouped
-    for i, (name, members) in enumerate(groups.items()):
-        how = look(i)
+    for name, members in groups.items():
+        how = looks.look(name)
         for j, x in enumerate(members):
             names = [y.method for y in members[:MOST_NAMES]]
             more = len(members) - len(names)
             label = f"{title(name)}\n" + ", ".join(names) + (f" and {more} more" if more else "")
-            axes.plot(x.q, x.p, linewidth=0.9, label=label if j == 0 else None, zorder=2, **how)
-            axes.plot(x.q[-1], x.p[-1], "o", color=how["color"], markersize=4, zorder=3)
+            axes.plot(
+                x.q,
+                x.p,
+                linewidth=0.9,
+                label=label if j == 0 else None,
+                zorder=2,
+                color=how.color,
+                linestyle=how.linestyle,
+            )
+            axes.plot(
+                x.q[-1],
+                x.p[-1],
+                looks.mark(looks.engine(x.method))[0],
+                color=how.color,
+                markersize=4,
+                zorder=3,
+            )
     axes.set_aspect("equal")
     axes.set_xlabel("q")
     axes.set_ylabel("p")

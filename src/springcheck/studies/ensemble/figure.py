@@ -9,11 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, SymLogNorm
 from matplotlib.figure import Figure
 
-from springcheck.figures.style import look, save, style
+from springcheck.figures import looks, overlay
+from springcheck.figures.style import save, style
 from springcheck.studies.ensemble.measure import columns
 from springcheck.studies.ensemble.result import Columns, Ensemble
 
 DRAWN = ("max_error", "energy_drift")
+
+MOST = 1e3
+"""Errors and energies, relative to those of the start, beyond which nothing is read off a picture."""
+
+FAR = 1e6
+"""Where a line that leaves it is drawn to."""
 
 
 def draw(found: Ensemble, folder: Path) -> list[Path]:
@@ -39,13 +46,20 @@ def picture(
     if len(over) == 1:
         figure = Figure(figsize=(7.2, 4.6), layout="constrained")
         axes = figure.add_subplot()
-        for i, (method, x) in enumerate(shown.items()):
-            order = np.argsort(x[over[0]])
-            axes.plot(x[over[0]][order], x[quantity][order], label=method, **look(i))
-        _scaled(axes, quantity, np.concatenate([x[quantity] for x in shown.values()]))
+        for scheme, methods in looks.by_scheme(shown).items():
+            look = looks.look(scheme)
+            for j, method in enumerate(methods):
+                x, mark = shown[method], looks.mark(looks.engine(method))[0]
+                order = np.argsort(x[over[0]])
+                axes.plot(
+                    x[over[0]][order], np.clip(x[quantity][order], -FAR, FAR), label=method, color=look.color,
+                    linestyle=look.linestyle if j == 0 else "none", marker=mark,
+                    markevery=max(1, len(order) // 12), markerfacecolor="white", markersize=4,
+                )  # fmt: skip
+        _scaled(axes, np.concatenate([x[quantity] for x in shown.values()]))
         axes.set_xlabel(over[0])
         axes.set_ylabel(quantity.replace("_", " "))
-        figure.legend(loc="outside right upper", frameon=False)
+        overlay.scheme_legend(figure, looks.by_scheme(shown))
         return figure
     count = min(3, len(shown))
     rows = -(-len(shown) // count)
@@ -53,11 +67,9 @@ def picture(
     grid = np.atleast_1d(figure.subplots(rows, count, sharex=True, sharey=True)).ravel()
     every = np.concatenate([x[quantity] for x in shown.values()])
     every = every[np.isfinite(every)]
-    norm: LogNorm | SymLogNorm
-    if np.min(every) > 0:
-        norm = LogNorm(float(np.min(every)), float(np.max(every)))
-    else:
-        norm = SymLogNorm(1e-16, vmin=float(np.min(every)), vmax=float(np.max(every)))
+    # what explodes has the last colour
+    low, high = (float(np.clip(x, -MOST, MOST)) for x in (np.min(every), np.max(every)))
+    norm = LogNorm(low, max(high, 2 * low)) if low > 0 else SymLogNorm(1e-16, vmin=low, vmax=max(high, 1e-15))
     mark = None
     for axes, (method, x) in zip(grid, shown.items(), strict=False):
         mark = axes.scatter(x[over[0]], x[over[1]], c=x[quantity], norm=norm, s=9, marker="s", linewidths=0)
@@ -70,7 +82,8 @@ def picture(
     figure.supxlabel(over[0], fontsize=9)
     figure.supylabel(over[1], fontsize=9)
     if mark is not None:
-        figure.colorbar(mark, ax=list(grid), label=quantity.replace("_", " "))
+        beyond = "max" if np.max(every) > MOST else "neither"
+        figure.colorbar(mark, ax=list(grid), label=quantity.replace("_", " "), extend=beyond)
     return figure
 
 
@@ -83,7 +96,13 @@ def _slice(x: Columns, found: Ensemble, over: tuple[str, ...]) -> Columns:
     return {name: column[keep] for name, column in x.items()}
 
 
-def _scaled(axes: Axes, quantity: str, values: np.ndarray) -> None:
+def _scaled(axes: Axes, values: np.ndarray) -> None:
     good = values[np.isfinite(values)]
-    if len(good) and np.min(good) > 0 and np.max(good) > 100 * np.min(good):
+    if not len(good):
+        return
+    low, high = float(np.min(good)), float(np.max(good))
+    if low > 0 and high > 100 * low:
         axes.set_yscale("log")
+        axes.set_ylim(low / 2, min(2 * high, max(MOST, 4 * low)))
+    elif max(-low, high) > MOST:
+        axes.set_ylim(max(low, -MOST), min(high, MOST))

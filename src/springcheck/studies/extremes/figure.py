@@ -10,6 +10,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from springcheck.arrays import Floats
 from springcheck.figures.style import save, style
 from springcheck.studies.extremes.planes import planes
 from springcheck.studies.extremes.result import Atlas
@@ -39,6 +40,7 @@ def picture(atlas: Atlas) -> Figure:
         plane = np.array(
             [[np.nan if x is None else OUTCOMES.index(x.outcome) for x in row] for row in one.cells]
         )
+        plane = np.array([_filled(row) for row in plane])
         gaps |= bool(np.isnan(plane).any())
         axes.grid(False)
         axes.imshow(
@@ -65,3 +67,14 @@ def picture(atlas: Atlas) -> Figure:
     title = textwrap.fill(f"{len(atlas.cells)} extreme cases: {total}", 46 * columns)
     figure.suptitle(title, fontsize=10)
     return figure
+
+
+def _filled(row: Floats) -> Floats:
+    """A row of outcomes (c,), each cell as wide as the distance to the next one that was tried: a coarse grid
+    has other forces in every row."""
+    tried = np.flatnonzero(np.isfinite(row))
+    if len(tried) < 2:
+        return row
+    apart = np.abs(np.arange(len(row))[:, None] - tried)
+    near = np.min(apart, axis=1) <= (np.median(np.diff(tried)) + 1) // 2
+    return np.where(near, row[tried[np.argmin(apart, axis=1)]], np.nan)

@@ -1,17 +1,19 @@
-"""Error against run time and against force calls."""
+"""Error against run time and against force calls: a colour for each scheme, a mark for each engine."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
+from springcheck.figures import looks, overlay
+from springcheck.figures.style import save, style
 from springcheck.studies.precision.result import PrecisionStudy
 
 Document = Mapping[str, Any]
@@ -31,57 +33,38 @@ def draw(study: PrecisionStudy, folder: Path) -> list[Path]:
 
 def picture(document: Document) -> Figure:
     """The two panels, with one legend beside them."""
-    figure = Figure(figsize=(10.5, 5.2), layout="constrained")
+    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    looks = _looks([method["method"] for method in document["methods"]])
+    drawn = [method for method in document["methods"] if _of(document, method["method"], "run_seconds")]
+    groups = looks.by_scheme(method["method"] for method in drawn)
     for axes, cost in ((left, "run_seconds"), (right, "force_calls")):
-        for method in document["methods"]:
-            _line(axes, document, method, cost, looks[method["method"]])
+        for scheme, labels in groups.items():
+            for j, label in enumerate(labels):
+                # what costs as many force calls has the same curve there: one line, and every engine's marks
+                _line(axes, document, label, cost, scheme, line=cost == "run_seconds" or j == 0)
         axes.set_xscale("log")
         axes.set_yscale("log")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(LogLocator(numticks=20))
             axis.set_minor_formatter(NullFormatter())
     _frame(left, document)
-    for axes in (left, right):
-        _slopes(axes, document)
+    floors = _floors(document, groups)
+    for scheme, y in floors.items():
+        look = looks.look(scheme)
+        for axes in (left, right):
+            axes.axhline(y, color=look.color, linewidth=0.8, linestyle=(0, (1, 3)), zorder=1)
+        right.annotate(
+            f"{y:.0e}", (1.0, y), xycoords=("axes fraction", "data"), xytext=(-2, 2),
+            textcoords="offset points", ha="right", fontsize=7, color=look.color,
+        )  # fmt: skip
+    _slopes(right, document)
     left.set_xlabel("run time of the engine alone (s)")
     right.set_xlabel("force calls")
-    left.set_ylabel("largest error (distance in the energy norm, of the start)")
-    figure.suptitle(f"{document['scene']}: error against cost, to the same final time", x=0.02, ha="left")
-    handles, labels = left.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside right upper", frameon=False, handlelength=3.2, title="method (order)"
-    )
-    rounding = any(point["rounding_error"] for point in document["points"])
-    about = [
-        *(["faint dots: the part of\n  the error that is rounding"] if rounding else []),
-        *(["ring: rounding floor"] if any(method["floor"] for method in document["methods"]) else []),
-    ]
-    figure.text(0.995, 0.02, "\n".join(about), ha="right", va="bottom", fontsize=8, color="#444444")
+    left.set_ylabel("largest error / initial energy norm")
+    overlay.heading(figure, f"{document['scene']}: error against cost, to the same final time", 90)
+    extra = [Line2D([], [], color="#666666", linewidth=0.8, linestyle=(0, (1, 3)), label="rounding floor")]
+    overlay.scheme_legend(figure, groups, *(extra if floors else []))
     return figure
-
-
-def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """A colour for each engine, or for each method of a single one; a marker and a line style for each."""
-    engines = list(dict.fromkeys(name.partition(":")[0] for name in names))
-    families = engines if len(engines) > 1 else list(names)
-    count = dict.fromkeys(families, 0)
-    out: dict[str, dict[str, Any]] = {}
-    for i, name in enumerate(names):
-        family = name.partition(":")[0] if len(engines) > 1 else name
-        place = families.index(family)
-        # the first families are drawn hollow and larger, so that curves that coincide show both
-        hollow = place < max(1, len(families) // 2)
-        out[name] = {
-            "color": COLOURS[place % len(COLOURS)],
-            "linestyle": LINES[count[family] % len(LINES)],
-            "marker": MARKERS[i % len(MARKERS)],
-            "markerfacecolor": "none" if hollow else None,
-            "markersize": 6.5 if hollow else 3.2,
-        }
-        count[family] += 1
-    return out
 
 
 def _of(document: Document, method: str, cost: str) -> list[Mapping[str, Any]]:
@@ -92,42 +75,46 @@ def _of(document: Document, method: str, cost: str) -> list[Mapping[str, Any]]:
     ]
 
 
-def _line(
-    axes: Axes, document: Document, method: Mapping[str, Any], cost: str, look: Mapping[str, Any]
-) -> None:
-    name = method["method"]
-    points = _of(document, name, cost)
-    if not points:
-        return
+def _line(axes: Axes, document: Document, label: str, cost: str, scheme: str, *, line: bool) -> None:
+    """One method's points, those of the largest errors left out."""
+    points = _of(document, label, cost)
     x = np.array([point[cost] for point in points], dtype=float)
     y = np.array([point["max_error"] for point in points], dtype=float)
-    order = method["order"]
-    label = name if order is None else f"{name}  ({order:.2f})"
-    axes.plot(x, y, label=label, linewidth=1.0, markeredgewidth=0.9, **look)
-    known = [point["rounding_error"] is not None and point["rounding_error"] > 0 for point in points]
-    if any(known):
-        rounding = np.array([point["rounding_error"] or np.nan for point in points], dtype=float)
-        axes.plot(x, rounding, ".", markersize=2.2, color=look["color"], alpha=0.45)
-    if method["floor"] is not None:
-        best = int(np.argmin(np.abs(y - method["floor"])))
-        axes.plot(x[best], y[best], "o", markersize=10, fillstyle="none", color=look["color"])
-        axes.axhline(y[best], color=look["color"], linewidth=0.7, linestyle=(0, (1, 3)))
-        if cost == "run_seconds":
-            axes.annotate(
-                f"{y[best]:.1e}",
-                (x[best], y[best]),
-                xytext=(8, -10),
-                textcoords="offset points",
-                fontsize=7.5,
-                color=look["color"],
-            )
+    look = looks.look(scheme)
+    marks: dict[str, Any] = {
+        "marker": looks.mark(looks.engine(label))[0],
+        "markersize": 4,
+        "markerfacecolor": "white",
+        "markeredgecolor": look.color,
+        "markeredgewidth": 0.8,
+    }
+    axes.plot(
+        x, y, color=look.color, linestyle=look.linestyle if line else "none", linewidth=1.0, label=label,
+        markevery=1 if len(x) <= MOST_MARKS else len(x) // MOST_MARKS + 1, **marks,
+    )  # fmt: skip
+
+
+MOST_MARKS = 14
+"""Of each line."""
+
+
+def _floors(document: Document, groups: Mapping[str, list[str]]) -> dict[str, float]:
+    """The lowest rounding floor that was found of each scheme."""
+    found = {}
+    for scheme, labels in groups.items():
+        floors = [
+            method["floor"]
+            for method in document["methods"]
+            if method["method"] in labels and method["floor"] is not None
+        ]
+        if floors:
+            found[scheme] = min(floors)
+    return found
 
 
 def _frame(axes: Axes, document: Document) -> None:
     errors = [point["max_error"] for point in document["points"] if point["max_error"]]
-    parts = [point["rounding_error"] for point in document["points"] if point["rounding_error"]]
-    low = min([*errors, *(part for part in parts if part > 1e-16)])
-    axes.set_ylim(10.0 ** np.floor(np.log10(low)), min(ROOM, 2 * max(errors)))
+    axes.set_ylim(10.0 ** np.floor(np.log10(min(errors))), min(ROOM, 2 * max(errors)))
 
 
 def _slopes(axes: Axes, document: Document) -> None:

@@ -10,12 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from springcheck.figures.style import COLOURS, LINES, MARKERS, save, style
+from springcheck.figures import looks, overlay
+from springcheck.figures.style import save, style
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.stability.result import Stability
+
+ROOM = 30.0
+"""Errors above this say nothing."""
 
 
 def draw(study: Stability, folder: Path) -> list[Path]:
@@ -33,25 +37,27 @@ def draw(study: Stability, folder: Path) -> list[Path]:
     return written
 
 
-def limits(found: Sequence[Limit]) -> Figure:
-    """Spectral radius against h w: schemes as lines, engines as marks on them."""
-    schemes: dict[str, list[Limit]] = {}
-    for limit in found:
-        schemes.setdefault(limit.scheme, []).append(limit)
-    figure = Figure(figsize=(9.2, 4.6), layout="constrained")
+def limits(found: Sequence[Limit], fastest: float | None = None) -> Figure:
+    """Spectral radius against h w: schemes as lines, engines as marks on them.
+
+    `fastest`: h times the fastest angular frequency of a scene, marked.
+    """
+    figure = Figure(figsize=(9.2, 4.8), layout="constrained")
     axes = figure.add_subplot()
+    axes.axhspan(0, 1, color="#f2f2f2", zorder=0)
     axes.axhline(1.0, color="#888888", linewidth=0.8)
-    for i, (scheme, members) in enumerate(schemes.items()):
-        colour = COLOURS[i % len(COLOURS)]
+    groups = looks.by_scheme(limit.method for limit in found)
+    members = {name: [one for one in found if one.method in labels] for name, labels in groups.items()}
+    for i, (name, mine) in enumerate(members.items()):
+        look = looks.look(name)
         axes.plot(
-            members[0].turn, members[0].radius_predicted, color=colour, linestyle=LINES[i % len(LINES)],
-            label=scheme.partition(":")[0],
+            mine[0].turn, mine[0].radius_predicted, color=look.color, linestyle=look.linestyle, label=name
         )  # fmt: skip
-        for j, limit in enumerate(members):
+        for j, limit in enumerate(mine):
             axes.plot(
                 limit.turn[(i + j) % 4 :: 4], limit.radius[(i + j) % 4 :: 4], linestyle="none",
-                marker=MARKERS[j % len(MARKERS)], markerfacecolor="white", markeredgecolor=colour,
-                label=f"   {limit.method}",
+                marker=looks.mark(looks.engine(limit.method))[0], markerfacecolor="white",
+                markeredgecolor=look.color, label=limit.method,
             )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("symlog", linthresh=2.0)
@@ -63,9 +69,11 @@ def limits(found: Sequence[Limit]) -> Figure:
     axes.minorticks_off()
     axes.set_xlabel("step times frequency, $h\\,\\omega$")
     axes.set_ylabel("spectral radius of one step")
-    axes.set_title("Stable where the radius is at most 1: schemes (lines), engines' own propagators (marks)")
-    handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside right upper", frameon=False)
+    if fastest is not None and axes.get_xlim()[0] < fastest < axes.get_xlim()[1]:
+        axes.axvline(fastest, color="#555555", linewidth=0.9, linestyle=(0, (1, 2)))
+        axes.annotate(f" this scene: {fastest:.3g}", (fastest, 150), fontsize=7.5, color="#555555", va="top")
+    overlay.heading(figure, "Stable where the radius of one step is at most 1 (grey)")
+    overlay.scheme_legend(figure, groups)
     return figure
 
 
@@ -84,7 +92,7 @@ def regions(found: Sequence[Region]) -> Figure:
         if not region.stable_predicted.all():
             axes.contour(
                 region.turn, region.ratio, region.stable_predicted.astype(float), levels=[0.5],
-                colors=COLOURS[1], linewidths=1.6,
+                colors="#D55E00", linewidths=1.6,
             )  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -115,10 +123,12 @@ def resonances(found: Sequence[Resonance]) -> Figure:
     """Growth per step along h w of the fast spring."""
     figure = Figure(figsize=(8.0, 3.8 * len(found)), layout="constrained")
     for axes, one in zip(np.atleast_1d(figure.subplots(len(found), 1)).ravel(), found, strict=True):
-        axes.plot(one.turn, one.radius_predicted - 1, color=COLOURS[0], label="the exact map")
         axes.plot(
-            one.turn, one.radius - 1, linestyle="none", marker="o", markersize=2.6, color=COLOURS[1],
-            label=f"{one.method}, measured",
+            one.turn, one.radius_predicted - 1, color="#b3b3b3", linewidth=3, label="the exact map"
+        )  # fmt: skip
+        axes.plot(
+            one.turn, one.radius - 1, linestyle="none", marker="o", markersize=2.2,
+            color=looks.look(looks.scheme_of(one.method)).color, label=f"{one.method}, measured",
         )  # fmt: skip
         axes.axvline(np.pi, color="#777777", linestyle=":", linewidth=1)
         top = float(np.max(one.radius_predicted - 1))
@@ -139,37 +149,45 @@ def resonances(found: Sequence[Resonance]) -> Figure:
 
 
 def costs(found: Sequence[Cost]) -> Figure:
-    """Steps, force calls and error against stiffness."""
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-    panels = figure.subplots(1, 3)
-    methods = list(dict.fromkeys(cost.method for cost in found))
-    for axes, (field, title) in zip(
-        panels,
-        (
-            ("steps", "steps"),
-            ("force_calls", "force calls of finished runs"),
-            ("error", "error of the slow motion"),
-        ),
-        strict=True,
-    ):
-        for i, method in enumerate(methods):
-            rows = [cost for cost in found if cost.method == method]
-            if field == "force_calls":
-                rows = [cost for cost in rows if cost.outcome == "complete"]
-            x = [cost.ratio for cost in rows]
-            y = np.array([float(getattr(cost, field)) for cost in rows])
-            y = np.where((y > 0) & (y < 30 if field == "error" else y > 0), y, np.nan)
-            axes.plot(
-                x, y, color=COLOURS[i % len(COLOURS)], linestyle=LINES[(i + i // 7) % len(LINES)],
-                marker=MARKERS[i % len(MARKERS)], markerfacecolor="white", label=method,
-            )  # fmt: skip
+    """Steps, force calls and error against stiffness; hollow where a run was too long to be finished."""
+    figure = Figure(figsize=(11.4, 4.4), layout="constrained")
+    groups = looks.by_scheme(dict.fromkeys(cost.method for cost in found))
+    panels = (("steps", "steps"), ("force_calls", "force calls"), ("error", "error of the slow motion"))
+    for axes, (field, title) in zip(figure.subplots(1, 3), panels, strict=True):
+        for scheme, methods in groups.items():
+            mine = [[cost for cost in found if cost.method == method] for method in methods]
+            # the line goes through the one that was run to its end most often
+            finished = [sum(cost.outcome == "complete" for cost in rows) for rows in mine]
+            for j, rows in enumerate(mine):
+                _cost(axes, rows, field, scheme, j == int(np.argmax(finished)))
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_title(title)
+        axes.set_title(title, loc="left")
         axes.set_xlabel(
             "stiffness ratio" if found[0].family == "two-scales" else "damping ratio, $c\\,/\\,2\\sqrt{km}$"
         )
-    handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside right upper", frameon=False)
-    figure.suptitle(f"{found[0].family}: what stiffness costs (steps of unfinished runs are estimates)")
+    overlay.heading(
+        figure,
+        f"{found[0].family}: what stiffness costs (hollow: runs too long to be finished, estimated)",
+        110,
+    )
+    overlay.scheme_legend(figure, groups)
     return figure
+
+
+def _cost(axes: Axes, rows: Sequence[Cost], field: str, scheme: str, line: bool) -> None:
+    """One method's numbers: the first of a scheme as a line, all as marks."""
+    look = looks.look(scheme)
+    done = np.array([cost.outcome == "complete" for cost in rows])
+    x = np.array([cost.ratio for cost in rows])
+    y = np.array([float(getattr(cost, field)) for cost in rows])
+    # an error above the room of the motion, and force calls of a part of a run, say nothing
+    seen = (y > 0) & (y < ROOM if field == "error" else done | (field == "steps"))
+    if line:
+        axes.plot(x[seen], y[seen], color=look.color, linestyle=look.linestyle)
+    for full in (True, False):
+        some = seen & (done == full)
+        axes.plot(
+            x[some], y[some], linestyle="none", marker=looks.mark(looks.engine(rows[0].method))[0],
+            markeredgecolor=look.color, markerfacecolor=look.color if full else "white", markersize=4.5,
+        )  # fmt: skip
