@@ -8,13 +8,22 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from springcheck import output, store
 from springcheck.cli import main
 from springcheck.physics import scenefile
+from springcheck.studies.census import result as census_result
+from springcheck.studies.census import text as census_text
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.faults import result as faults_result
+from springcheck.studies.faults import text as faults_text
+from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
-from springcheck.text import GAP, Table, table
+from springcheck.studies.run import measure as run_study
+from springcheck.studies.run import text as run_text
+from springcheck.text import GAP, Lines, Table, table
 
 WIDTHS = (60, 80, 100, 200)
 
@@ -50,6 +59,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "s.h5"]) == 0
         )
         assert main(["extremes", "--quick", "--method", "own:implicit-euler", "--quiet", "-o", "x.h5"]) == 0
+        vary = ["--vary", "time.step=0.1,0.3", "--vary", "spring.0.stiffness=1:2:2"]
+        assert main(["ensemble", "spring", *vary, *own, "-o", "e.h5"]) == 0
     finally:
         os.chdir(before)
     return here
@@ -60,6 +71,7 @@ COMMANDS = [
     ["inspect", "run.h5", "--trajectory", "own:semi-implicit-euler", "--rows", "7"],
     ["inspect", "s.h5"],
     ["inspect", "x.h5"],
+    ["inspect", "e.h5"],
     ["identify", "run.h5"],
     ["list"],
 ]
@@ -102,6 +114,69 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
         printed.append(bare(capsys.readouterr().out))
         assert not Counter(printed[0].split()) - Counter(printed[-1].split()), width
         assert max(map(len, printed[-1].splitlines())) <= (width or 200)
+
+
+def on_terminals(lines: Lines, monkeypatch: Patch, capsys: Captured) -> None:
+    """Every word of these lines in a pipe is on every terminal, and none is wider than it."""
+    printed = []
+    for width in (None, *WIDTHS):
+        capsys.readouterr()
+        with monkeypatch.context() as patch:
+            patch.setattr("sys.stdout.isatty", lambda wide=width: wide is not None, raising=False)
+            patch.setenv("COLUMNS", str(width or 1))
+            output.show(lines)
+        printed.append(bare(capsys.readouterr().out))
+        assert not Counter(printed[0].split()) - Counter(printed[-1].split()), width
+        # a folded line may end in a blank
+        assert max(len(line.rstrip()) for line in printed[-1].splitlines()) <= (width or 1 << 16), width
+
+
+def test_every_word_of_a_run_with_faults_is_on_every_terminal(
+    tmp_path: Path, monkeypatch: Patch, capsys: Captured
+) -> None:
+    scene = scenefile.load_scene("chain")
+    faults = ("action-not-reaction", "mass")
+    found = run_study.run(scene, tmp_path / "r.h5", methods=["own:semi-implicit-euler"], faults=faults)
+    lines = run_text.lines(found)
+    # the store's name is as long as its folder's
+    on_terminals([line for line in lines if str(tmp_path) not in str(line)], monkeypatch, capsys)
+
+
+def test_every_word_of_the_faults_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:
+    results = tuple(
+        faults_result.Result(
+            name=fault.name,
+            about=fault.about,
+            size=fault.size,
+            rejected_by=fault.caught_by,
+            missed_by=("step-defect",) if j == 0 else (),
+            limits=dict.fromkeys(fault.caught_by, 1e-15) if fault.size else {},
+        )
+        for j, fault in enumerate(FAULTS)
+    )
+    clean = faults_result.Clean(runs=1, verdicts=1, alarms=("own:euler, scene 7: step-defect 3 of 2",))
+    on_terminals(
+        faults_text.lines(faults_result.FaultReport(results=results, clean=clean)), monkeypatch, capsys
+    )
+
+
+def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:
+    nothing = np.zeros(3)
+    entries = tuple(
+        census_result.Entry(
+            method=f"openmm:semi-implicit-euler-{j}", version="8", claimed="velocity-verlet",
+            found="semi-implicit-euler", agrees=j > 0, substeps=1, velocity_offset=-0.5, area=1e-9,
+            friction=-1e-5, precision="single", amplitude=1.0001, force_calls=1.0, seconds=1e-6,
+            digest="same", q=nothing, p=nothing,
+        )
+        for j in range(4)
+    )  # fmt: skip
+    left = (LeftOut(method="dart:joint-spring", reason="its library cannot be loaded here"),)
+    on_terminals(
+        census_text.lines(census_result.Census(entries=entries, left_out=left, taken_up=1)),
+        monkeypatch,
+        capsys,
+    )
 
 
 def rendered(made: Table, width: int) -> list[str]:

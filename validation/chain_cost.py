@@ -25,7 +25,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from springcheck import engines
-from springcheck.figures.style import MARKERS, look, save, style
+from springcheck.figures import looks
+from springcheck.figures.style import save, style
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 
@@ -82,9 +83,12 @@ def draw(rows: Sequence[tuple[str, int, float]], folder: Path) -> None:
     with style():
         figure = Figure(figsize=(6.4, 4.2), layout="constrained")
         axes = figure.add_subplot()
-        for i, name in enumerate(dict.fromkeys(row[0] for row in rows)):
+        for name in dict.fromkeys(row[0] for row in rows):
             mine = [(masses, each) for label, masses, each in rows if label == name]
-            axes.plot(*zip(*mine, strict=True), **look(i), marker=MARKERS[i % len(MARKERS)], label=name)
+            look, mark = looks.look(looks.scheme_of(name)), looks.mark(looks.engine(name))[0]
+            axes.plot(
+                *zip(*mine, strict=True), color=look.color, linestyle=look.linestyle, marker=mark, label=name
+            )
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("masses in the chain")

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from arguments import arguments
 from springcheck.arrays import Floats
 from springcheck.checks import laws
-from springcheck.figures import style
+from springcheck.figures import looks, style
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.simulate import run
@@ -85,9 +85,13 @@ def _draw(axes: object, steps: Floats, change: Floats, i: int, label: str) -> No
 
     assert isinstance(axes, Axes)
     mean, spread = np.mean(change, axis=1), np.std(change, axis=1)
-    look = style.look(i)
-    axes.plot(steps, mean, label=label, **look)
-    axes.fill_between(steps, mean - spread, mean + spread, color=look["color"], alpha=0.15, linewidth=0)
+    look = looks.look(looks.scheme_of(label))
+    # one colour for one scheme: its methods differ by their marks
+    mark = "os^D"[i % 4]
+    axes.plot(
+        steps, mean, label=label, color=look.color, linestyle=look.linestyle, marker=mark, markevery=0.2
+    )
+    axes.fill_between(steps, mean - spread, mean + spread, color=look.color, alpha=0.15, linewidth=0)
 
 
 if __name__ == "__main__":

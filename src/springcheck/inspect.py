@@ -12,7 +12,7 @@ from springcheck import store
 from springcheck.studies import STUDIES
 from springcheck.studies.keeper import plain as plainly
 from springcheck.studies.study import Result, Study
-from springcheck.text import Lines, Table, plain, table
+from springcheck.text import Lines, Table, ordinal, plain, table
 from springcheck.trajectory import Trajectory
 
 
@@ -88,7 +88,7 @@ def _runs(summary: store.Summary) -> Table:
 def _frames(run: Trajectory, stride: int) -> Lines:
     n = run.q.shape[1]
     shown = min(n, 3)
-    title = f"{run.label}" + (f", every {stride}th frame" if stride > 1 else "")
+    title = f"{run.label}" + (f", every {ordinal(stride)} frame" if stride > 1 else "")
     if n > shown:
         title += f", the first {shown} of {n} particles"
     names = [f"{name}{i}" if n > 1 else name for name in ("q", "p") for i in range(shown)]

@@ -120,6 +120,17 @@ def hanging(head: str, text: str) -> Lines:
     return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]
 
 
+def ordinal(n: int) -> str:
+    """A number's place in a row: 1st, 2nd, 3rd, 11th, 41st."""
+    ending = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
+    return f"{n}{ending}"
+
+
+def count(n: int, noun: str) -> str:
+    """So many of something: 1 cell, 2 cells."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def seconds(value: float | None) -> str:
     """A time with three digits and its unit."""
     if value is None or not np.isfinite(value):

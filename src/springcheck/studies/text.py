@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from springcheck.studies.choose import LeftOut
-from springcheck.text import Lines, plain
+from springcheck.text import Lines, count, plain
 
 
 def left_out(left: Sequence[LeftOut]) -> Lines:
@@ -19,4 +19,7 @@ def left_out(left: Sequence[LeftOut]) -> Lines:
 
 def taken_up(pieces: int, what: str) -> Lines:
     """A line on what an interrupted call had finished, where there was one."""
-    return [plain(f"  {pieces} {what} were finished by an interrupted call and taken up")] if pieces else []
+    if not pieces:
+        return []
+    were = "was" if pieces == 1 else "were"
+    return [plain(f"  {count(pieces, what)} {were} finished by an interrupted call and taken up")]

@@ -20,7 +20,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
     out: Lines = [
         plain("What every engine runs, by its states", "bold"),
         plain("Amplitude: of the blog's spring after 200 steps, exactly 1.  All else: spring-uneven."),
-        *taken_up(census.taken_up, "methods"),
+        *taken_up(census.taken_up, "method"),
         plain(),
     ]
     rows: list[Row] = []
@@ -28,7 +28,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
     for name, members in census.grouped.items():
         rows.append(plain(title(name), "italic"))
         rows += [_row(x, partners[x.method]) for x in members]
-    out.append(table(TITLES, rows, left=("method", "arithmetic", "same bits as")))
+    out.append(table(TITLES, rows, left=("method", "arithmetic"), prose=TITLES[-1]))
     out += [
         plain(f"{x.method} is declared as {title(x.claimed)}; its states show {title(x.found)}")
         for x in census.entries

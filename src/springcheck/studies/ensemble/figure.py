@@ -49,11 +49,11 @@ def picture(
         for scheme, methods in looks.by_scheme(shown).items():
             look = looks.look(scheme)
             for j, method in enumerate(methods):
-                x, mark = shown[method], looks.mark(looks.engine(method))[0]
+                x, sign = shown[method], looks.mark(looks.engine(method))[0]
                 order = np.argsort(x[over[0]])
                 axes.plot(
                     x[over[0]][order], np.clip(x[quantity][order], -FAR, FAR), label=method, color=look.color,
-                    linestyle=look.linestyle if j == 0 else "none", marker=mark,
+                    linestyle=look.linestyle if j == 0 else "none", marker=sign,
                     markevery=max(1, len(order) // 12), markerfacecolor="white", markersize=4,
                 )  # fmt: skip
         _scaled(axes, np.concatenate([x[quantity] for x in shown.values()]))

@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from springcheck.studies.ensemble.result import Ensemble, Tally
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, plain, table
+from springcheck.text import Lines, count, plain, table
 
 
 def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
@@ -19,8 +19,8 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
     ]
     titles = ("method", "cells", "complete", "error from", "to", "energy from", "to")
     out: Lines = [
-        plain(f"{found.scene.title}: {cells} cells, {how} over {', '.join(found.fields)}", "bold"),
-        *taken_up(found.taken_up, "chunks of cells"),
+        plain(f"{found.scene.title}: {count(cells, 'cell')}, {how} over {', '.join(found.fields)}", "bold"),
+        *taken_up(found.taken_up, "chunk"),
         plain(),
         table(titles, rows),
         plain("error: largest distance from the exact solution; energy: (H - H0)/|H0| where largest", "dim"),

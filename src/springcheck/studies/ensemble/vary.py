@@ -130,10 +130,10 @@ def _finite(*values: float) -> None:
 
 
 class Varied:
-    """A scene of which fields are varied."""
+    """A scene of which fields are varied, by an option of the command line."""
 
-    def __init__(self, scene: Scene, plan: Plan) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, plan: Plan, option: str = "--vary") -> None:
+        self.scene, self._option = scene, option
         self._data = tomllib.loads(plan.text or scene.to_toml())
         for axis in plan.axes:
             self._at(axis.field)
@@ -169,7 +169,7 @@ class Varied:
                 raise KeyError
         except (KeyError, IndexError, ValueError, TypeError):
             raise SpringcheckError(
-                f"--vary {field}: scene {self.scene.name} has no such number; "
+                f"{self._option} {field}: scene {self.scene.name} has no such number; "
                 "fields are named as in its file, such as spring.0.stiffness or time.step"
             ) from None
         return found, key
@@ -187,7 +187,7 @@ class Varied:
                 before.append((table, key, held))
                 is_count = isinstance(held, int) and not isinstance(held, bool) and value == int(value)
                 table[key] = int(value) if is_count else value
-            where = "--vary " + ", ".join(f"{field}={value:g}" for field, value in values.items())
+            where = f"{self._option} " + ", ".join(f"{field}={value:g}" for field, value in values.items())
             return scenefile.from_tables(self._data, name=self.scene.name, where=where)
         finally:
             for table, key, held in reversed(before):

@@ -28,7 +28,7 @@ def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:
     verdict = f"{len(wrong)} cells silently wrong" if wrong else "no cell is silently wrong"
     out: Lines = [
         plain(f"{len(atlas.cells)} extreme cases", "bold"),
-        *taken_up(atlas.taken_up, "tables of cells"),
+        *taken_up(atlas.taken_up, "table"),
         plain(),
         table(("method", "cells", *SHORT.values()), rows),
         plain(),

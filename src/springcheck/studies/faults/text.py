@@ -5,12 +5,12 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.faults.result import FaultReport
-from springcheck.text import Lines, plain, table
+from springcheck.text import Lines, Row, plain, table
 
 
 def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
     """Every fault with what rejects it and the smallest size that is seen; the right engines' runs."""
-    rows = []
+    rows: list[Row] = []
     for result in found.results:
         limit = min(result.limits.values(), default=None)
         rows.append(
@@ -21,6 +21,7 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
                 ", ".join(result.rejected_by),
             )
         )
+        rows.append(plain(f"  {result.about}", "dim"))
     clean = found.clean
     rejected = sum(bool(result.rejected_by) for result in found.results)
     return [

@@ -39,9 +39,10 @@ def picture(document: Document) -> Figure:
     groups = looks.by_scheme(method["method"] for method in drawn)
     for axes, cost in ((left, "run_seconds"), (right, "force_calls")):
         for scheme, labels in groups.items():
-            for j, label in enumerate(labels):
-                # what costs as many force calls has the same curve there: one line, and every engine's marks
-                _line(axes, document, label, cost, scheme, line=cost == "run_seconds" or j == 0)
+            # as many force calls are the same curve: one line, and the marks of every engine
+            longest = max(labels, key=lambda label: len(_of(document, label, "force_calls")))
+            for label in labels:
+                _line(axes, document, label, cost, scheme, line=cost == "run_seconds" or label == longest)
         axes.set_xscale("log")
         axes.set_yscale("log")
         for axis in (axes.xaxis, axes.yaxis):

@@ -18,7 +18,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     out: Lines = [
         plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
         plain(f"  {done} points in {study.seconds:.0f} s on {study.machine['processor']}"),
-        *taken_up(study.taken_up, "points"),
+        *taken_up(study.taken_up, "point"),
         plain(),
         _methods(study.methods),
     ]

@@ -11,6 +11,22 @@ from springcheck.studies.study import Study, scene_option, store_options
 def _options(parser: ArgumentParser) -> None:
     scene_option(parser, nargs="?")
     store_options(parser)
+    parser.add_argument("--step", type=float, metavar="H", help="another step than the scene's")
+    parser.add_argument("--steps", type=int, metavar="N", help="another number of steps")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="FIELD=NUMBER",
+        help="another number in a field of the scene file, as spring.0.stiffness=2; repeatable",
+    )
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="NAME[=SIZE]",
+        help="an engine broken on purpose among the others, as `springcheck faults` tells; repeatable",
+    )
     parser.add_argument(
         "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
     )

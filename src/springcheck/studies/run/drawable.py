@@ -9,6 +9,7 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
+from springcheck.text import ordinal
 from springcheck.trajectory import Trajectory
 
 MOST_FRAMES = 4001
@@ -42,7 +43,7 @@ def drawable(path: Path) -> Drawable:
     for run in summary.runs:
         runs[run.label], stride = keeper.strided(path, run.label, MOST_FRAMES)
         if stride > 1:
-            notes.append(f"{run.label}: every {stride}th of {run.frames} frames is drawn")
+            notes.append(f"{run.label}: every {ordinal(stride)} of {run.frames} frames is drawn")
             fast |= not _shows_motion(runs[run.label])
     followed = runs
     if fast:

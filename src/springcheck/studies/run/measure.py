@@ -27,6 +27,8 @@ from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
+from springcheck.studies.run.changes import changed
+from springcheck.studies.run.faulty import ENGINE, broken
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
@@ -51,19 +53,23 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         raise SpringcheckError("--samples, --seed, --workers and --cluster go with --vary")
     if options.vary and (options.source is not None or options.thorough or options.verdicts):
         raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
+    changes = bool(options.set) or options.step is not None or options.steps is not None
+    if (changes or options.fault) and (options.vary or options.source is not None):
+        raise SpringcheckError("--set, --step, --steps and --fault go with one SCENE")
     if options.vary:
         from springcheck.studies.ensemble import measure as ensemble
 
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    scene = scenefile.load_scene(options.scene)
+    scene = changed(options) if changes else scenefile.load_scene(options.scene)
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
         methods=options.method,
         force=options.force,
         thorough=options.thorough,
+        faults=options.fault,
         progress=progress,
     )
 
@@ -83,21 +89,25 @@ def run(
     methods: Sequence[str] = (),
     force: bool = False,
     thorough: bool = False,
+    faults: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Report:
     """Run, compare, store, judge.  Work that an interrupted call has stored is taken up.
 
-    `thorough` adds the experiments, whose runs are made on the side and not stored.
+    `thorough` adds the experiments, whose runs are made on the side and not stored; `faults` engines broken
+    on purpose, as NAME or NAME=SIZE.
 
     Raises SpringcheckError for everything that a user can mend; what is finished then stays in the
     journal, and an existing file stays as it was.
     """
     path = Path(path)
     labels, left = choose(scene, methods)
+    wrong = [broken(text) for text in dict.fromkeys(faults)]
     bar = _Bar(progress, len(labels) * (1 + thorough))
-    with keeper.kept(path, keeper.command("run", labels, scene.digest), force=force) as kept:
+    command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
+    with keeper.kept(path, command, force=force) as kept:
         resumed = kept.runs()
-        kept.room(scene, len(labels) - len(resumed))
+        kept.room(scene, len(labels) + len(wrong) - len(resumed))
         for label in tuple(labels):
             if str(label) in resumed:
                 continue
@@ -111,9 +121,14 @@ def run(
                     raise
                 labels.remove(label)
                 left.append(LeftOut(method=str(label), reason=str(error)))
-        names = tuple(str(label) for label in labels)
+        for one in wrong:
+            if one.label not in resumed:
+                with kept.draft(Label(engine=ENGINE, method=one.fault.name), scene) as draft:
+                    one.play(scene, draft)
+        names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = kept.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
+        report = replace(report, faults={one.label: one.about for one in wrong})
         if thorough:
             report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
         kept.commit_run(scene, report.comparison, report.verdicts)
@@ -252,17 +267,19 @@ class _Tally:
 
     def add(self, piece: Trajectory) -> None:
         """Take a piece into account."""
-        scene = self._scene
+        scene, right = self._scene, np.asarray(self._start)
         if self._known:
             steps = checks.Case(trajectory=piece, scene=scene).steps
             q, p = exact.true_motion(scene, steps, piece.step)
+            if scene.system.is_damped:
+                right = np.asarray(scene.system.energy(q, p), np.float64)
             # not max(), which leaves out what is no number
             here = np.max(self._norm(piece.q - q, piece.p - p))
             # nothing below what is known of the exact solution is reported as an error
             known = exact.uncertainty(scene, float(steps[-1]) * piece.step)
             self.error = float(np.maximum(np.maximum(self.error, here), known))
         with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - self._start
+            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - right
         worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
@@ -298,6 +315,12 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
         raise StoreError(f"{path}: holds no trajectory to run again")
     if not chosen:
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(known)}")
+    for name in chosen:
+        if name.startswith(f"{ENGINE}:"):
+            raise StoreError(
+                f"{path}: {name} is of an engine broken on purpose, which --from does not run; "
+                "name the others with --method"
+            )
     scene = keeper.stored_scene(path)
     found = []
     beside = path.absolute().parent

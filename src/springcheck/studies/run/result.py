@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -29,7 +30,8 @@ class MethodRun:
     max_error: float
     """Largest distance from the exact solution (`Norm`); NaN where that is not known."""
     energy_drift: float
-    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0."""
+    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0.  With friction
+    H - H of the exact solution in the place of H - H0, where that is known."""
     start_seconds: float
     run_seconds: float
     force_calls: int
@@ -49,6 +51,8 @@ class Report:
     judged_frames: int
     """Frames of each run that were judged: all of them, unless the run is very long."""
     resumed: tuple[str, ...] = ()
+    faults: Mapping[str, str] = field(default_factory=dict)
+    """What is wrong with each run of an engine that is broken on purpose."""
 
     def __repr__(self) -> str:
         methods = f"{len(self.runs)} method{'s' if len(self.runs) != 1 else ''}"
@@ -87,6 +91,7 @@ class Report:
                 "not_judged": self.not_judged,
                 "comparison": self.comparison,
                 "same_motion": self.same,
+                "faults": dict(self.faults),
             }
         )
         return found

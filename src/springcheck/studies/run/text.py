@@ -10,6 +10,8 @@ import numpy as np
 from rich.text import Text
 
 from springcheck import checks, schemes
+from springcheck.physics.exact import has_true_motion
+from springcheck.physics.scene import Scene
 from springcheck.studies.ensemble import text as ensemble
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
@@ -30,6 +32,7 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
     out: Lines = []
     if found.verdicts:
         out += [plain(), plain("Largest value of each check, as a fraction of its bound:")]
+        out.append(plain("below 1 passes; ! marks what does not", "dim"))
         out += [*matrices(found.verdicts), *sights(found.verdicts)]
         out += [*failures(found.verdicts), *unjudged(found.verdicts)]
         if verdicts:
@@ -45,7 +48,7 @@ def _report(report: Report) -> Lines:
     out: Lines = [_headline(report), plain(), _runs(report.runs)]
     out += [
         plain("error: largest distance from the exact solution, relative to the initial energy norm", "dim"),
-        plain("energy: (H - H0)/|H0| where it is largest", "dim"),
+        plain(f"energy: {_energy(report.scene)}", "dim"),
     ]
     out += [
         plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
@@ -54,8 +57,10 @@ def _report(report: Report) -> Lines:
     ]
     out += _same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
+    out.append(plain("below 1 passes; ! marks what does not", "dim"))
     out += [*matrices(report.verdicts), *sights(report.verdicts)]
-    out += failures(report.verdicts)
+    out += failures(v for v in report.verdicts if v.method not in report.faults)
+    out += _faults(report)
     out += unjudged(report.verdicts)
     out += left_out(report.left_out)
     if report.judged_frames < report.scene.frames:
@@ -92,6 +97,15 @@ def _runs(runs: Sequence[MethodRun]) -> Table:
         ]
     titles = ("method", "error", "energy", "start", "run", "outcome")
     return table(titles, rows, left=("method", "outcome"))
+
+
+def _energy(scene: Scene) -> str:
+    """What the column of energies holds."""
+    if not scene.system.is_damped:
+        return "(H - H0)/|H0| where it is largest"
+    if has_true_motion(scene):
+        return "(H - H exact)/|H0| where it is largest, the exact loss by friction taken off"
+    return "(H - H0)/|H0| where it is largest, the loss by friction in it"
 
 
 def _error(x: float) -> str:
@@ -181,6 +195,17 @@ def failures(verdicts: Iterable[Verdict]) -> Lines:
     for v in verdicts:
         if v.passed is False:
             out.append(plain(f"FAILED {v.method} {v.check}: {verdict_line(v)}", "bold red"))
+    return out
+
+
+def _faults(report: Report) -> Lines:
+    """What is wrong with each engine that is broken on purpose, and which checks reject it."""
+    out: Lines = []
+    for method, about in report.faults.items():
+        mine = [v for v in report.verdicts if v.method == method and v.passed is not None]
+        seen = [v.check for v in mine if not v.passed]
+        said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: nothing here sees it"
+        out.append(plain(f"{method}, broken on purpose ({about}): {said}", "" if seen else "bold yellow"))
     return out
 
 

@@ -27,7 +27,9 @@ def draw(study: Stability, folder: Path) -> list[Path]:
     written = []
     with style():
         if study.limits:
-            written += save(limits(study.limits), folder, "stability-limits")
+            written += save(
+                limits(study.limits, abs(study.scene.step) * study.fastest), folder, "stability-limits"
+            )
         if study.regions:
             written += save(regions(study.regions), folder, "stability-regions")
         if study.resonances:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from springcheck.physics.scene import Scene
+from springcheck.physics.system import MOST_DENSE
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import plain
 from springcheck.studies.stability import limits
@@ -39,6 +40,11 @@ class Stability:
     """Where it was stored."""
 
     @property
+    def fastest(self) -> float:
+        """The scene's largest angular frequency [1/T] (see `fastest`)."""
+        return fastest(self.scene)
+
+    @property
     def passed(self) -> bool:
         """Whether limits, growth, regions and bands are where theory puts them, and any was measured."""
         return bool(self.limits) and not failures(self)
@@ -59,6 +65,8 @@ class Stability:
             {
                 "scene": self.scene.name,
                 "passed": self.passed,
+                "fastest": self.fastest,
+                "h_w": abs(self.scene.step) * self.fastest,
                 "methods": [_limit(limit) for limit in self.limits],
                 "regions": [
                     {
@@ -90,6 +98,26 @@ def _limit(x: Limit) -> dict[str, Any]:
         **_named(x, *names),
         "points": [{"h_w": a, "radius": b, "radius_predicted": c} for a, b, c in points],
     }
+
+
+def fastest(scene: Scene) -> float:
+    """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
+
+    That of small oscillations about the start; of more particles than a matrix is kept for the bound of
+    Gershgorin.
+    """
+    system = scene.system
+    if system.has_modes:
+        largest = float(np.max(system.modes.w2))
+    elif system.is_separate:
+        largest = float(np.max(system.hessian_diagonal(scene.q) / scene.m))
+    elif scene.n <= MOST_DENSE:
+        root = np.sqrt(scene.m)
+        scaled = np.asarray(system.hessian(scene.q), np.float64) / root[:, None] / root
+        largest = float(np.linalg.eigvalsh(scaled)[-1])
+    else:
+        largest = float(np.max(system.gershgorin(scene.q) / scene.m))
+    return float(np.sqrt(max(largest, 0.0)))
 
 
 def growth_allowed(limit: Limit) -> float:

@@ -15,7 +15,8 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
     """The whole report."""
     out: Lines = [
         plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"),
-        *taken_up(study.taken_up, "measurements"),
+        *_of_scene(study),
+        *taken_up(study.taken_up, "measurement"),
         plain(),
     ]
     if study.limits:
@@ -27,8 +28,10 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
                 "-" if np.isnan(x.growth_above) else f"{y:.7f}" for y in (x.growth_above, x.growth_predicted)
             ]
             style = "" if x.agrees else "bold red"
-            rows.append([plain(cell, style) for cell in (x.method, *places, f"{off:.0e}", *grown)])
-        out += [table(("method", "limit h w", "theory", "off", "growth above", "predicted"), rows), plain()]
+            cells = (x.method, *places, f"{off:.0e}", *grown, _largest_step(x.limit, study.fastest))
+            rows.append([plain(cell, style) for cell in cells])
+        titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
+        out += [table(titles, rows), plain()]
     if study.costs:
         costs = [
             (
@@ -42,3 +45,28 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
     out += [plain(line) for line in study.sentences]
     out += left_out(study.left_out)
     return [*out, plain(f"Stored in {study.path}")] if study.path else out
+
+
+def _of_scene(study: Stability) -> Lines:
+    """The scene's fastest motion, its step, and the methods for which that is too long."""
+    if not study.fastest:
+        return [
+            plain("  nothing in this scene oscillates at its start: no step is too long for its stability")
+        ]
+    turn = abs(study.scene.step) * study.fastest
+    beyond = [x.method for x in study.limits if x.limit < turn]
+    said = f"its step h = {study.scene.step:g} makes h w = {turn:.4g}"
+    out: Lines = [
+        plain(f"  fastest angular frequency of this scene, at its start: w = {study.fastest:.6g}; {said}")
+    ]
+    if beyond:
+        out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
+    elif study.limits:
+        out.append(plain("  within the limit of every method measured here"))
+    return out
+
+
+def _largest_step(limit: float, fastest: float) -> str:
+    if limit == 0:
+        return "none"
+    return "any" if np.isinf(limit) or not fastest else f"{limit / fastest:.4g}"

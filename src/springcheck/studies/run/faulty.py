@@ -1,0 +1,93 @@
+"""An engine broken on purpose among the others: --fault."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from springcheck import simulate
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError, nearest
+from springcheck.physics.scene import Scene
+from springcheck.studies.faults.seeded import Fault
+from springcheck.studies.faults.table import FAULTS
+from springcheck.studies.keeper import Draft
+from springcheck.trajectory import Trajectory
+
+ENGINE = "fault"
+"""What stands for an engine in the labels of faults."""
+
+MOST_NUMBERS = 10**7
+"""Of one trajectory: a fault is recorded in memory, by loops in Python."""
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A fault, of its size in the table or of another."""
+
+    fault: Fault
+    size: float | None
+
+    @property
+    def label(self) -> str:
+        """Of its trajectory."""
+        return f"{ENGINE}:{self.fault.name}"
+
+    @property
+    def about(self) -> str:
+        """What is wrong, and by how much."""
+        size = self.fault.size if self.size is None else self.size
+        return self.fault.about + ("" if size is None else f" ({size:.0e})")
+
+    def play(self, scene: Scene, draft: Draft) -> None:
+        """Record it.  MethodError where it makes no sense of the scene."""
+        if scene.steps * scene.n > MOST_NUMBERS:
+            raise MethodError(f"--fault {self.fault.name}: {scene.steps} steps are too many for it")
+        try:
+            made = self.fault.run(scene, self.label, size=self.size)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            raise MethodError(
+                f"--fault {self.fault.name}: it cannot be had on scene {scene.name}, only on a "
+                f"{self.fault.scene} such as that of `springcheck faults` ({error})"
+            ) from error
+        energy = made.energy if "energy" in scene.quantities else None
+        draft.append(made.t, made.q, made.p, energy)
+        draft.finish(_record(made, self))
+
+
+def _record(made: Trajectory, broken: Broken) -> simulate.Record:
+    return simulate.Record(
+        label=Label(engine=ENGINE, method=broken.fault.name),
+        scheme=made.scheme,
+        step=made.step,
+        every=made.every,
+        tolerance=made.tolerance,
+        outcome=made.outcome,
+        timing=made.timing,
+        force_calls=made.force_calls,
+        arithmetic=made.arithmetic,
+        rebuilds_velocity=made.rebuilds_velocity,
+        off_axis=made.off_axis,
+        origin={"engine": "broken on purpose", "method": broken.about, "velocity": "as it says"},
+    )
+
+
+def broken(text: str) -> Broken:
+    """The fault of NAME or NAME=SIZE.  MethodError where there is none."""
+    name, equals, size = text.partition("=")
+    found = {fault.name: fault for fault in FAULTS}.get(name)
+    if found is None:
+        names = [fault.name for fault in FAULTS]
+        raise MethodError(
+            f"--fault {name}: no such fault{nearest(name, names)}; `springcheck faults` tells them all"
+        )
+    if not equals:
+        return Broken(found, None)
+    try:
+        value = float(size)
+    except ValueError:
+        value = math.nan
+    if found.size is None or not (math.isfinite(value) and value > 0):
+        needed = "it has no size" if found.size is None else "a size above 0 is needed"
+        raise MethodError(f"--fault {text}: {needed}")
+    return Broken(found, value)

@@ -1,0 +1,154 @@
+"""`springcheck run` with numbers set anew and engines broken on purpose; what its report says of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import simulate, store
+from springcheck.cli import main
+from springcheck.physics import scenefile
+from springcheck.studies import keeper
+from springcheck.studies.stability.result import fastest
+from springcheck.text import count, ordinal
+
+Captured = pytest.CaptureFixture[str]
+EULER = ["--method", "own:euler"]
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_numbers_are_set_as_if_the_file_had_them() -> None:
+    changes = [
+        "--set",
+        "spring.0.stiffness=2",
+        "--set",
+        "particle.0.mass=1.7",
+        "--step",
+        "0.2",
+        "--steps",
+        "50",
+    ]
+    assert main(["run", "spring", *EULER, *changes, "--quiet"]) == 0
+    text = scenefile.text_of("spring")
+    for old, new in (("stiffness = 1.0", "stiffness = 2"), ("mass = 1.0", "mass = 1.7")):
+        text = text.replace(old, new)
+    text = text.replace("step = 0.1", "step = 0.2").replace("steps = 200", "steps = 50")
+    scene = scenefile.parse(text, name="spring")
+    kept = keeper.stored_scene(Path("spring.h5"))
+    assert kept.digest == scene.digest != scenefile.load_scene("spring").digest
+    assert "spring.0.stiffness = 2" in kept.title
+    np.testing.assert_array_equal(
+        store.read_one("spring.h5", "own:euler").q, simulate.run(scene, "own:euler").q
+    )
+    # the unchanged scene is another one
+    assert main(["run", "spring", *EULER, "--quiet"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--set", "spring.7.stiffness=2"], "spring.7.stiffness: scene spring has no such number"),
+        (["--set", "spring.0.stifness=2"], "unknown field"),
+        (["--set", "spring.0.stiffness"], "FIELD=NUMBER is needed"),
+        (["--set", "spring.0.stiffness=two"], "FIELD=NUMBER is needed"),
+        (["--set", "=2"], "FIELD=NUMBER is needed"),
+        (["--set", "time.step=0.2", "--step", "0.3"], "set twice"),
+        (["--steps", "-3"], ">= 1"),
+        (["--step", "nan"], "step"),
+        (["--fault", "stifness"], "did you mean stiffness"),
+        (["--fault", "kcal=2"], "no size"),
+        (["--fault", "mass=-1"], "above 0"),
+        (["--set", "time.step=1", "--vary", "time.step=1:2:3"], "go with one SCENE"),
+    ],
+)
+def test_what_cannot_be_set_is_refused_in_one_line(given: list[str], words: str, capsys: Captured) -> None:
+    assert main(["run", "spring", *EULER, *given]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert len(said.splitlines()) == 1
+    assert not list(Path().glob("*.h5"))
+
+
+def test_a_fault_is_a_method_among_the_others_and_is_rejected(capsys: Captured) -> None:
+    command = ["run", "spring-uneven", *EULER, "--fault", "stiffness", "--fault", "mass=1e-6"]
+    assert main([*command, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    failed = {v["method"]: v["check"] for v in found["verdicts"] if v["passed"] is False}
+    assert set(failed) == set(found["faults"]) == {"fault:stiffness", "fault:mass"}
+    assert found["faults"]["fault:mass"] == "every mass is too large (1e-06)"
+    whole = store.read_one("spring-uneven.h5", "fault:mass")
+    right = simulate.run(scenefile.load_scene("spring-uneven"), "ase:velocity-verlet")
+    off = np.max(np.abs(whole.q - right.q))
+    # a phase of 200 steps of h w = 0.0885 with a mass that is 1e-6 too large
+    assert off == pytest.approx(0.3 * 200 * 0.0885 * 0.5e-6, rel=1)
+    assert main([*command, "--force"]) == 1
+    assert (
+        "fault:mass, broken on purpose (every mass is too large (1e-06)): rejected by"
+        in capsys.readouterr().out
+    )
+    assert main(["run", "--from", "spring-uneven.h5"]) == 2
+    assert "broken on purpose" in capsys.readouterr().err
+    assert main(["run", "--from", "spring-uneven.h5", *EULER]) == 0
+
+
+def test_with_friction_energies_are_measured_against_the_exact_loss(capsys: Captured) -> None:
+    assert main(["run", "rlc-circuit", "--method", "own:*", "--json"]) == 0
+    drift = {run["method"]: run["energy_drift"] for run in json.loads(capsys.readouterr().out)["runs"]}
+    scene = scenefile.load_scene("rlc-circuit")
+    q, p = scene.system.solution(np.arange(401), scene.step)  # type: ignore[misc]
+    right = np.asarray(scene.system.energy(q, p), float)
+    for method, found in drift.items():
+        run = simulate.run(scene, method)
+        assert run.energy is not None
+        off = run.energy - right
+        assert found == pytest.approx(off[np.argmax(np.abs(off))] / run.energy[0], rel=1e-9), method
+    # 93 % of the energy is gone, and the scheme has lost what it should
+    assert abs(drift["own:semi-implicit-euler"]) < 0.05
+    assert main(["run", "rlc-circuit", "--method", "own:euler", "--force"]) == 0
+    said = capsys.readouterr().out
+    assert "the exact loss by friction" in said
+    assert "below 1 passes" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("spring-uneven", np.sqrt(2.9 / 3.7)),
+        ("carbon-monoxide", np.sqrt(1145328.357 * (1 / 12 + 1 / 15.99491461957))),
+        ("overdamped", np.sqrt(2.9 / 1.3)),
+        ("anharmonic", np.sqrt((2.9 + 3 * 1.7 * 0.9**2) / 1.3)),
+        ("free", 0.0),
+        ("inverted", 0.0),
+    ],
+)
+def test_the_fastest_frequency_of_a_scene(name: str, expected: float) -> None:
+    assert fastest(scenefile.load_scene(name)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_stability_speaks_of_the_scene(capsys: Captured) -> None:
+    assert (
+        main(["stability", "stiff-spring", "--method", "own:semi-implicit-euler", "--method", "own:euler"])
+        == 0
+    )
+    said = capsys.readouterr().out
+    # w = sqrt(14800/0.37) = 200, h = 0.0095
+    assert "w = 200;" in said
+    assert "h w = 1.9" in said
+    assert "beyond the limit there: own:euler" in said
+    (row,) = (line for line in said.splitlines() if line.startswith("own:semi-implicit-euler"))
+    assert row.split()[-1] == "0.01"
+
+
+def test_ordinals_and_plurals() -> None:
+    given = (1, 2, 3, 4, 11, 12, 13, 21, 41, 101, 111, 1002)
+    assert [ordinal(n) for n in given] == [
+        "1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "41st", "101st", "111th", "1002nd",
+    ]  # fmt: skip
+    assert (count(1, "cell"), count(2, "cell"), count(0, "cell")) == ("1 cell", "2 cells", "0 cells")
