@@ -15,12 +15,13 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes, store
+from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.studies.faults import clean
-from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
+from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 
 VALIDATION = Path(__file__).parent.parent / "validation"
 sys.path.insert(0, str(VALIDATION))
@@ -105,3 +106,19 @@ def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     sees = {v["check"]: v["sees"] for v in shown["verdicts"]}
     assert sees["step-defect"]["stiffness"] < 1e-13
     assert sees["start"] == {"stiffness": None, "step": None, "friction": None}
+
+
+def test_the_matrix_says_it_of_its_single_steps() -> None:
+    scene, scheme = detection.spring(0.3, 20), schemes.SCHEMES["velocity-verlet"]
+
+    def bench(name: str = "", x: float = 0.0) -> checks.Bench:
+        def run(other: Scene, label: str) -> Trajectory:
+            made: Trajectory = detection.planted(other, scheme, name, x)
+            return made
+
+        return checks.Bench(scene=scene, label="", run=run)
+
+    for name in ("stiffness", "step"):
+        limit = getattr(experiments.propagator(bench()).sees, name)
+        assert experiments.propagator(bench(name, 3 * limit)).passed is False
+        assert experiments.propagator(bench(name, limit / 10)).passed is True

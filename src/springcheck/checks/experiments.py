@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Floats
+from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.checks import sight
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
@@ -38,12 +39,18 @@ def propagator(bench: Bench) -> Verdict:
     q, p = case.next_states
     of_q, of_p = case.allowance
     off = np.maximum(np.abs(q - case.trajectory.q[1:]) / of_q, np.abs(p - case.trajectory.p[1:]) / of_p)
+
+    def part(at: Integers, change: sight.States) -> Reals:
+        most = np.maximum(np.abs(change[0]) / of_q[at], np.abs(change[1]) / of_p[at])
+        return np.asarray(most / case.roundings)
+
     return bench.verdict(
         "propagator",
         float(np.max(off)),
         float(case.roundings),
         "roundings",
         f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each",
+        sight.of_steps(case, np.ones(1, dtype=bool), part),
     )
 
 
