@@ -117,8 +117,8 @@ def test_the_package_exposes_its_scenes_to_a_plain_run() -> None:
     ] == []
 
 
-def test_faults_of_the_command_line_print_one_document(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_faults_of_the_command_line_print_one_document_and_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from springcheck import cli
 
@@ -133,8 +133,17 @@ def test_faults_of_the_command_line_print_one_document(
     assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
     assert document["limits"]["stiffness"]["step-defect"] < 1e-14
     assert document["clean_runs"] == 21
-    assert cli.main(["faults"]) == 0
-    assert "2 of 2 faults rejected" in capsys.readouterr().out
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["faults", "-o", "f.h5"]) == 0
+    said = capsys.readouterr().out
+    assert "2 of 2 faults rejected" in said
+    assert cli.main(["inspect", "f.h5"]) == 0
+    assert said.partition("Stored in")[0].strip() in capsys.readouterr().out
+    assert trial.stored("f.h5").document() == document
+    assert cli.main(["plot", "f.h5", "--quiet"]) == 0
+    assert [path.name for path in sorted(tmp_path.rglob("*.png"))] == ["faults.png"]
+    assert cli.main(["faults", "-o", "f.h5"]) == 2
+    assert "--force" in capsys.readouterr().err
 
 
 def test_a_thorough_run_reports_its_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,9 +22,12 @@ from springcheck.page.content import drawn
 from springcheck.page.sections import Piece, Section, Sheet
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import STUDIES, charts
+from springcheck.studies import STUDIES, charts, keeper
 from springcheck.studies.charts import Bank, Chart, Curve, Scale, Tiles
 from springcheck.studies.extremes import measure as atlas
+from springcheck.studies.faults import measure as faults
+from springcheck.studies.faults.result import Clean, FaultReport
+from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
 
 HOSTILE = (
@@ -227,6 +230,10 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
+NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults")
+FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
+
+
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A small store of each study that a store holds, by its name."""
@@ -241,15 +248,16 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
     for name, call in calls.items():
         assert main([*call, "-o", str(folder / f"{name}.h5"), "--quiet"]) == 0
-    return {name: folder / f"{name}.h5" for name in calls}
-
-
-NAMES = ("precision", "stability", "extremes", "census", "ensemble")
+    with keeper.kept(folder / "faults.h5", "faults") as kept:
+        found = tuple(faults.examine(fault, limits=fault.name == "friction") for fault in FEW)
+        clean = Clean(runs=3, verdicts=20, alarms=())
+        faults.record(kept, FaultReport(results=found, clean=clean))
+    return {name: folder / f"{name}.h5" for name in NAMES}
 
 
 def test_these_are_all_studies_that_a_store_holds() -> None:
     kept = {study.name for study in STUDIES if not study.trajectories}
-    assert kept - {"faults"} == set(NAMES)
+    assert kept == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -265,7 +273,8 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     assert tables
     tags = Tags(text)
     assert all(attributes.get("scope") in {"row", "col"} for tag, attributes in tags.tags if tag == "th")
-    assert "own:semi-implicit-euler" in {row[0].text for table in tables for row in table.rows}
+    known = "friction" if name == "faults" else "own:semi-implicit-euler"
+    assert known in {row[0].text for table in tables for row in table.rows}
 
 
 def test_charts_hold_the_stored_doubles(studies: dict[str, Path]) -> None:
@@ -298,6 +307,17 @@ def test_every_cell_of_the_atlas_stands_in_its_map(studies: dict[str, Path]) -> 
         if kind >= 0
     }
     assert seen == placed
+
+
+def test_every_fault_stands_in_its_map(studies: dict[str, Path]) -> None:
+    (chart,) = _data(page.html(page.gather(studies["faults"])))["banks"]["faults-0"]["charts"]
+    assert chart["y"]["values"] == [fault.name for fault in FEW[::-1]]
+    for result, row in zip(
+        faults.stored(studies["faults"]).results[::-1], chart["tiles"]["rows"], strict=True
+    ):
+        kinds = [kind for count, kind in row for _ in range(count)]
+        seen = {check for check, kind in zip(chart["x"]["values"], kinds, strict=True) if kind == 0}
+        assert seen == set(result.rejected_by)
 
 
 def keeper_atlas(path: Path) -> list[Any]:

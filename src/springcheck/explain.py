@@ -89,6 +89,12 @@ def check_lines(check: Any) -> Iterator[str]:
         yield from _folded(f"Must reject, and is held to it: {', '.join(names)}")
 
 
+def sentence(check: Any) -> str:
+    """What holds where a check passes, in one sentence."""
+    paragraph = inspect.cleandoc(check.judge.__doc__ or "").partition("\n\n")[0]
+    return " ".join(paragraph.split()).partition(". ")[0].removesuffix(".") + "."
+
+
 def _seen(check: Any) -> Iterator[str]:
     """The faults that a check of recorded states passes, measured now."""
     from springcheck.studies.faults import measure

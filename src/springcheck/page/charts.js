@@ -93,8 +93,12 @@ class Chart {
   }
 
   draw() {
-    const { spec } = this, L = 62, R = 12, T = 12, B = 46;
-    const W = (this.W = Math.max(280, this.box.clientWidth || 440)), H = (this.H = Math.min(420, Math.max(260, Math.round(W * 0.72))));
+    const { spec } = this, wordy = (scale) => (scale.named ? Math.max(...scale.values.map((v) => v.length)) : 0);
+    // names are written in full: at the left, and upwards below
+    const L = 62 + 6.4 * Math.max(0, wordy(spec.y) - 5), R = 12, T = 12, B = 46 + 6.4 * Math.max(0, wordy(spec.x) - 2);
+    const W = (this.W = Math.max(280, this.box.clientWidth || 440));
+    const tall = spec.y.named ? spec.y.values.length * 14 + T + B : Math.min(420, Math.max(260, Math.round(W * 0.72)));
+    const H = (this.H = tall);
     let [x0, x1, y0, y1] = this.view || this.whole();
     let sx = (W - L - R) / (x1 - x0), sy = (H - T - B) / (y1 - y0);
     if (spec.equal) {
@@ -107,7 +111,9 @@ class Chart {
     const root = element("svg", { viewBox: `0 0 ${W} ${H}`, "aria-hidden": "true" });
     for (const [v, text] of ticks(spec.x, x0, x1)) {
       if (!spec.tiles) root.append(element("line", { class: "grid", x1: x(v), x2: x(v), y1: T, y2: H - B }));
-      root.append(element("text", { x: x(v), y: H - B + 17, "text-anchor": "middle" }, text));
+      const under = { x: x(v), y: H - B + 17, "text-anchor": "middle" };
+      const upright = { transform: `translate(${x(v) + 4} ${H - B + 6}) rotate(-90)`, "text-anchor": "end" };
+      root.append(element("text", spec.x.named ? upright : under, text));
     }
     for (const [v, text] of ticks(spec.y, y0, y1)) {
       if (!spec.tiles) root.append(element("line", { class: "grid", x1: L, x2: W - R, y1: y(v), y2: y(v) }));
@@ -168,7 +174,7 @@ class Chart {
       }
     });
     kinds.forEach(([, shade], kind) => {
-      if (paths[kind]) inside.append(element("path", { class: `tile ${shade === "limit" ? "limit-tile" : shade}`, d: paths[kind] }));
+      if (paths[kind]) inside.append(element("path", { class: `tile ${shade === "limit" ? "limit-tile" : shade}`, d: paths[kind], "shape-rendering": "crispEdges" }));
     });
   }
 

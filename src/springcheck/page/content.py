@@ -58,8 +58,8 @@ class Content:
     summary: Summary
     not_trusted: tuple[Finding, ...]
     methods: tuple[Passed, ...]
-    explained: Mapping[str, tuple[str, ...]]
-    """Of the checks among the verdicts: what each looks at, in lines."""
+    explained: Mapping[str, tuple[str, tuple[str, ...]]]
+    """Of the checks among the verdicts: what each looks at, in a sentence and in lines."""
     same: tuple[Same, ...] | None
     """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
     comparison: Comparison | None
@@ -102,7 +102,7 @@ def gather(path: Path) -> Content:
         not_trusted=tuple(store.doubts(path)),
         methods=tuple(_methods(summary, verdicts)),
         explained={
-            check.name: tuple(explain.check_lines(check))
+            check.name: (explain.sentence(check), tuple(explain.check_lines(check)))
             for check in checks.ALL
             if any(verdict.check == check.name for verdict in verdicts)
         },

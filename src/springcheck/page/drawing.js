@@ -96,16 +96,17 @@ function powerOfTen(exponent) {
 function ticks(scale, low, high) {
   const { values, log } = scale;
   if (values.length) {
+    if (scale.named) return values.map((text, i) => [i, text]).filter(([i]) => i >= low && i <= high);
     const first = Math.max(0, Math.ceil(low)), last = Math.min(values.length - 1, Math.floor(high));
     const every = Math.max(1, Math.ceil((last - first + 1) / 8)), found = [];
-    // of many values in even ratios those next to a power of ten
-    const ratio = Math.log(values[1] / values[0]);
-    const even = Math.abs(Math.log(values[values.length - 1] / values[0]) / (values.length - 1) / ratio - 1) < 1e-6;
-    for (let i = first; i <= last; i++) {
-      const decade = 10 ** Math.round(Math.log10(values[i]));
-      const near = Math.abs(Math.log(values[i] / decade)) <= Math.abs(ratio) / 2;
-      if (even && last - first > 40 ? near : (i - first) % every === 0) found.push([i, number(values[i])]);
+    // many values in even ratios: a logarithmic axis, marked at powers of ten
+    const ratio = Math.log10(values[1] / values[0]), most = values.length - 1;
+    const even = Math.abs(Math.log10(values[most] / values[0]) / (most * ratio) - 1) < 1e-6;
+    if (even && last - first > 40) {
+      const start = Math.log10(values[0]);
+      return ticks({ values: [], log: true }, start + low * ratio, start + high * ratio).map(([v, text]) => [(v - start) / ratio, text]);
     }
+    for (let i = first; i <= last; i += every) found.push([i, number(values[i])]);
     return found;
   }
   if (log && high - low > 1) {

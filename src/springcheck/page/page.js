@@ -50,7 +50,7 @@ function banks() {
   for (const [name, bank] of Object.entries(DATA.banks)) {
     for (const chart of bank.charts) {
       for (const curve of chart.curves) Object.assign(curve, { x: numbers(curve.x), y: numbers(curve.y), title: curve.group });
-      if (chart.tiles) for (const scale of [chart.x, chart.y]) scale.values = numbers(scale.values);
+      if (chart.tiles) for (const scale of [chart.x, chart.y]) if (!scale.named) scale.values = numbers(scale.values);
     }
     new Bank(document.getElementById(name), bank);
   }

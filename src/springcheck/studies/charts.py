@@ -27,6 +27,8 @@ class Scale:
     log: bool = False
     values: Sequence[float] = ()
     """Of tiles: what stands at 0, 1, 2 ..."""
+    names: Sequence[str] = ()
+    """The same in words, all of which are written."""
     shown: tuple[float, float] | None = None
     """From and to at first; left out: what the curves fill."""
 
@@ -109,7 +111,8 @@ def numbers(values: Sequence[float] | Floats) -> list[float | str]:
 def _chart(chart: Chart) -> dict[str, Any]:
     found = asdict(chart)
     for name in ("x", "y"):
-        found[name]["values"] = numbers(found[name]["values"])
+        names = list(found[name].pop("names"))
+        found[name] |= {"named": bool(names), "values": names or numbers(found[name]["values"])}
     for curve in found["curves"]:
         curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
     if chart.tiles:

@@ -11,6 +11,8 @@ from springcheck.studies.study import Study, report_options
 
 def _options(parser: ArgumentParser) -> None:
     team.options(parser, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("-o", "--output", metavar="FILE", help="keep it in a store, for plot and report")
+    parser.add_argument("--force", action="store_true", help="write an existing store anew")
     report_options(parser)
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 
@@ -15,9 +17,10 @@ from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
+from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.faults import clean, steppers
-from springcheck.studies.faults.result import Clean, FaultReport, Result
+from springcheck.studies.faults.result import SEEN, Clean, FaultReport, Result, restored, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.study import Progress
@@ -198,7 +201,25 @@ def judged_labels() -> list[str]:
 
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
-    return study(simulate.run, judged_labels(), team=teams.of(options), progress=progress)
+    labels, team = judged_labels(), teams.of(options)
+    if options.output is None:
+        return study(simulate.run, labels, team=team, progress=progress)
+    named = keeper.command("faults", list(map(engines.parse, labels)))
+    with keeper.kept(options.output, named, force=options.force) as kept:
+        found = study(simulate.run, labels, team=team, progress=progress)
+        record(kept, found)
+    return replace(found, path=Path(options.output))
+
+
+def record(kept: keeper.Keeper, found: FaultReport) -> None:
+    """Keep a study in a store."""
+    kept.keep(SEEN, "limits", seen(found))
+    kept.commit("faults", found.document())
+
+
+def stored(path: str | Path) -> FaultReport:
+    """The study that a store holds.  StoreError where it holds none."""
+    return keeper.restored(path, "faults", restored)
 
 
 def study(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
-from springcheck.studies.keeper import plain
+from springcheck.studies.keeper import Kept, plain
+from springcheck.studies.tables import Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +39,8 @@ class FaultReport:
 
     results: tuple[Result, ...]
     clean: Clean
+    path: Path | None = None
+    """Where it was stored."""
 
     @property
     def sound(self) -> bool:
@@ -60,3 +64,44 @@ class FaultReport:
         }
         document: dict[str, Any] = plain(found)
         return document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """The smallest size of a fault that a check rejects, for viewers of the file."""
+
+    fault: str
+    check: str
+    size: float
+
+
+SEEN: Rows[Seen] = Rows(kind=Seen, beginning="faults/", named="")
+
+
+def seen(report: FaultReport) -> list[Seen]:
+    """All detection limits."""
+    return [
+        Seen(fault=result.name, check=check, size=size)
+        for result in report.results
+        for check, size in result.limits.items()
+    ]
+
+
+def restored(kept: Kept) -> FaultReport:
+    """The study that a store holds: its document has everything."""
+    known = kept.document
+    results = tuple(
+        Result(
+            name=one["name"],
+            about=one["about"],
+            size=one["size"],
+            rejected_by=tuple(one["rejected_by"]),
+            missed_by=tuple(one["missed_by"]),
+            limits=dict(known["limits"].get(one["name"], {})),
+        )
+        for one in known["faults"]
+    )
+    clean = Clean(
+        runs=known["clean_runs"], verdicts=known["clean_verdicts"], alarms=tuple(known["false_alarms"])
+    )
+    return FaultReport(results=results, clean=clean, path=kept.path)

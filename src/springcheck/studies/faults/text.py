@@ -24,7 +24,7 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
         rows.append(plain(f"  {result.about}", "dim"))
     clean = found.clean
     rejected = sum(bool(result.rejected_by) for result in found.results)
-    return [
+    out: Lines = [
         table(("fault", "size", "seen from", "rejected by"), rows, left=("fault",), prose="rejected by"),
         plain(),
         *(
@@ -38,3 +38,4 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
             f"{clean.verdicts} verdicts, {len(clean.alarms)} false alarms"
         ),
     ]
+    return [*out, plain(f"Stored in {found.path}")] if found.path else out
