@@ -6,8 +6,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from springcheck.figures.style import COLOURS, MARKERS, save, style
+from springcheck.figures.style import save, style
 from springcheck.studies.faults.result import FaultReport
+
+MARKERS = "os^DvPX*<>"
 
 
 def draw(found: FaultReport, folder: Path) -> list[Path]:
@@ -28,7 +30,7 @@ def limits(found: FaultReport) -> Figure:
         places = [(result.limits[check], j) for j, result in enumerate(shown) if check in result.limits]
         axes.plot(
             *zip(*places, strict=True), linestyle="none", marker=MARKERS[i % len(MARKERS)],
-            color=COLOURS[i % len(COLOURS)], markerfacecolor="white", label=check,
+            color=f"C{i}", markerfacecolor="white", label=check,
         )  # fmt: skip
     sizes = [(result.size, j) for j, result in enumerate(shown) if result.size]
     axes.plot(*zip(*sizes, strict=True), "|", color="#888888", markersize=9, label="size in the table")
