@@ -175,6 +175,11 @@ class Verdict:
     sees: Limits = NOT_KNOWN
     """What the check would have seen in this run."""
 
+    @property
+    def reason(self) -> str:
+        """Why, and what the check would have seen."""
+        return f"{self.why}; {self.sees}" if str(self.sees) else self.why
+
     def __repr__(self) -> str:
         if self.passed is None:
             return f"Verdict({self.method} {self.check}: not applicable, {self.why})"

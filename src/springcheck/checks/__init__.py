@@ -6,7 +6,8 @@ rounding of what was added up, so that "4.1 of 19" reads: four roundings were se
 place.
 
 `record`, `steps`, `motion` and `solver` hold the checks of a trajectory, `experiments` and `laws` those
-that need runs of their own.  A check is an object (see `Check`); the two lists here are the only ones.
+that need runs of their own; `sight` says of each what it would have seen, `drag` adds up what single steps
+hide.  A check is an object (see `Check`); the two lists here are the only ones.
 
 Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
 Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,7 @@ class Judgement:
             "verdicts": [
                 {
                     "check": v.check, "value": _finite(v.value), "bound": _finite(v.bound), "unit": v.unit,
-                    "passed": v.passed, "why": v.why,
+                    "passed": v.passed, "why": v.why, "sees": asdict(v.sees),
                 }
                 for v in self.verdicts
             ],
@@ -57,7 +57,7 @@ class Judgement:
         rows = [
             (
                 v.check, told[v.passed],
-                "" if v.passed is None else f"{v.value:.3g} of {v.bound:.3g} {v.unit}".strip(), v.why,
+                "" if v.passed is None else f"{v.value:.3g} of {v.bound:.3g} {v.unit}".strip(), v.reason,
             )
             for v in self.verdicts
         ]  # fmt: skip

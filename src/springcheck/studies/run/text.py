@@ -226,8 +226,7 @@ def verdict_line(v: Verdict) -> str:
     """Value, bound, ratio and why."""
     if v.passed is None:
         return f"not applicable: {v.why}"
-    seen = f"; {v.sees}" if str(v.sees) else ""
-    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.why}{seen}"
+    return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.reason}"
 
 
 def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
