@@ -40,6 +40,10 @@ def smooth(scene: Scene, first: float, last: float) -> Motion | None:
     )
 
 
+BOUNDS = 17
+"""Times at which the uncertainty of an exact solution is worked out."""
+
+
 class Exact:
     """The exact solution of a scene at the frames of its runs; alike frames are computed once."""
 
@@ -57,9 +61,18 @@ class Exact:
         return self._found[key]
 
     def error(self, run: Trajectory) -> Floats:
-        """Distance of each frame from it (f,), relative to the initial energy norm."""
+        """Distance of each frame from it (f,), relative to the initial energy norm.
+
+        No error below what is known of the exact solution is shown as one.
+        """
         q, p = self.at(run)
-        return self.scene.system.norm(run.q - q, run.p - p)
+        return np.maximum(self.scene.system.norm(run.q - q, run.p - p), self.uncertainty(run.t))
+
+    def uncertainty(self, t: Floats) -> Floats:
+        """How well it is known at these times (f,), relative to the initial energy norm."""
+        times = np.linspace(0, float(np.max(np.abs(t))), BOUNDS)
+        bounds = [exact.uncertainty(self.scene, float(time)) for time in times]
+        return np.interp(np.abs(t), times, bounds)
 
 
 def periods(x: Floats) -> float:

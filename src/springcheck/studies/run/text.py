@@ -47,7 +47,7 @@ def _report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     out: Lines = [_headline(report), plain(), _runs(report.runs)]
     out += [
-        plain("error: largest distance from the exact solution, relative to the initial energy norm", "dim"),
+        plain("error: largest distance from the exact solution, over the initial energy norm", "dim"),
         plain(f"energy: {_energy(report.scene)}", "dim"),
     ]
     out += [
@@ -184,9 +184,10 @@ def sights(verdicts: Sequence[Verdict]) -> Lines:
     if not known:
         return []
     keen, dull = (how(known, key=lambda name: known[name]) for how in (min, max))
-    said = f"A stiffness off by {known[keen]:.1e} would be seen in {keen}"
-    others = f", by {known[dull]:.1e} in {dull} and in all between" if dull != keen else ""
-    return [plain(said + others, "dim")]
+    said = [f"A stiffness off by {known[keen]:.1e} would be seen in {keen}"]
+    if dull != keen:
+        said = [f"{said[0]},", f"one off by {known[dull]:.1e} in {dull} and in all between"]
+    return [plain(line, "dim") for line in said]
 
 
 def failures(verdicts: Iterable[Verdict]) -> Lines:

@@ -28,7 +28,13 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
                 "-" if np.isnan(x.growth_above) else f"{y:.7f}" for y in (x.growth_above, x.growth_predicted)
             ]
             style = "" if x.agrees else "bold red"
-            cells = (x.method, *places, f"{off:.0e}", *grown, _largest_step(x.limit, study.fastest))
+            cells = (
+                x.method,
+                *places,
+                f"{off:.0e}",
+                *grown,
+                _largest_step(x.theory if x.agrees else x.limit, study.fastest),
+            )
             rows.append([plain(cell, style) for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
         out += [table(titles, rows), plain()]

@@ -1,0 +1,41 @@
+"""The two figures of the README, made anew in data/figures.
+
+Claim: they are what `springcheck plot` draws of `springcheck run spring` and `springcheck census`; nothing in
+them is drawn by hand.
+Run:   python validation/readme_figures.py [FOLDER]     (two minutes; with the extra `established`)
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from arguments import arguments
+from springcheck import load_scene
+from springcheck.studies.census import figure as orbits
+from springcheck.studies.census.measure import measure
+from springcheck.studies.run import figure as trajectories
+from springcheck.studies.run.measure import run, stored
+
+NAMES = ("phase-portrait.png", "census.png")
+
+
+def main() -> int:
+    """Draw both; the exit status says whether all verdicts behind them passed."""
+    folder = arguments(__doc__, folder=Path("data/figures")).folder
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        report = run(load_scene("spring"), Path(name, "spring.h5"))
+        census = measure()
+        drawn = trajectories.draw(stored(report.path), Path(name)) + orbits.draw(census, Path(name))
+        for path in drawn:
+            if path.name in NAMES:
+                (folder / path.name).write_bytes(path.read_bytes())
+                print(folder / path.name)
+    print(f"{len(report.runs)} methods in the phase portrait, {len(census.entries)} in the census")
+    return report.status or census.status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
