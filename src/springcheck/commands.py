@@ -126,7 +126,8 @@ def _identify(options: Namespace) -> int:
         path = Path(options.file)
         if formats.is_hdf5(path):
             doubts = output.doubts(options.file)
-        stated = {"mass": options.mass, "stiffness": options.stiffness, "step": options.step}
+        names = "mass", "stiffness", "friction", "step"
+        stated = {name: getattr(options, name) for name in names}
         found = files.identify_file(path, options.trajectory, _columns(options), stated)
     output.warn(options.file, doubts)
     documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
@@ -229,6 +230,7 @@ COMMANDS = (
         _argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities"),
         _GROUP,
         _argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
+        _argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
         _argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
         _NAMES,
         _argument("--step", type=float, metavar="H", help="is this the time step?"),

@@ -25,7 +25,7 @@ NAMES = {
 
 UNREAD = (
     ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
-    ("integrator", "--stepper", ("--mass", "--stiffness", "--step", "--trajectory")),
+    ("integrator", "--stepper", ("--mass", "--stiffness", "--friction", "--step", "--trajectory")),
 )
 """An option, and those that its command does not read beside it."""
 

@@ -96,15 +96,13 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     # states between two frames lie on the same orbit: either component may be as large as the whole
     lengths = np.sqrt(np.sum(z**2, axis=1))
     size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * (lengths[:-1] + lengths[1:])[:, None]
-    # a solution is evaluated at times, and their rounding turns the phase; of steps that are differences of
-    # rounded times only the sum over a frame shows
-    turned = [
-        np.sqrt(abs(match.a)) * record.clock * match.stride / 2.0**-52
-        if scheme.flow or (match.stride > 1 and record.slips is not None)
-        else 0.0
-        for match, scheme in zip(matches, schemes, strict=True)
-    ]
-    size += np.array(turned)[:, None, None] * np.max(lengths)
+    # a solution is evaluated at times, and their rounding turns the phase
+    turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
+    flow = np.array([scheme.flow for scheme in schemes])
+    size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
+    if found.slips is not None:
+        # of steps that are differences of rounded times only the sum over a frame shows
+        size += np.where(stride > 1, turned, 0.0)[:, None, None] * lengths[:-1, None]
     if record.parts is not None:
         summed = np.stack(
             [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1

@@ -43,7 +43,7 @@ def stated_stiffness(
         return True, [], []
     room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
     may_be = ""
-    for what, other, of_force in _single_constants(record, stated):
+    for what, other, of_force in _single_constants(record, stated, plainest.stride):
         if disagreements(record, moving, plainest, other, quantum if of_force else 0.0):
             continue
         # what is told from the stated one by a little only may be anything of that size
@@ -73,11 +73,14 @@ def stated_stiffness(
     )
 
 
-def _single_constants(record: Record, stated: Floats) -> list[tuple[str, Floats, bool]]:
+def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
     """Constants that may be in single precision, the stiffness that shows then, and whether of the force."""
     with np.errstate(all="ignore"):
         single = stated.astype(np.float32).astype(np.float64)
-        out = [("stiffness", single, True)]
+        h = float(record.interval) / stride
+        longer = (float(np.float32(h)) / h) ** 2
+        out = [("stiffness", single, True), ("step", stated * longer, False)]
+        out += [("stiffness and the step", single * longer, False)]
         if record.mass is not None:
             share = record.mass / record.mass.astype(np.float32).astype(np.float64)
             out += [("mass", stated * share, False), ("stiffness and the mass", single * share, False)]

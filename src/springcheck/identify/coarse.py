@@ -156,7 +156,8 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
 
 
 OUTLIER = 6.0
-"""Largest error of bounded rounding over the root mean square of its neighbours': 1.7 where uniform."""
+"""Largest error of bounded rounding over the root mean square of its neighbours': 1.7 where uniform, 4 where
+normal."""
 
 LAGS = range(2, 26)
 """Frames at whose distance errors are correlated, a quarter of all at most; neighbours share a force in some
@@ -179,8 +180,8 @@ def irregular(missing: Floats, bias: Floats | None = None, lags: range = LAGS) -
         if total == 0:
             continue
         # rounding is bounded: one error that towers above its neighbours is none
-        blocks = np.array_split(np.abs(x), 8)
-        if any(np.max(b) > OUTLIER * np.sqrt(np.mean(b**2)) for b in blocks if len(b) > 2 * OUTLIER):
+        blocks = [np.sort(np.abs(b)) for b in np.array_split(x, 8) if len(b) > OUTLIER]
+        if any(b[-1] > OUTLIER * np.sqrt(np.mean(b[:-1] ** 2)) for b in blocks):
             return False
         if len(x) * sum((float(x[k:] @ x[:-k]) / total) ** 2 for k in lags) > limit:
             return False

@@ -20,6 +20,9 @@ from springcheck.identify.wrong import misfit, wrong_map
 FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""
 
+DRIFTING = 64.0
+"""Roundings that may be left over where a constant that is added to the position is the cause."""
+
 FALLS = 12.0
 """Factor by which an explanation must bring the misfit down."""
 
@@ -240,10 +243,11 @@ def _solver(e: Evidence) -> list[Explanation]:
 
 
 def _drift(e: Evidence) -> list[Explanation]:
-    if not e.found.drifts:
-        return []
     back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
     fitting = matched(e.found, e.terms)
+    if not fitting and np.any(np.max(np.abs(e.misses), axis=1) > DRIFTING * e.unit):
+        # what one map and a constant leave over is more than rounding: the constant may be of something else
+        return []
     whose = title(fitting[0].scheme) if fitting else "The scheme"
     return [
         Explanation(
@@ -298,8 +302,10 @@ def _shape(e: Evidence) -> list[Explanation]:
     """What the residual depends on: position, velocity, or time; or nothing, and it is noise."""
     z, missing = e.found.z[:-1].astype(np.float64), e.misses
     q, v = z.T
+    # a motion that grows or decays is not judged by its largest states alone
+    weight = (e.found.weight / np.max(e.found.weight))[:, None]
     t = np.linspace(-1, 1, e.pairs)
-    count = min(14, max(4, e.pairs // 20))
+    count = min(14, max(4, e.pairs // 8))
     linear = [q, v]
     groups: dict[str, list[Floats]] = {
         "drag": [*linear, np.abs(v) * v],
@@ -317,7 +323,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
     }
     left = {
-        name: _left(np.stack(columns, axis=1), missing)
+        name: _left(weight * np.stack(columns, axis=1), weight * missing)
         for name, columns in groups.items()
         if e.pairs > 3 * len(columns)
     }
@@ -327,9 +333,25 @@ def _shape(e: Evidence) -> list[Explanation]:
         return [_noise(e, size)]
     best = min(left[name] for name in fitting)
     # of those that explain nearly as much, the one of the fewest numbers
-    name = next(name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02))
-    cause, remedy = _sentence(e, name, q, v, missing, size)
-    return [Explanation(cause=cause, remedy=remedy, misfit=left[name])]
+    good = [name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02)]
+    cause, remedy = _sentence(e, good[0], q, v, missing, size)
+    kinds = list(dict.fromkeys(KIND[name] for name in good))
+    if len(kinds) > 1:
+        # over less than a period position and velocity are functions of time, and of each other
+        cause = (
+            f"The force depends on {' or on '.join(kinds)}, and the arc is too short to tell which: it "
+            f"moves a frame by {size:.1e} of the state's size"
+        )
+        remedy = "record more than a period, where positions come back at other times and velocities"
+    return [Explanation(cause=cause, remedy=remedy, misfit=left[good[0]])]
+
+
+KIND = {
+    "drag": "the velocity", "quadratic": "powers of the position", "cubic": "powers of the position",
+    "anharmonic": "powers of the position", "position": "powers of the position", "velocity": "the velocity",
+    "stiffness in time": "time", "friction in time": "time", "map in time": "time",
+}  # fmt: skip
+"""What the force depends on in each group of columns."""
 
 
 def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, size: float) -> tuple[str, str]:
@@ -381,7 +403,7 @@ def _noise(e: Evidence, size: float) -> Explanation:
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
-    if not irregular(e.misses, lags=range(1, 26)):
+    if not irregular(e.misses * e.found.weight[:, None], lags=range(1, 26)):
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",

@@ -168,7 +168,7 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
 def identify_file(
     path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
 ) -> dict[str, Identification]:
-    """What a file holds, by label, `stated` the mass, stiffness and step of the command line.
+    """What a file holds, by label, `stated` mass, stiffness, friction and step of the command line.
 
     Raises SpringcheckError, which names the trajectory.
     """
@@ -176,7 +176,7 @@ def identify_file(
     for name, value in given.items():
         # beyond these sizes the squares of numbers are none
         if not 1e-150 < abs(value) < 1e150 or (name == "mass" and value < 0):
-            if value == 0 and name == "stiffness":
+            if value == 0 and name in ("stiffness", "friction"):
                 continue
             needed = "a number of a size from 1e-150 to 1e150, a mass above 0"
             raise SpringcheckError(f"--{name} {value:g}: {needed} is needed")

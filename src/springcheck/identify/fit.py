@@ -16,6 +16,10 @@ ROUNDING = 2.0**-53
 DEAD = 2.0**-40
 """Distance from an equilibrium, as a share of its own from 0, below which a motion has died down to it."""
 
+LEAST_NOISE = 1e-30
+"""Share of the largest noise that a pair counts with at least: a motion that grows by 1e20 shows its
+equilibrium in its first frames alone."""
+
 FEWEST_PAIRS = 5
 """More pairs than these are needed before a constant part is looked for."""
 
@@ -60,12 +64,14 @@ def _least_squares(columns: Extended, right: Extended) -> Extended:
     With columns of size 1 the condition of the normal equations is far below 1/eps of extended precision
     unless the states are degenerate, which is found out apart.
     """
-    gram = columns.T @ columns
-    inverse = np.linalg.pinv(gram.astype(np.float64)).astype(np.longdouble)
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1)
+    columns = columns / size
+    inverse = np.linalg.pinv((columns.T @ columns).astype(np.float64)).astype(np.longdouble)
     x = inverse @ (columns.T @ right)
     for _ in range(3):
         x = x + inverse @ (columns.T @ (right - columns @ x))
-    return np.asarray(x)
+    return np.asarray(x / size[:, None])
 
 
 def _sizes(z: Extended) -> Extended:
@@ -197,7 +203,7 @@ def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
     moving = length > 0
     lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0
     noise = np.maximum(noise, lowest / 3 * length)
-    weight = 1 / np.maximum(noise, 1e-9 * np.max(noise))
+    weight = 1 / np.maximum(noise, LEAST_NOISE * np.max(noise))
     about = states[:-1] - rest
     return np.asarray(weight * np.sqrt(2 * len(about) / float(np.sum((weight[:, None] * about) ** 2))))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial
@@ -29,9 +29,10 @@ Selected: TypeAlias = Integers | slice
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
-    """A kick and the drift after it, (F,) of every family: columns e, i, x, b, d with the shares in them."""
+    """A kick and the drift after it, (F,) of every family: columns e, i, x, b, d with the shares in them, in
+    double and in extended precision."""
 
-    columns: tuple[Extended, ...]
+    columns: Mapping[np.dtype[Any], tuple[Reals, ...]]
     kicks: bool
     damps: bool
     decays: bool
@@ -46,7 +47,8 @@ def _slots(families: tuple[Family, ...]) -> tuple[Slot, ...]:
             [row[at] if at < len(row) else np.zeros(5, np.longdouble) for row in rows], np.longdouble
         ).T
         e, i, x, b, d = (bool(np.any(column)) for column in table)
-        out.append(Slot(columns=tuple(table), kicks=e or i or x or b, damps=e or i or x, decays=x, drifts=d))
+        columns = {np.dtype(x): tuple(table.astype(x)) for x in (np.float64, np.longdouble)}
+        out.append(Slot(columns=columns, kicks=e or i or x or b, damps=e or i or x, decays=x, drifts=d))
     return tuple(out)
 
 
@@ -88,7 +90,6 @@ class Table:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        staged: Selected = slice(None)
         for kind, members in self.kinds:
             at: Selected = slice(None) if np.all(members) else np.flatnonzero(members[which])
             n, x, y = which[at], a[at], g[at]
@@ -97,18 +98,21 @@ class Table:
         q, v = out
         damped = bool(np.any(g))
         for slot in self.slots:
-            e, i, x_, b, d = (column.astype(a.dtype)[which[staged]] for column in slot.columns)
+            e, i, x, b, d = slot.columns[a.dtype]
             if slot.kicks:
-                pull = b * a
+                pull = b[which] * a
                 if damped and slot.damps:
-                    below = 1 + i * g
-                    v = ((1 - e * g) * v - pull * q) / below
-                    v = v * np.exp(-x_ * g) if slot.decays else v
+                    below = 1 + i[which] * g
+                    v *= 1 - e[which] * g
+                    v -= pull * q
+                    v /= below
+                    if slot.decays:
+                        v *= np.exp(-x[which] * g)
                 else:
-                    v = v - pull * q
+                    v -= pull * q
             if slot.drifts:
-                q = q + d * v
-        return np.moveaxis(np.stack([q, v]), -1, 0)
+                q += d[which] * v
+        return out.transpose(2, 0, 1)
 
     def _special(self, kind: str, n: Integers, a: Reals, g: Reals) -> Reals:
         if kind == "held":

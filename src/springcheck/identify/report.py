@@ -176,39 +176,25 @@ def _single_parameters(
     record: Record, moving: list[int], maps: list[Map], base: list[Terms], stride: int | None
 ) -> tuple[list[Joint], str]:
     """Schemes that fit if the step or the mass is the stated one in single precision, and which of them."""
-    if record.momenta or not record.fine:
+    if record.momenta:
         return [], ""
-    loose = [replace(x, mass_unknown=True) for x in base]
-    strides = range(stride, stride + 1) if stride is not None and stride > 0 else range(1, 13)
-    found: dict[str, list[Joint]] = {}
+    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in moving]
+    heavier = [float(np.log(np.longdouble(np.float32(m)) / np.longdouble(m))) for m in masses]
     for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
-        for joint in search(maps, loose, strides, families):
-            if joint.accepted and (what := _rounded(record, moving, joint)):
-                found.setdefault(what, []).append(joint)
-        if found:
-            what, joints = max(found.items(), key=lambda pair: len(pair[1]))
-            remark = f"the {what} was rounded to single precision in double arithmetic"
-            return sorted(joints, key=lambda x: x.plainness), remark
+        for s in range(stride, stride + 1) if stride is not None and stride > 0 else range(1, 13):
+            h = record.interval / s
+            longer = float(np.log(np.longdouble(np.float32(h)) / h))
+            for what, scales in (
+                ("step", [-longer] * len(masses)),
+                ("mass", heavier),
+                ("step and the mass", [m - longer for m in heavier]),
+            ):
+                loose = [replace(x, log_mass=y) for x, y in zip(base, scales, strict=True)]
+                joints = [x for x in search(maps, loose, range(s, s + 1), families) if x.accepted]
+                if joints and any(scales):
+                    remark = f"the {what} was rounded to single precision in double arithmetic"
+                    return sorted(joints, key=lambda x: x.plainness), remark
     return [], ""
-
-
-def _rounded(record: Record, moving: list[int], joint: Joint) -> str:
-    """Which parameter's rounding to single precision is the scale of velocities that a scheme fits with."""
-    h = float(record.interval) / joint.stride
-    step = float(np.log(np.longdouble(np.float32(h)) / np.longdouble(h)))
-    masses = [0.0 if record.mass is None else float(record.mass[j]) for j in moving]
-    rounded = [math.log(float(np.float32(m)) / m) if m else 0.0 for m in masses]
-    for what, expected in (
-        ("step", [-step] * len(masses)),
-        ("mass", rounded),
-        ("step and the mass", [m - step for m in rounded]),
-    ):
-        off = [abs(part.log_mass - x) for part, x in zip(joint.parts, expected, strict=True)]
-        room = [6 * part.mass_error + 2 * record.jitter + 8 * ROUNDING for part in joint.parts]
-        clear = any(abs(x) > 100 * r for x, r in zip(expected, room, strict=True))
-        if clear and all(x <= r for x, r in zip(off, room, strict=True)):
-            return what
-    return ""
 
 
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:

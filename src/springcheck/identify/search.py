@@ -72,7 +72,8 @@ class Joint:
         return self.scheme + steps
 
 
-def _same(one: Family, other: Family, g: tuple[float, ...]) -> bool:
+def same_map(one: Family, other: Family, g: tuple[float, ...] = (0, 0, 0)) -> bool:
+    """Whether two families have one map at three steps, with these frictions."""
     return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
 
 
@@ -89,8 +90,8 @@ def aliases(name: str) -> tuple[str, ...]:
         f.scheme
         for f in UNDAMPED
         if f.scheme != name
-        and _same(f, own[0], (0, 0, 0))
-        and _same(FAMILIES[f"{f.scheme}, damped"], own[1], (0, 0.2, 0.5))
+        and same_map(f, own[0], (0, 0, 0))
+        and same_map(FAMILIES[f"{f.scheme}, damped"], own[1], (0, 0.2, 0.5))
     )
 
 
@@ -102,7 +103,7 @@ def frictionless(name: str) -> tuple[str, ...]:
         for f in UNDAMPED
         if f.scheme != name
         and any(kind == "friction" for kind, _ in SCHEMES[f.scheme].stages)
-        and _same(f, FAMILIES[name], (0, 0, 0))
+        and same_map(f, FAMILIES[name], (0, 0, 0))
     )
 
 
@@ -113,7 +114,7 @@ def distinct(*, damped: bool) -> tuple[Family, ...]:
     for family in DAMPED if damped else UNDAMPED:
         if not damped and any(kind == "friction" for kind, _ in family.stages):
             continue
-        if not any(_same(family, other, (0.1, 0.2, 0.5)) for other in out):
+        if not any(same_map(family, other, (0.1, 0.2, 0.5)) for other in out):
             out.append(family)
     return tuple(out)
 

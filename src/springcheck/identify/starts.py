@@ -43,6 +43,8 @@ class Terms:
     coarse rounding that cuts off, or repeats itself from turn to turn, is no noise that averages away."""
     log_stiffness: float | None = None
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
+    log_mass: float = 0.0
+    """Log of the scale of momenta over velocities, where it is known beforehand."""
     growing: bool = False
     """Whether friction of the wrong sign is looked for."""
 
@@ -247,8 +249,12 @@ def least_squares(slopes: Floats, miss: Floats) -> tuple[Floats, Floats]:
     errors of 1; columns may differ by many powers of ten."""
     size = np.sqrt(np.sum(slopes**2, axis=1))
     size = np.where(np.isfinite(size) & (size > 0), size, 1.0)
-    even = np.nan_to_num(slopes / size[:, None, :], posinf=0, neginf=0)
-    right = np.nan_to_num(np.sum(even * miss[:, :, None], axis=1))
+    even = slopes / size[:, None, :]
+    # what is no number changes nothing
+    lost = ~np.isfinite(np.sum(even, axis=(1, 2)) + np.sum(miss, axis=1))
+    if np.any(lost):
+        even[lost], miss = 0.0, np.where(lost[:, None], 0.0, miss)
+    right = np.sum(even * miss[:, :, None], axis=1)
     if even.shape[2] == 1:
         present = np.sum(even[:, :, 0] ** 2, axis=1, keepdims=True) > 0
         return right * present / size, present / size**2

@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.identify.evidence import Evidence, distance, title
-from springcheck.identify.families import FAMILIES, FAULTS, HELD
+from springcheck.identify.families import FAMILIES, FAULTS, HELD, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
-from springcheck.identify.search import Joint, distinct, search
+from springcheck.identify.search import Joint, distinct, same_map, search
 from springcheck.identify.starts import Terms
+
+
+@cache
+def _faults() -> tuple[Family, ...]:
+    """Faults whose map is no scheme's: velocities a step ahead of a kick-drift scheme are drift-kick."""
+    return tuple(f for f in FAULTS if not any(same_map(f, scheme) for scheme in distinct(damped=False)))
 
 
 def wrong_map(e: Evidence) -> list[Explanation]:
     """Schemes that are written down wrongly; friction of the wrong sign; held forces; wrong scales."""
     ranked: list[tuple[int, Explanation]] = []
-    for joint in search([e.found], [e.terms], range(1, 5), FAULTS):
+    for joint in search([e.found], [e.terms], range(1, 5), _faults()):
         family = FAMILIES[joint.family]
         if joint.accepted:
             steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
@@ -167,7 +174,7 @@ def faults_of(
     )
     return [
         _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x)
-        for x in search([e.found], [e.terms], range(1, 3), FAULTS)
+        for x in search([e.found], [e.terms], range(1, 3), _faults())
         if x.accepted and _rank(e, x) == 0
     ]
 
