@@ -272,35 +272,42 @@ def _hides(states: tuple[Floats, ...], stride: int) -> bool:
     return bool(np.max(np.abs(left)) <= 128 * 2.0**-52 * stride)
 
 
+def said_of(number_: int) -> tuple[Draw, str, str, float] | None:
+    """What is said of one trajectory, its statement and the seconds of the call; None where it overflows."""
+    draw = Draw(np.random.default_rng([4, number_]))
+    try:
+        with np.errstate(all="ignore"):
+            states = draw.move()
+    except OverflowError:
+        return None
+    t, q, v = states
+    if not (np.all(np.isfinite(q)) and np.max(np.abs(q)) < 1e30):
+        return None
+    stated = draw.k if draw.stated else None
+    begun = time.process_time()
+    try:
+        found = identify(t, written(q, draw.form), v=written(v, draw.form), mass=draw.m, stiffness=stated)
+        said, statement = judged(draw, found, _hides(states, draw.stride)), found.statement
+    except IdentificationError as error:
+        said, statement = f"refused: {str(error)[:60]}", ""
+    return draw, said, statement, time.process_time() - begun
+
+
 def block(first: int) -> dict[str, Any]:
     """One block of trajectories: what was said of each class, what is wrong, and the seconds a call takes."""
     counts: Counter[str] = Counter()
     wrong: list[str] = []
     seconds: list[float] = []
     for at in range(first, first + BLOCK):
-        draw = Draw(np.random.default_rng([4, at]))
-        try:
-            with np.errstate(all="ignore"):
-                states = draw.move()
-        except OverflowError:
+        one = said_of(at)
+        if one is None:
             continue
-        t, q, v = states
-        if not (np.all(np.isfinite(q)) and np.max(np.abs(q)) < 1e30):
-            continue
-        stated = draw.k if draw.stated else None
+        draw, said, statement, spent = one
         name = draw.error or f"{'held' if draw.held else 'damped' if draw.g else 'plain'}, {draw.form}"
-        name = "two errors" if draw.second else name
-        begun = time.process_time()
-        found = None
-        try:
-            found = identify(t, written(q, draw.form), v=written(v, draw.form), mass=draw.m, stiffness=stated)
-            said = judged(draw, found, _hides(states, draw.stride))
-        except IdentificationError as error:
-            said = f"refused: {str(error)[:60]}"
-        seconds.append(time.process_time() - begun)
-        counts[f"{name}: {said}"] += 1
+        counts[f"{'two errors' if draw.second else name}: {said}"] += 1
+        seconds.append(spent)
         if said.isupper() or said in ("none", "named, but not what was stated"):
-            wrong.append(f"{said}: number {at}: {draw}: {found.statement[:200] if found else ''}")
+            wrong.append(f"{said}: number {at}: {draw}: {statement[:200]}")
     return {"first": first, "counts": counts, "wrong": wrong, "seconds": seconds}
 
 

@@ -100,8 +100,8 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
     flow = np.array([scheme.flow for scheme in schemes])
     size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
-    if found.slips is not None:
-        # of steps that are differences of rounded times only the sum over a frame shows
+    if record.slips is not None:
+        # of steps that may be differences of rounded times only the sum over a frame shows
         size += np.where(stride > 1, turned, 0.0)[:, None, None] * lengths[:-1, None]
     if record.parts is not None:
         summed = np.stack(
