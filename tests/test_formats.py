@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import ase.io
 import ase.units
 import h5py
+import MDAnalysis
 import numpy as np
 import pytest
 from ase import Atoms
 
 from springcheck import simulate
 from springcheck.cli import main
+from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.trajectory import Trajectory
 
@@ -105,6 +107,78 @@ def dump(run: Trajectory) -> list[str]:
     return ["x.lammpstrj", "--step", repr(SCENE.step)]
 
 
+def extended_xyz(run: Trajectory) -> list[str]:
+    ase.io.write("x.extxyz", images(run))
+    return ["x.extxyz"]
+
+
+def universe() -> MDAnalysis.Universe:
+    found = MDAnalysis.Universe.empty(1, trajectory=True, velocities=True)
+    for name, values in (("name", ["X"]), ("resname", ["X"]), ("resid", [1]), ("mass", SCENE.m)):
+        found.add_TopologyAttr(name, values)
+    found.dimensions = [90, 90, 90, 90, 90, 90]
+    return found
+
+
+def frames(run: Trajectory, atoms: MDAnalysis.Universe) -> Iterator[tuple[float, MDAnalysis.Universe]]:
+    """A reduced length and time are 1 nm and 1 ps; MDAnalysis counts in Angstrom."""
+    for t, q, p in zip(run.t, run.q, run.p, strict=True):
+        atoms.atoms.positions, atoms.atoms.velocities = 10 * q * LINE, 10 * p / SCENE.m * LINE
+        atoms.trajectory.ts.time = t
+        yield t, atoms
+
+
+@pytest.mark.filterwarnings("ignore")
+def trr(run: Trajectory) -> list[str]:
+    with MDAnalysis.Writer("x.trr", 1) as writer:
+        for _, atoms in frames(run, universe()):
+            writer.write(atoms)
+    return ["x.trr"]
+
+
+def gro(run: Trajectory) -> list[str]:
+    out = []
+    for t, atoms in frames(run, universe()):
+        atoms.atoms.write("one.gro")
+        lines = Path("one.gro").read_text().splitlines()
+        # as trjconv writes the titles of several frames
+        out += [f"spring t= {t:9.5f} step= {round(t / SCENE.step)}", *lines[1:]]
+    Path("x.gro").write_text("\n".join(out) + "\n")
+    return ["x.gro"]
+
+
+def fixed_decimals(run: Trajectory) -> list[str]:
+    """Velocities are a tenth of positions, and are written a digit coarser for it."""
+    np.savetxt("x.txt", np.stack([run.t, run.q[:, 0], run.p[:, 0]], axis=1), fmt="%.8f", header="t q p")
+    return ["x.txt"]
+
+
+def arrays_in_hdf5(run: Trajectory) -> list[str]:
+    with h5py.File("x.hdf5", "w") as file:
+        file["t"], file["q"], file["p"], file["note"] = run.t, run.q, run.p, "mine"
+    return ["x.hdf5"]
+
+
+def groups_in_hdf5(run: Trajectory) -> list[str]:
+    with h5py.File("x.hdf5", "w") as file:
+        for name in ("one", "other"):
+            file[f"{name}/time"], file[f"{name}/x"] = run.t, (run.q * LINE)[:, None]
+            file[f"{name}/velocity"] = (run.p / SCENE.m * LINE)[:, None]
+    return ["x.hdf5", "--trajectory", "other"]
+
+
+def named_in_hdf5(run: Trajectory) -> list[str]:
+    with h5py.File("x.hdf5", "w") as file:
+        file["clock"], file["run/a"], file["run/b"] = run.t, run.q[:, 0].astype(np.float32), run.p[:, 0]
+        file["run/q"] = np.zeros(3)
+    return ["x.hdf5", "--columns", "t=clock,q=run/a,p=run/b"]
+
+
+def named_in_npz(run: Trajectory) -> list[str]:
+    np.savez("x.npz", clock=run.t, a=run.q, b=run.p, q=np.zeros(3))
+    return ["x.npz", "--columns", "t=clock,q=a,p=b"]
+
+
 def h5md(run: Trajectory) -> list[str]:
     with h5py.File("x.h5md", "w") as file:
         for name, values in (("position", run.q * LINE), ("velocity", run.p / SCENE.m * LINE)):
@@ -122,8 +196,16 @@ def store(run: Trajectory) -> list[str]:
 
 Writer = Callable[[Trajectory], list[str]]
 WRITERS: list[Writer] = [
-    csv, blanks, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store
+    csv, blanks, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
+    extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
 ]  # fmt: skip
+READ_BY_ALL: list[Writer] = [
+    csv, blanks, npz, in_space, dump, trr, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
+]  # fmt: skip
+
+
+def name_of(write: Writer) -> str:
+    return write.__name__
 
 
 def judged(capsys: pytest.CaptureFixture[str], arguments: list[str], scheme: str) -> tuple[int, dict]:  # type: ignore[type-arg]
@@ -134,7 +216,7 @@ def judged(capsys: pytest.CaptureFixture[str], arguments: list[str], scheme: str
     return status, {v["check"]: v["passed"] for v in json.loads(out.out)["verdicts"]}
 
 
-@pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+@pytest.mark.parametrize("write", WRITERS, ids=name_of)
 def test_a_file_passes_as_its_scheme_and_fails_as_another(
     write: Writer, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -142,17 +224,74 @@ def test_a_file_passes_as_its_scheme_and_fails_as_another(
     status, found = judged(capsys, arguments, "semi-implicit-euler")
     assert status == 0, found
     assert found["step-defect"]
+    assert found.get("identified", True)
     for other in ("velocity-verlet", "explicit-euler"):
         status, found = judged(capsys, arguments, other)
         assert status == 1
-        assert not found["step-defect"]
+        # three decimals leave each single step possible, and not all of them together
+        assert not found["identified" if write is gro else "step-defect"]
 
 
-@pytest.mark.parametrize("write", [csv, blanks, npz, in_space, dump], ids=lambda write: write.__name__)
+@pytest.mark.parametrize(
+    "write",
+    READ_BY_ALL,
+    ids=name_of,
+)
 def test_identify_reads_the_same_files(write: Writer, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = write(made("own:euler"))
     assert main(["identify", *arguments, "--mass", str(SCENE.m[0]), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["scheme"] == "explicit-euler"
+
+
+@pytest.mark.parametrize("write", [csv, groups_in_hdf5], ids=name_of)
+def test_plot_draws_the_same_files(write: Writer) -> None:
+    assert main(["plot", *write(made()), "-o", "figures", "--quiet"]) == 0
+    assert Path("figures/states.png").stat().st_size > 10_000
+
+
+def test_each_group_of_an_hdf5_file_is_a_trajectory(capsys: pytest.CaptureFixture[str]) -> None:
+    groups_in_hdf5(made())
+    assert main(["identify", "x.hdf5", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["identifications"]
+    assert [(one["trajectory"], one["scheme"]) for one in found] == [
+        ("one", "semi-implicit-euler"), ("other", "semi-implicit-euler")
+    ]  # fmt: skip
+    for command in (["judge", "x.hdf5", "--scene", "spring", "--scheme", "rk4"], ["plot", "x.hdf5"]):
+        assert main(command) == 2
+        assert "holds 2 trajectories; choose by --trajectory: one, other" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("ending", ["xtc", "dcd"])
+def test_positions_alone_are_refused_with_what_to_record(
+    ending: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with MDAnalysis.Writer(f"x.{ending}", 1) as writer:
+        for _, atoms in frames(made(), universe()):
+            writer.write(atoms)
+    for command in (["identify"], ["judge", "--scene", "spring", "--scheme", "rk4"], ["plot"]):
+        assert main([*command, f"x.{ending}"]) == 2
+        said = capsys.readouterr().err
+        assert f"{ending.upper()} file holds no velocities" in said
+        assert "record velocities too, as TRR and H5MD have them" in said
+
+
+def test_coarse_digits_are_those_of_the_quantity_that_is_written_coarsest() -> None:
+    rows = [["0.1", f"{x:.4f}", f"{x / 1000:.4f}"] for x in (12.3456, 98.7654, 31.4159)]
+    assert roundoff(rows, [1]) == pytest.approx(5e-6)
+    assert roundoff(rows, [1, 2]) == pytest.approx(5e-3)
+    # what does not change says nothing of how it is written
+    assert roundoff(rows, [0]) == 2.0**-53
+
+
+def test_arrays_that_are_not_there_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+    named_in_hdf5(made())
+    for columns, said in (
+        ("t=clok,q=run/a,p=run/b", "holds no array 'clok'"),
+        ("", "has no /particles as H5MD has, and no datasets of times"),
+    ):
+        assert main(["identify", "x.hdf5", "--columns", columns]) == 2
+        assert said in capsys.readouterr().err
 
 
 def test_one_bad_frame_fails(capsys: pytest.CaptureFixture[str]) -> None:

@@ -55,13 +55,18 @@ def _inspect(options: Namespace) -> int:
 
 
 def _plot(options: Namespace) -> int:
-    from springcheck import plot
+    from springcheck import formats, plot, store
     from springcheck.figures import folder
 
     path = Path(options.file)
-    doubts = output.doubts(options.file)
     into = Path(options.output or folder.folder_of(path))
-    written, notes = plot.draw(path, into, particle=options.particle)
+    doubts: list[dict[str, str]] = []
+    if path.is_file() and (options.columns or not formats.is_hdf5(path) or store.is_foreign(path)):
+        which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
+        written, notes = plot.draw_foreign(path, into, particle=options.particle, **which)
+    else:
+        doubts = output.doubts(options.file)
+        written, notes = plot.draw(path, into, particle=options.particle)
     output.warn(options.file, doubts)
     if not options.quiet:
         for line in (*notes, *written):
@@ -198,7 +203,8 @@ def _argument(*names: str, **how: Any) -> Argument:
 
 _FILE = _argument("file", metavar="FILE")
 _GROUP = _argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
-_NAMES = _argument("--columns", metavar="NAMES", help="names of a table's columns, as t,q,v")
+_NAMES = _argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
+_STEPS = _argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (
     Command("inspect", "what is in a store", _inspect, (
@@ -208,10 +214,13 @@ COMMANDS = (
         _argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
     )),
-    Command("plot", "draw what is in a store, as PNG and SVG", _plot, (
+    Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
         _FILE,
         _argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         _argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
+        _NAMES,
+        _STEPS,
+        _GROUP,
         QUIET,
     )),
     Command("report", "a store as one HTML page that checks itself in a browser", _report, (
@@ -244,7 +253,7 @@ COMMANDS = (
         _argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
         _NAMES,
         _GROUP,
-        _argument("--step", type=float, metavar="H", help="the time step of a file that counts steps"),
+        _STEPS,
         JSON,
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),

@@ -12,8 +12,9 @@ import numpy as np
 from springcheck import checks, schemes, store
 from springcheck.arrays import Floats
 from springcheck.engines import Arithmetic
-from springcheck.errors import StoreError
-from springcheck.formats import States, is_hdf5, read
+from springcheck.errors import IdentificationError, StoreError
+from springcheck.formats import States, is_hdf5, read, read_hdf5
+from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.text import Lines, plain, table
@@ -91,37 +92,52 @@ def judge(
     """
     found = load_scene(scene) if isinstance(scene, str) else scene
     known = schemes.scheme(scheme)
-    states = _states(path, trajectory) if is_hdf5(path) else read(path, columns, step)
+    states = states_in(path, columns, step, trajectory)
     judged, run, notes = as_trajectory(path, states, found, known.name)
+    verdicts = list(checks.judge(judged, run))
+    if states.roundoff > 2.0**-53:
+        verdicts.append(_shown(judged, run, states))
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
-        verdicts=tuple(checks.judge(judged, run)),
+        verdicts=tuple(verdicts),
     )  # fmt: skip
 
 
-def _states(path: Path, label: str | None) -> States:
-    """One trajectory of an HDF5 file: a store of ours, or an H5MD file of any program."""
+def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
+    """Whether the states as a whole show another scheme.
+
+    Few digits leave room for many schemes in every single step, as the other checks look at them; the map
+    that fits all steps together is known far better.
+    """
+
+    def verdict(passed: bool | None, why: str) -> Verdict:
+        value, bound = (np.nan, np.nan) if passed is None else (float(not passed), 0.0)
+        return Verdict(
+            method=run.label, check="identified", value=value, bound=bound, unit="other schemes",
+            passed=passed, why=why,
+        )  # fmt: skip
+
+    # as they are written: projected on a line they would not show their decimals
+    mass = np.repeat(scene.m, states.q.shape[1] // scene.n)
     try:
-        own = store.summary(path).runs
-    except StoreError:
-        own = ()
-    found: dict[str, States] = {}
-    if own:
-        for run in own:
-            # one frame more than is looked at in a piece of a very long run
-            piece = next(store.windows(path, run.label, run.frames + 1))
-            found[run.label] = States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None)
-    else:
-        for name, group in store.read_foreign(path).items():
-            flat = group.q.reshape(len(group.t), -1), group.v.reshape(len(group.t), -1)
-            found[name] = States(
-                t=group.t,
-                q=flat[0],
-                p=None,
-                v=flat[1],
-                mass=group.mass,
-                roundoff=max(2.0**-53, group.roundoff),
-            )
+        found = identify_states(of_arrays(run.label, replace(states, mass=mass)), step=scene.step)
+    except (IdentificationError, ArithmeticError, ValueError) as error:
+        return verdict(None, f"no scheme can be read from these states: {error}")
+    if not (found.fits and found.verdict in ("named", "not told apart")):
+        return verdict(None, "no one scheme is read from these states")
+    names = {found.scheme, *found.aliases}
+    for one in found.candidates:
+        names |= {one.scheme, *one.aliases}
+    return verdict(run.scheme in names, f"all states together: {found.statement}")
+
+
+def states_in(
+    path: Path, columns: Sequence[str] = (), step: float | None = None, label: str | None = None
+) -> States:
+    """The one trajectory of a file, or that of this label.  StoreError where there are several or none."""
+    if not is_hdf5(path):
+        return read(path, columns, step)
+    found = _in_hdf5(path, columns)
     if label is None and len(found) == 1:
         return next(iter(found.values()))
     if label not in found:
@@ -129,6 +145,33 @@ def _states(path: Path, label: str | None) -> States:
             f"{path}: holds {len(found)} trajectories; choose by --trajectory: {', '.join(found)}"
         )
     return found[label]
+
+
+def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
+    """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
+    try:
+        own = () if columns else store.summary(path).runs
+    except StoreError:
+        own = ()
+    found: dict[str, States] = {}
+    for run in own:
+        # one frame more than is looked at in a piece of a very long run
+        piece = next(store.windows(path, run.label, run.frames + 1))
+        found[run.label] = States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None)
+    if found:
+        return found
+    if columns or not store.is_h5md(path):
+        return read_hdf5(path, columns)
+    for name, group in store.read_foreign(path).items():
+        found[name] = States(
+            t=group.t,
+            q=group.q.reshape(len(group.t), -1),
+            p=None,
+            v=group.v.reshape(len(group.t), -1),
+            mass=group.mass,
+            roundoff=max(2.0**-53, group.roundoff),
+        )
+    return found
 
 
 def as_trajectory(
@@ -142,7 +185,7 @@ def as_trajectory(
     q = states.q
     other = states.p if states.p is not None else np.asarray(states.v)
     if q.shape[1] == 3 * scene.n:
-        q, other = _along(path, q, other, scene, notes)
+        q, other = _along(path, q, other, scene, notes, max(1e-6, 4 * states.roundoff))
     if q.shape[1] != scene.n:
         raise StoreError(f"{path}: {q.shape[1]} positions a frame, {scene.n} in scene {scene.name}")
     p = other if states.p is not None else other * scene.m
@@ -180,14 +223,16 @@ def as_trajectory(
     return judged, run, tuple(notes)
 
 
-def _along(path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str]) -> tuple[Floats, Floats]:
-    """Motions in space (f, 3n) along the one line that they keep to (f, n)."""
+def _along(
+    path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
+) -> tuple[Floats, Floats]:
+    """Motions in space (f, 3n) along the one line that they keep to (f, n), but for `off` of their size."""
     r = q.reshape(len(q), -1, 3)
     moved = (r - r[0]).reshape(-1, 3)
     _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
     if sizes[0] == 0:
         raise StoreError(f"{path}: nothing moves")
-    if sizes[1] > 1e-6 * sizes[0]:
+    if sizes[1] > off * sizes[0]:
         raise StoreError(f"{path}: the motion is not along one line")
     line = axes[0]
     positions, rest = r @ line, other.reshape(len(q), -1, 3) @ line

@@ -1,17 +1,18 @@
-"""Trajectories of others, told by what is in them, not by their names; HDF5 is the store's to read."""
+"""Trajectories of others, told by what is in them, not by their names; the store opens those in HDF5."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.formats.columns import States
+from springcheck.formats.columns import ALONE, States, kind
 from springcheck.formats.molecular import read_ase, read_gro, read_lammps, read_trr
-from springcheck.formats.numbers import read_npy, read_npz
+from springcheck.formats.numbers import read_npy, read_npz, states_of
 from springcheck.formats.tables import read_table
 
-__all__ = ["States", "is_hdf5", "read"]
+__all__ = ["States", "is_hdf5", "read", "read_hdf5"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -43,11 +44,12 @@ def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> 
         if head.startswith(b"\x93NUMPY"):
             return read_npy(path, columns)
         if head.startswith(b"PK\x03\x04"):
-            return read_npz(path)
+            return read_npz(path, columns)
         if head.startswith(b"ITEM: "):
             return read_lammps(path, step)
         if head.startswith((b"\x00\x00\x07\xcb", b"\x00\x00\x07\xe7")) or head[4:8] == b"CORD":
-            raise StoreError(f"{path}: XTC and DCD files hold no velocities; positions alone tell nothing")
+            what = "a DCD" if head[4:8] == b"CORD" else "an XTC"
+            raise StoreError(f"{path}: {what} file holds no velocities; {ALONE}, as TRR and H5MD have them")
         if head.startswith(b"\x00\x00\x07\xc9"):
             return read_trr(path, step)
         if head.startswith(b"- of Ulm") or _is_extended_xyz(path):
@@ -55,6 +57,35 @@ def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> 
         return read_gro(path, step) if path.suffix == ".gro" else read_table(path, columns)
     except UnicodeDecodeError as error:
         raise StoreError(f"{path}: is of no format that is known here") from error
+
+
+def read_hdf5(path: Path, columns: Sequence[str] = ()) -> dict[str, States]:
+    """The trajectories of an HDF5 file that is neither a store nor H5MD, by name.
+
+    Every group with datasets of times, positions, and momenta or velocities is one; or `columns` name the
+    datasets, as ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where there is none.
+    """
+    if columns:
+        wanted = {text.rpartition("=")[2].strip("/") for text in columns}
+        groups = store.read_arrays(path, lambda place: place in wanted)
+        flat = {
+            f"{group}/{name}".strip("/"): a for group, found in groups.items() for name, a in found.items()
+        }
+        return {path.name: states_of(path, flat, [x.replace("=/", "=").removeprefix("/") for x in columns])}
+    groups = store.read_arrays(path, lambda place: kind(place.rpartition("/")[2]) is not None)
+    made: dict[str, States] = {}
+    said = StoreError(
+        f"{path} has no /particles as H5MD has, and no datasets of times, positions and velocities by their "
+        "names; give these, as --columns t=clock,q=run/x,v=run/dx"
+    )
+    for name, arrays in groups.items():
+        try:
+            made[name or path.name] = states_of(path, arrays)
+        except StoreError as error:
+            said = error if ALONE in str(error) else said
+    if not made:
+        raise said
+    return made
 
 
 def _is_extended_xyz(path: Path) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -25,6 +25,10 @@ NAMES: dict[Kind, str] = {
     "v": r"v|vx|vy|vz|vel|velocity|velocities",
     "m": r"m|mass|masses",
 }
+
+
+ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
+"""What is said of a file that could not tell schemes apart, which share one recurrence of the positions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,9 +61,9 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
     for what, why in (("t", "times"), ("q", "positions")):
         if what not in parts:
-            raise StoreError(f"{path}: no column of {why} among {_list(columns)}; name them, as t,q,v")
+            raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
     if "p" not in parts and "v" not in parts:
-        raise StoreError(f"{path}: no column of momenta or velocities among {_list(columns)}")
+        raise StoreError(f"{path}: no column of momenta or velocities among {listed(columns)}; {ALONE}")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
         raise StoreError(f"{path}: {t.shape[1]} columns of times")
@@ -82,8 +86,10 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     )
 
 
-def _list(names: Columns) -> str:
-    return ", ".join(list(names)[:8]) + (" ..." if len(names) > 8 else "") if names else "none"
+def listed(names: Iterable[str]) -> str:
+    """Names between commas, the first eight of them."""
+    names = list(names)
+    return ", ".join(names[:8]) + (" ..." if len(names) > 8 else "") if names else "none"
 
 
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:

@@ -13,7 +13,8 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.errors import StoreError
-from springcheck.formats.columns import States
+from springcheck.formats.columns import ALONE, States
+from springcheck.formats.tables import roundoff
 
 MOST_FRAMES = 1 << 20
 
@@ -57,14 +58,28 @@ def read_ase(path: Path, step: float | None) -> States:
     if not all(
         atoms.has("momenta") or "velocities" in atoms.arrays or "vel" in atoms.arrays for atoms in found
     ):
-        raise StoreError(f"{path}: holds no velocities; write momenta too, positions alone tell nothing")
+        raise StoreError(f"{path}: holds no velocities or momenta; {ALONE}")
     v = []
     for atoms in found:
         plain = atoms.arrays.get("velocities", atoms.arrays.get("vel"))
         v.append(plain if plain is not None else atoms.get_velocities() * units.fs)
     named = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
     t = named if all(x is not None for x in named) else _times(path, range(len(found)), step)
-    return _made(path, t, [atoms.positions for atoms in found], v, found[0].get_masses())
+    written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
+    return _made(path, t, [atoms.positions for atoms in found], v, found[0].get_masses(), written)
+
+
+def _written(lines: list[str]) -> float:
+    """How finely an extended XYZ file is written, whose atoms are rows of a name and numbers."""
+    rows: list[list[str]] = []
+    i = 0
+    while i < len(lines) and lines[i].strip():
+        n = int(lines[i])
+        rows += [line.split() for line in lines[i + 2 : i + 2 + n]]
+        i += n + 2
+    if len({len(row) for row in rows}) != 1:
+        return 2.0**-53
+    return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell])
 
 
 def read_lammps(path: Path, step: float | None) -> States:
@@ -73,6 +88,7 @@ def read_lammps(path: Path, step: float | None) -> States:
     q: list[Floats] = []
     v: list[Floats] = []
     mass = None
+    cells: list[list[str]] = []
     lines = path.read_text().splitlines()
     i = 0
     try:
@@ -92,7 +108,9 @@ def read_lammps(path: Path, step: float | None) -> States:
             lacking = [x for pair in wanted for x in pair if x not in names]
             if lacking:
                 raise StoreError(f"{path}: its atoms have no {', '.join(lacking)}; dump x y z vx vy vz")
-            table = np.array([[float(x) for x in line.split()] for line in lines[i + 1 : i + 1 + n]])
+            rows = [line.split() for line in lines[i + 1 : i + 1 + n]]
+            table = np.array([[float(x) for x in row] for row in rows])
+            cells += rows
             if "id" in names:
                 table = table[np.argsort(table[:, names.index("id")])]
             q.append(table[:, [names.index(pair[0]) for pair in wanted]])
@@ -104,12 +122,8 @@ def read_lammps(path: Path, step: float | None) -> States:
     if len({len(x) for x in q}) != 1:
         raise StoreError(f"{path}: the number of atoms changes")
     # LAMMPS writes 6 digits unless dump_modify asks for more
-    return _made(path, _times(path, steps, step), q, v, mass, 5e-6 if _short(lines) else 2.0**-53)
-
-
-def _short(lines: list[str]) -> bool:
-    digits = [len(x.lstrip("-").split("e")[0].replace(".", "").lstrip("0")) for x in lines[-1].split()]
-    return max(digits, default=0) < 15
+    read = [names.index(name) for pair in wanted for name in pair]
+    return _made(path, _times(path, steps, step), q, v, mass, roundoff(cells, read))
 
 
 def read_gro(path: Path, step: float | None) -> States:
@@ -118,7 +132,7 @@ def read_gro(path: Path, step: float | None) -> States:
     t: list[float] = []
     q: list[Any] = []
     v: list[Any] = []
-    i = 0
+    i = wide = thin = 0
     try:
         while i < len(lines) and lines[i].strip():
             title, n = lines[i], int(lines[i + 1])
@@ -127,7 +141,7 @@ def read_gro(path: Path, step: float | None) -> States:
             # columns are as wide as the distance between decimal points
             points = [j for j, c in enumerate(rows[0]) if c == "."]
             if len(points) < 6:
-                raise StoreError(f"{path}: holds no velocities; nothing can be told from positions alone")
+                raise StoreError(f"{path}: holds no velocities; {ALONE}")
             wide, thin = points[1] - points[0], points[4] - points[3]
             q.append([[float(row[20 + k * wide : 20 + (k + 1) * wide]) for k in range(3)] for row in rows])
             at = 20 + 3 * wide
@@ -135,7 +149,11 @@ def read_gro(path: Path, step: float | None) -> States:
             i += n + 3
     except (ValueError, IndexError) as error:
         raise StoreError(f"{path}, line {min(i + 1, len(lines))}: is no .gro frame: {error}") from error
-    return _made(path, t, q, v, None, 5e-4)
+    # decimals are fixed: 3 of positions and 4 of velocities unless GROMACS is told otherwise
+    sizes = (float(np.max(np.abs(q))), float(np.max(np.abs(v))))
+    halves = (0.5 * 10.0 ** (5 - wide), 0.5 * 10.0 ** (4 - thin))
+    written = max([half / size for half, size in zip(halves, sizes, strict=True) if size > 0], default=1.0)
+    return _made(path, t, q, v, None, written)
 
 
 def read_trr(path: Path, step: float | None) -> States:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck.errors import StoreError
-from springcheck.formats.columns import States, named, split
+from springcheck.errors import StoreError, nearest
+from springcheck.formats.columns import States, kind, listed, named, split
 
 
 def _load(path: Path) -> Any:
@@ -27,27 +28,45 @@ def _roundoff(arrays: Sequence[Any]) -> float:
     return float(max([2.0**-53, *widths]))
 
 
-def read_npz(path: Path) -> States:
-    """Arrays t (f,), q and p or v (f,) or (f, n), and perhaps m (n,)."""
-    arrays: dict[str, Any] = _load(path)
-    frames = {len(a) for name, a in arrays.items() if name == "t" and a.ndim == 1}
-    rows = next(iter(frames), 0)
-    columns = {}
-    mass = None
-    for name, a in arrays.items():
-        if not (np.issubdtype(a.dtype, np.floating) or np.issubdtype(a.dtype, np.integer)):
-            continue
-        if name in ("m", "mass"):
-            mass = np.atleast_1d(np.asarray(a, np.float64))
-        elif a.ndim in (1, 2, 3) and len(a) == rows:
-            columns[name] = np.asarray(a, np.float64).reshape(rows, -1)
-    found_states = split(path, columns, _roundoff([a for a in arrays.values() if a.ndim]))
-    if mass is None:
-        return found_states
-    return States(
-        t=found_states.t, q=found_states.q, p=found_states.p, v=found_states.v, mass=mass,
-        roundoff=found_states.roundoff,
-    )  # fmt: skip
+def read_npz(path: Path, names: Sequence[str] = ()) -> States:
+    """Arrays t (f,), q and p or v (f,) or (f, n), and perhaps m (n,), by their names or as `names` say."""
+    return states_of(path, _load(path), names)
+
+
+def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) -> States:
+    """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
+
+    `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``.
+    """
+    arrays = _chosen(path, arrays, names)
+    numbers = {
+        name: a
+        for name, a in arrays.items()
+        if np.issubdtype(a.dtype, np.floating) or np.issubdtype(a.dtype, np.integer)
+    }
+    rows = next((len(a) for name, a in numbers.items() if kind(name) == "t" and a.ndim == 1), 0)
+    columns = {
+        name: np.asarray(a, np.float64).reshape(rows, -1)
+        for name, a in numbers.items()
+        if rows and kind(name) not in (None, "m") and a.ndim in (1, 2, 3) and len(a) == rows
+    }
+    masses = [np.atleast_1d(np.asarray(a, np.float64)) for name, a in numbers.items() if kind(name) == "m"]
+    states = split(path, columns, _roundoff([numbers[name] for name in columns]))
+    return replace(states, mass=masses[0].ravel()) if masses else states
+
+
+def _chosen(path: Path, arrays: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:
+    if not names:
+        return arrays
+    found = {}
+    for text in names:
+        what, _, name = text.rpartition("=")
+        if name not in arrays:
+            raise StoreError(
+                f"{path}: holds no array {name!r}{nearest(name, arrays)}; it has {listed(arrays)}"
+            )
+        found[what or name] = arrays[name]
+    return found
 
 
 def read_npy(path: Path, names: Sequence[str]) -> States:

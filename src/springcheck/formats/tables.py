@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import States, named, split
+from springcheck.formats.columns import States, kind, named, split
 
 LARGEST = 1 << 30
 """Bytes of a text file that are read at once."""
@@ -42,7 +42,8 @@ def read_table(path: Path, names: Sequence[str]) -> States:
     if not chosen:
         raise StoreError(f"{path}: its {len(rows[0])} columns have no names; give them, as --columns t,q,v")
     values = np.array([[float(cell) for cell in row] for row in rows])
-    return split(path, named(path, values, chosen), _roundoff(rows))
+    states = [i for i, name in enumerate(chosen[: len(rows[0])]) if kind(name) in ("q", "p", "v")]
+    return split(path, named(path, values, chosen), roundoff(rows, states))
 
 
 def _cells(line: str) -> list[str]:
@@ -60,11 +61,19 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _roundoff(rows: Sequence[Sequence[str]]) -> float:
-    """Half a unit of the last digit that is written, relative; that of a double from 17 digits on."""
-    digits = 0
-    for row in rows[:1000]:
-        for cell in row:
-            plain = re.sub(r"[eEdD].*$", "", cell).lstrip("+-").replace(".", "").lstrip("0")
-            digits = max(digits, len(plain))
-    return max(2.0**-53, 0.5 * 10.0 ** (1 - digits)) if digits < 16 else 2.0**-53
+def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
+    """Half a unit of the last digit, relative to the largest number, of the column that is written coarsest.
+
+    That of a double from 16 digits on.  A column that does not change, or is 0, says nothing.
+    """
+    found = 2.0**-53
+    for i in columns:
+        cells = {row[i] for row in rows[:1000]}
+        digits = max(map(_digits, cells))
+        if len(cells) > 1 and 0 < digits < 16:
+            found = max(found, 0.5 * 10.0 ** (1 - digits))
+    return found
+
+
+def _digits(cell: str) -> int:
+    return len(re.sub(r"[eEdD].*$", "", cell).lstrip("+-").replace(".", "").lstrip("0"))

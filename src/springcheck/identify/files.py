@@ -53,20 +53,28 @@ def read(
     Raises StoreError where the file cannot be read, holds no velocities, or has no such trajectory.
     """
     if path.is_file() and not formats.is_hdf5(path) and not label:
-        return [_plain(path, formats.read(path, columns, step))]
+        return [of_arrays(path.name, formats.read(path, columns, step))]
     try:
-        own = store.summary(path).runs
+        own = () if columns else store.summary(path).runs
     except StoreError:
         own = ()
-    found = list(_ours(path, own, label) if own else _foreign(path, label))
+    names = [run.label for run in own]
+    if own:
+        found = list(_ours(path, own, label))
+    elif columns or not store.is_h5md(path):
+        plain = formats.read_hdf5(path, columns)
+        names = list(plain)
+        found = [of_arrays(name, states) for name, states in plain.items() if label in (None, name)]
+    else:
+        found = list(_foreign(path, label))
     if not found:
-        names = [run.label for run in own] or list(store.read_foreign(path, 2))
+        names = names or list(store.read_foreign(path, 2))
         raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
     return found
 
 
-def _plain(path: Path, found: formats.States) -> States:
-    """The only trajectory of a file that is no HDF5."""
+def of_arrays(name: str, found: formats.States) -> States:
+    """A trajectory that stands in arrays of a file."""
     kept = slice(MOST_FRAMES)
     speed = found.p if found.p is not None else found.v
     notes = [f"the first {MOST_FRAMES} frames were looked at"] if len(found.t) > MOST_FRAMES else []
@@ -75,7 +83,7 @@ def _plain(path: Path, found: formats.States) -> States:
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))
     return States(
-        label=path.name,
+        label=name,
         t=found.t[kept],
         q=found.q[kept][:, chosen],
         p=None if p is None else p[kept][:, chosen],

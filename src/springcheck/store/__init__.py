@@ -9,7 +9,7 @@ from springcheck.store.checking import Finding, check, doubts
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import room
-from springcheck.store.foreign import read_foreign
+from springcheck.store.foreign import is_foreign, is_h5md, read_arrays, read_foreign
 from springcheck.store.journal import Journal, open_new
 from springcheck.store.layout import machine, size
 from springcheck.store.reading import (
@@ -36,6 +36,6 @@ from springcheck.store.tables import Table
 __all__ = [
     "Draft", "Finding", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "open_new", "read", "read_foreign", "read_one", "read_tables", "room", "scene_text", "size", "sources",
-    "strided", "summary", "verdicts", "windows",
+    "is_foreign", "is_h5md", "open_new", "read", "read_arrays", "read_foreign", "read_one", "read_tables",
+    "room", "scene_text", "size", "sources", "strided", "summary", "verdicts", "windows",
 ]  # fmt: skip

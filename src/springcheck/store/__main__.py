@@ -40,6 +40,8 @@ def main(kind: str, path: Path) -> str:
     if kind == trust.OURS:
         return json.dumps([(finding.place, finding.what) for finding in checking.structure(path)])
     try:
+        for _ in foreign.arrays(path, lambda place: True):
+            pass
         foreign.load(path)
     except StoreError as error:
         return str(error)

@@ -1,8 +1,9 @@
-"""Trajectories that other programs wrote: any H5MD file with positions and velocities."""
+"""Trajectories that other programs wrote: H5MD files, and the arrays of any HDF5 file by their names."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.errors import StoreError
-from springcheck.store import access, files, trust
+from springcheck.store import access, files, layout, trust
 
 MOST_NUMBERS = 1 << 24
 """Positions of one particle group that are read [numbers]: frames beyond are left out."""
 MOST_FRAMES = 1 << 25
 """Frames of a file that is looked at."""
+DEEPEST = 4
+"""Groups in groups that are looked into."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +66,58 @@ def load(path: Path, most: int | None = None) -> dict[str, Foreign]:
                 "write velocities too, nothing can be told from positions alone"
             )
         return found
+
+
+def is_foreign(path: str | Path) -> bool:
+    """Whether an HDF5 file is no store of ours.  StoreError where it cannot be read."""
+    path = Path(path)
+    trust.trust(path, trust.FOREIGN)
+    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        return access.attribute(file, "format") not in (layout.FORMAT, layout.OLDER)
+
+
+def is_h5md(path: str | Path) -> bool:
+    """Whether a file has particle groups where H5MD has them.  StoreError where it cannot be read."""
+    path = Path(path)
+    trust.trust(path, trust.FOREIGN)
+    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        return isinstance(access.find(file, "particles"), h5py.Group)
+
+
+def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, dict[str, Any]]:
+    """Arrays of numbers of an HDF5 file by group and name, those whose path is wanted.
+
+    What does not lie in the file, has more than three dimensions or is too large is left out.
+    Raises StoreError where the file cannot be read.
+    """
+    path = Path(path)
+    trust.trust(path, trust.FOREIGN)
+    found: dict[str, dict[str, Any]] = {}
+    for place, values in arrays(path, wanted):
+        group, _, name = place.rpartition("/")
+        found.setdefault(group, {})[name] = values
+    return found
+
+
+def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
+    """The same one by one, in this process."""
+    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        for place in _places(file, ""):
+            if wanted(place):
+                with contextlib.suppress(StoreError):
+                    dataset = _numbers(path, file, place)
+                    if dataset.ndim <= 3 and dataset.size <= MOST_NUMBERS:
+                        yield place, np.asarray(dataset[()])
+
+
+def _places(group: Any, before: str, depth: int = 0) -> Iterator[str]:
+    """Paths of the datasets below a group, no deeper than anyone nests runs."""
+    for name in access.members(group):
+        node = access.find(group, name)
+        if isinstance(node, h5py.Dataset):
+            yield f"{before}{name}"
+        elif isinstance(node, h5py.Group) and depth < DEEPEST:
+            yield from _places(node, f"{before}{name}/", depth + 1)
 
 
 def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:
