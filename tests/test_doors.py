@@ -6,12 +6,17 @@ import json
 import shutil
 import subprocess
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from springcheck import engines
+from springcheck import doors, engines, simulate
 from springcheck.cli import main
+from springcheck.errors import MethodError
+from springcheck.physics.scenefile import load_scene
+from springcheck.studies import team
 
 EXAMPLES = Path(__file__).parent / "command-examples"
 
@@ -34,7 +39,7 @@ def leapfrog(q, p, h, force, mass):
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:  # type: ignore[type-arg]
     status = main(["run", "spring-uneven", "--method", "own:euler", "--json", *arguments])
     out = capsys.readouterr()
-    assert status in (0, 1), out.err
+    assert not out.err
     return {"status": status} | json.loads(out.out)
 
 
@@ -67,7 +72,11 @@ def test_a_wrong_function_runs_among_the_engines_without_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "mine.py").write_text(VERLET.replace("h * p / mass", "1.01 * h * p / mass"))
-    assert run(capsys, "--stepper", "mine.py:leapfrog")["runs"][1]["scheme"] == "unknown"
+    found = run(capsys, "--stepper", "mine.py:leapfrog")
+    assert found["runs"][1]["scheme"] == "unknown"
+    # nothing of it failed, and nothing of its scheme was judged
+    assert found["status"] == 2
+    assert all(v["passed"] is not False for v in found["verdicts"])
     assert main(["plot", "spring-uneven.h5", "--quiet"]) == 0
 
 
@@ -80,6 +89,56 @@ def test_arrays_serve_where_numbers_do_not(tmp_path: Path, capsys: pytest.Captur
     assert run(capsys, "--stepper", "mine.py:f")["runs"][1]["scheme"] == "semi-implicit-euler"
     # of several masses it moves the first alone
     assert main(["run", "chain", "--stepper", "mine.py:f", "--quiet", "--method", "own:euler"]) == 1
+
+
+def test_several_functions_and_programs_run_in_one_call(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET + "\n\n" + VERLET.replace("def leapfrog", "def other"))
+    (tmp_path / "else.py").write_text(VERLET)
+    names = ("mine.py:leapfrog", "mine.py:other", "else.py:leapfrog")
+    program = f"sh {EXAMPLES / 'euler.sh'} {{scene}} {{out}}"
+    commands = ("--command", f"one={program}", "--command", f"two={program}") if shutil.which("awk") else ()
+    found = run(capsys, *(x for name in names for x in ("--stepper", name)), *commands)
+    assert [one["method"] for one in found["runs"]] == [
+        "own:euler", "stepper:mine-leapfrog", "stepper:other", "stepper:else-leapfrog",
+        *(("command:one", "command:two") if commands else ()),
+    ]  # fmt: skip
+    assert all(v["passed"] is not False for v in found["verdicts"])
+    assert found["status"] == (2 if commands else 0)
+
+
+def test_names_that_would_be_one_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    stepper = ("--stepper", "mine.py:leapfrog")
+    assert "two functions would have one name" in refused(capsys, *stepper, *stepper)
+    command = ("--command", "a=cat {scene} {out}")
+    assert "two commands have this name" in refused(capsys, *command, *command)
+
+
+def test_workers_run_what_a_call_brings(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    shutil.copy(Path(__file__).parent / "plugin-example" / "springcheck_pefrl.py", tmp_path / "plug.py")
+    what = doors.Brought(engines=("plug.py",), steppers=("mine.py:leapfrog",))
+    labels = what.bring()
+    assert labels == ["pefrl:pefrl", "stepper:leapfrog"]
+    scene = load_scene("spring-uneven")
+    parts = [partial(simulate.run, scene, label) for label in labels]
+    alone = dict(team.Processes(1).carried_out(parts))
+    both = dict(team.Processes(2, what).carried_out(parts))
+    for number in (0, 1):
+        assert np.array_equal(alone[number].q, both[number].q)
+        assert np.array_equal(alone[number].p, both[number].p)
+    with pytest.raises(MethodError, match="unknown engine"):
+        list(team.Processes(2).carried_out(parts))
+
+
+def test_a_cluster_is_told_apart_from_the_processes_of_a_call(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    assert main(["precision", "spring", "--stepper", "mine.py:leapfrog", "--cluster", "tcp://nowhere:1"]) == 2
+    assert "--cluster: what a call brings is not on the machines of a cluster" in capsys.readouterr().err
 
 
 BAD_FUNCTIONS = [

@@ -40,7 +40,8 @@ def grid(case: Case) -> Verdict:
         wrong.append(f"the step is {run.step:g} instead of {scene.step:g}")
     if run.every != scene.every:
         wrong.append(f"every {run.every} steps are recorded instead of {scene.every}")
-    if not case.scheme.one_step and not case.scheme.flow and run.tolerance != scene.tolerance:
+    fixed = case.scheme.one_step or case.scheme.flow or case.scheme.unnamed
+    if not fixed and run.tolerance != scene.tolerance:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
     if run.energy is None and "energy" in scene.quantities:
         wrong.append("there are no energies")

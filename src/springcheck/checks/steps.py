@@ -26,6 +26,8 @@ lost 3 of the 19 digits of the reference there."""
 
 def no_map(case: Case) -> str | None:
     """Why a check of the scheme's one-step map does not apply, or None."""
+    if case.scheme.unnamed:
+        return "its scheme is not known; --scheme NAME states it"
     if not case.scheme.one_step:
         return "an adaptive solver has no one-step map; it is judged by its tolerance"
     if len(case.trajectory.t) < 2:

@@ -1,44 +1,86 @@
-"""Engines that a command line brings: the file of a plug-in, a function, a program in any language."""
+"""Engines that a command line brings: files of plug-ins, functions, programs in any language."""
 
 from __future__ import annotations
 
 import math
 from argparse import Namespace
+from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
 from springcheck import engines
 from springcheck.doors import command, function
 from springcheck.errors import MethodError
+from springcheck.physics import terms
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Brought:
+    """What a call brings, as it names it, so that another process can bring it too."""
+
+    engines: tuple[str, ...] = ()
+    steppers: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ()
+    scheme: str = ""
+    seconds: float = command.SECONDS
+
+    def bring(self) -> list[str]:
+        """Make the engines known -> the labels of their methods.  MethodError where one cannot be used."""
+        found = [engines.from_file(Path(text)) for text in self.engines]
+        # a file may only register a term
+        labels = [
+            f"{x.name}:{m.name}" for x in found if x is not None for m in x.methods.values() if m.default
+        ]
+        if self.steppers:
+            files = [function.file_of(spec) for spec in self.steppers]
+            made = function.engine(self.steppers, self.scheme)
+            labels += _labels(engines.bring(made, files[0], _digest(*files)))
+        if self.programs:
+            made = command.engine(self.programs, self.scheme, self.seconds)
+            files = [file for text in self.programs for file in command.files(text)]
+            labels += _labels(engines.bring(made, self.programs[0], _digest(*files)))
+        return labels
+
+
+@cache
+def bring_once(what: Brought) -> None:
+    """Bring it where this process has not: a worker carries out many parts."""
+    what.bring()
 
 
 def bring(options: Namespace) -> None:
     """Make the engines that the options name known, and have their methods run beside the others.
 
-    Raises MethodError, in one line, where one of them cannot be used.
+    `options.brought` tells the processes that a study starts.  Raises MethodError, in one line, where one of
+    them cannot be used.
     """
-    scheme = getattr(options, "scheme", None) or ""
-    labels = []
-    for text in getattr(options, "engine", []):
-        # a file may only register a term
-        if (own := engines.from_file(Path(text))) is not None:
-            labels += [f"{own.name}:{name}" for name, method in own.methods.items() if method.default]
-    if getattr(options, "stepper", None):
-        file = function.file_of(options.stepper)
-        found = engines.bring(function.engine(options.stepper, scheme), file, _digest(file))
-        labels += [f"{found.name}:{name}" for name in found.methods]
-    if getattr(options, "program", None):
-        seconds = options.timeout if options.timeout is not None else command.SECONDS
-        if not (math.isfinite(seconds) and seconds > 0):
-            raise MethodError(f"--timeout {seconds}: a number of seconds above 0 is needed")
-        made = command.engine(options.program, scheme, seconds)
-        found = engines.bring(made, options.program, _digest(*command.files(options.program)))
-        labels += [f"{found.name}:{name}" for name in found.methods]
-    if labels and (getattr(options, "workers", 1) or 1) > 1:
-        raise MethodError("--workers: what a call brings is known to its own process alone; leave it out")
+    seconds = getattr(options, "timeout", None)
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
+        raise MethodError(f"--timeout {seconds}: a number of seconds above 0 is needed")
+    what = Brought(
+        engines=tuple(options.engine),
+        steppers=tuple(getattr(options, "stepper", ())),
+        programs=tuple(getattr(options, "program", ())),
+        scheme=getattr(options, "scheme", None) or "",
+        seconds=command.SECONDS if seconds is None else seconds,
+    )
+    before = terms.known()
+    labels = what.bring()
+    options.brought = what
+    if getattr(options, "cluster", None):
+        raise MethodError("--cluster: what a call brings is not on the machines of a cluster; leave it out")
+    if (getattr(options, "workers", 1) or 1) > 1 and terms.known() != before:
+        raise MethodError(
+            "--workers: a term that a call brings is known to its own process alone; leave it out"
+        )
     if labels and hasattr(options, "method"):
         # where methods are named, those that are brought here are meant as well
         options.method = [*(options.method or ["*"]), *(x for x in labels if x not in options.method)]
+
+
+def _labels(found: engines.Engine) -> list[str]:
+    return [f"{found.name}:{name}" for name in found.methods]
 
 
 def _digest(*paths: str) -> str:

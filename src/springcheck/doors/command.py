@@ -12,6 +12,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,43 @@ SECONDS = 600.0
 """What a command may take unless it is told."""
 
 
-def engine(text: str, scheme: str = "", seconds: float = SECONDS) -> Engine:
-    """An engine of ``name=command``.  MethodError where the command cannot be called."""
+def engine(texts: Sequence[str], scheme: str = "", seconds: float = SECONDS) -> Engine:
+    """An engine of ``name=command`` texts.  MethodError where a command cannot be called."""
+    commands: dict[str, list[str]] = {}
+    for text in texts:
+        name, words = _words(text)
+        if name in commands:
+            raise MethodError(f"--command {name}: two commands have this name")
+        commands[name] = words
+    schemes.bring(UNKNOWN)
+    known = schemes.scheme(scheme).name if scheme else UNKNOWN.name
+
+    def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+        return _Command(method.name, commands[method.name], scene, step, seconds)
+
+    return Engine(
+        name="command",
+        title=f"the command {next(iter(commands))}" if len(commands) == 1 else "commands",
+        methods={
+            name: Method(
+                name=name,
+                scheme=known,
+                about=f"{shlex.join(words)}; its time is the whole command's",
+                terms=EVERY_POTENTIAL | {"damping"},
+            )
+            for name, words in commands.items()
+        },
+        schemes=(UNKNOWN,),
+        start=start,
+        version=lambda: {name: shlex.join(words) for name, words in commands.items()},
+        arithmetic=lambda label: Arithmetic(),
+        convention=lambda method: "as the command writes them",
+        step_seconds=1e-3,
+    )
+
+
+def _words(text: str) -> tuple[str, list[str]]:
+    """Name and arguments of a command."""
     name, equals, line = text.partition("=")
     if not equals or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         raise MethodError(f"--command {text!r}: not of the form 'name=./engine {{scene}} {{out}}'")
@@ -42,30 +78,7 @@ def engine(text: str, scheme: str = "", seconds: float = SECONDS) -> Engine:
             raise MethodError(f"--command {name}: no {place} among its arguments: {line.strip()!r}")
     if shutil.which(words[0]) is None:
         raise MethodError(f"--command {name}: there is no program {words[0]!r} here that can be run")
-    schemes.bring(UNKNOWN)
-    known = schemes.scheme(scheme).name if scheme else UNKNOWN.name
-
-    def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-        return _Command(name, words, scene, step, seconds)
-
-    return Engine(
-        name="command",
-        title=f"the command {name}",
-        methods={
-            name: Method(
-                name=name,
-                scheme=known,
-                about=f"{line.strip()}; its time is the whole command's",
-                terms=EVERY_POTENTIAL | {"damping"},
-            )
-        },
-        schemes=(UNKNOWN,),
-        start=start,
-        version=lambda: {"command": line.strip()},
-        arithmetic=lambda label: Arithmetic(),
-        convention=lambda method: "as the command writes them",
-        step_seconds=1e-3,
-    )
+    return name, words
 
 
 def files(text: str) -> list[str]:

@@ -1,11 +1,11 @@
-"""A student's function ``step(q, p, h, force, mass) -> (q, p)`` as an engine of one method."""
+"""Students' functions ``step(q, p, h, force, mass) -> (q, p)`` as the methods of an engine."""
 
 from __future__ import annotations
 
 import inspect
 import re
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ UNKNOWN = Scheme(
     order=0,
     limit=np.inf,
     symplectic=False,
+    unnamed=True,
     source="none: only what needs no scheme is judged",
 )
 
@@ -51,27 +52,44 @@ def file_of(spec: str) -> str:
     return _file(load(spec)) or spec
 
 
-def engine(spec: str, scheme: str = "") -> Engine:
-    """An engine of the function; without a stated scheme the one that it is found to be, if it is one."""
-    function = load(spec)
-    name = re.sub(r"[^A-Za-z0-9_-]", "-", spec.rpartition(":")[2]) or "step"
-    where = _file(function)
+def engine(specs: Sequence[str], scheme: str = "") -> Engine:
+    """An engine of the functions; without a stated scheme each is what it is found to be, if anything."""
+    functions = dict(zip(_names(specs), map(load, specs), strict=True))
 
     def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-        return _Steps(function, scene, step, where)
+        function = functions[method.name]
+        return _Steps(function, scene, step, _file(function))
 
-    known = schemes.scheme(scheme).name if scheme else _identified(function)
-    about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
+    methods = {}
+    for spec, (name, function) in zip(specs, functions.items(), strict=True):
+        known = schemes.scheme(scheme).name if scheme else _identified(function)
+        about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
+        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_POTENTIAL | {"damping"})
     return Engine(
         name="stepper",
-        title=f"the function {spec}",
-        methods={name: Method(name=name, scheme=known, about=about, terms=EVERY_POTENTIAL | {"damping"})},
+        title=f"the function {specs[0]}" if len(specs) == 1 else "functions",
+        methods=methods,
         schemes=(UNKNOWN,),
         start=start,
         version=dict,
         convention=lambda method: "as the function returns them",
         step_seconds=2e-5,
     )
+
+
+def _names(specs: Sequence[str]) -> list[str]:
+    """Names of functions, with those of their modules where two are alike.  MethodError where that is not
+    enough."""
+    plain = [re.sub(r"[^A-Za-z0-9_-]", "-", spec.rpartition(":")[2]) or "step" for spec in specs]
+    whole = [
+        re.sub(r"[^A-Za-z0-9_-]", "-", f"{Path(spec.rpartition(':')[0].removesuffix('.py')).name}-{name}")
+        for spec, name in zip(specs, plain, strict=True)
+    ]
+    names = [long if plain.count(short) > 1 else short for short, long in zip(plain, whole, strict=True)]
+    twice = next((spec for spec, name in zip(specs, names, strict=True) if names.count(name) > 1), None)
+    if twice is not None:
+        raise MethodError(f"--stepper {twice}: two functions would have one name; name each once")
+    return names
 
 
 def _identified(function: Callable[..., Any]) -> str:

@@ -83,6 +83,9 @@ class Scheme:
         # a stage takes its position from velocities, and these from the forces of stages before
         return reach if self.stages else 2 if np.any(uses @ uses) else int(np.any(uses))
 
+    unnamed: bool = False
+    """It stands for whatever somebody brings without a name, whose step is fixed or not."""
+
     @property
     def one_step(self) -> bool:
         """Whether `step` can carry the scheme out."""

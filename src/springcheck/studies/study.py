@@ -122,20 +122,24 @@ def engine_option(parser: ArgumentParser) -> None:
 
 
 def door_options(parser: ArgumentParser) -> None:
-    """A function or a program that runs beside the methods."""
+    """Functions and programs that run beside the methods."""
     engine_option(parser)
     parser.add_argument(
         "--stepper",
+        action="append",
+        default=[],
         metavar="MODULE:FUNCTION",
-        help="your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION",
+        help="your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION; repeatable",
     )
     parser.add_argument(
         "--command",
         dest="program",
+        action="append",
+        default=[],
         metavar="NAME=COMMAND",
-        help="a program in any language, as 'name=./engine {scene} {out}'",
+        help="a program in any language, as 'name=./engine {scene} {out}'; repeatable",
     )
-    parser.add_argument("--scheme", metavar="NAME", help="the scheme that your function or program has")
+    parser.add_argument("--scheme", metavar="NAME", help="the scheme of your functions and programs")
     parser.add_argument(
         "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
     )

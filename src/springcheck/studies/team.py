@@ -10,7 +10,10 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from springcheck.doors import Brought
 
 T = TypeVar("T")
 
@@ -33,16 +36,29 @@ class Processes:
     """Processes of this machine; one is the program itself."""
 
     workers: int = 1
+    brought: Brought | None = None
+    """Engines that the call has brought."""
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
         """Numbers and results of the parts, as they finish."""
         from springcheck.workers import carried_out
 
-        return carried_out([partial(_numbered, i, part) for i, part in enumerate(parts)], self.workers)
+        numbered = [partial(_numbered, i, part) for i, part in enumerate(parts)]
+        if self.workers > 1 and self.brought is not None:
+            numbered = [partial(_after, self.brought, part) for part in numbered]
+        return carried_out(numbered, self.workers)
 
 
 def _numbered(i: int, part: Callable[[], Any]) -> tuple[int, Any]:
     return i, part()
+
+
+def _after(brought: Brought, part: Callable[[], T]) -> T:
+    """A part that runs what a call has brought, in a process that may not have it yet."""
+    from springcheck import doors
+
+    doors.bring_once(brought)
+    return part()
 
 
 ALONE = Processes()
@@ -73,7 +89,7 @@ def _count(text: str) -> int:
 def of(options: Namespace) -> Team:
     """Those that the command line asks for."""
     if not options.cluster:
-        return Processes(options.workers)
+        return Processes(options.workers, getattr(options, "brought", None))
     from springcheck.studies.cluster import Cluster
 
     return Cluster(options.cluster)
