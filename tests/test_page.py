@@ -107,7 +107,9 @@ def test_tables_have_headers_and_every_verdict_its_reason(spring: Path, content:
     text = page.html(content)
     tags = Tags(text)
     assert tags.count("table") == len(OWN) + 2
-    assert all(attributes.get("scope") in {"row", "col"} for tag, attributes in tags.tags if tag == "th")
+    assert all(
+        attributes.get("scope") in {"row", "col", "rowgroup"} for tag, attributes in tags.tags if tag == "th"
+    )
     verdicts = store.verdicts(spring)
     assert text.count('class="why"') == len(verdicts) > 0
     assert "equal bit for bit" in text or "differ by at most" in text
@@ -272,7 +274,9 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     tables = [block for block in section.blocks if isinstance(block, Sheet)]
     assert tables
     tags = Tags(text)
-    assert all(attributes.get("scope") in {"row", "col"} for tag, attributes in tags.tags if tag == "th")
+    assert all(
+        attributes.get("scope") in {"row", "col", "rowgroup"} for tag, attributes in tags.tags if tag == "th"
+    )
     known = "friction" if name == "faults" else "own:semi-implicit-euler"
     assert known in {row[0].text for table in tables for row in table.rows}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import Any
 
 from springcheck import inspect
@@ -22,6 +21,10 @@ class Piece:
     strong: bool = False
     number: bool = False
     """Of a column that ends at its right edge."""
+    prose: bool = False
+    """Of a column that is broken into lines."""
+    heading: bool = False
+    """Over the rows of a table that follow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,19 +75,30 @@ def _blocks(lines: Iterable[Any]) -> Iterator[Piece | Sheet]:
 
 
 def _sheet(table: Table) -> Sheet:
-    numbers = [title not in table.left and title != table.prose for title in table.titles]
+    looks = [
+        {"number": title not in table.left and title != table.prose, "prose": title == table.prose}
+        for title in table.titles
+    ]
     rows = [
         (_piece(row),)
         if hasattr(row, "plain")
-        else tuple(_piece(cell, number) for cell, number in zip_longest(row, numbers, fillvalue=""))
+        else tuple(
+            _piece(cell, **look)
+            for cell, look in zip((*row, *[""] * (len(looks) - len(row))), looks, strict=True)
+        )
         for row in table.rows
     ]
-    titles = tuple(
-        Piece(text=title, number=number) for title, number in zip(table.titles, numbers, strict=True)
-    )
-    return Sheet(titles=titles, rows=tuple(rows))
+    titles = (Piece(text=title, **look) for title, look in zip(table.titles, looks, strict=True))
+    return Sheet(titles=tuple(titles), rows=tuple(rows))
 
 
-def _piece(text: Any, number: Any = False) -> Piece:
+def _piece(text: Any, *, number: bool = False, prose: bool = False) -> Piece:
     style = str(getattr(text, "style", ""))
-    return Piece(text=str(text).strip(), bad="red" in style, strong="bold" in style, number=number is True)
+    return Piece(
+        text=str(text).strip(),
+        bad="red" in style,
+        strong="bold" in style,
+        heading="italic" in style,
+        number=number,
+        prose=prose,
+    )
