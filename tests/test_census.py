@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import census as by_hand
 from springcheck import engines, simulate
 from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
@@ -54,6 +55,22 @@ def test_an_engine_that_is_not_what_it_is_declared_as_is_found_out(
     (tmp_path / "wrong.py").write_text(text.replace('scheme="pefrl"', 'scheme="velocity-verlet"'))
     assert main(["census", "--method", "pefrl:*", "--engine", "wrong.py"]) == 1
     assert "pefrl:pefrl is declared as velocity Verlet" in " ".join(capsys.readouterr().out.split())
+
+
+def test_what_was_measured_by_hand_is_compared() -> None:
+    """A census that names another scheme, amplitude, partner or growth than a loop by hand is told."""
+    one = census.entry(engines.parse("own:euler"))
+    right = replace(one, method="pymunk:force")
+    assert by_hand.differences(census.Census(entries=(one, right), left_out=())) == []
+    grown = replace(one, method="mujoco:motor-frame-skip-5", found="force-held-5", area=3.1e-3)
+    for wrong, said in (
+        (replace(right, found="semi-implicit-euler"), "is semi-implicit-euler, and was explicit-euler"),
+        (replace(right, amplitude=2.706), "has the amplitude 2.7060"),
+        (replace(right, digest="0"), "is not own:euler bit for bit"),
+        (grown, "grows the motion 1.857 times"),
+    ):
+        (found,) = by_hand.differences(census.Census(entries=(one, wrong), left_out=()))
+        assert said in found
 
 
 def held(n: float) -> Trajectory:
