@@ -73,6 +73,19 @@ def stated_stiffness(
     )
 
 
+def nearest_stiffness(record: Record, moving: list[int], joints: list[Joint], stated: Floats) -> list[Joint]:
+    """Those of several schemes whose stiffness comes nearest to the stated one, which none has."""
+    off = {}
+    for joint in joints:
+        _, stiffness, _ = numbers(record, moving, joint)
+        known = [
+            abs(k / float(stated[j]) - 1) for j, k in zip(moving, stiffness or (), strict=False) if stated[j]
+        ]
+        off[joint] = max(known, default=0.0)
+    least = min(off.values())
+    return [joint for joint in joints if off[joint] <= 2 * least]
+
+
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
     """Constants that may be in single precision, the stiffness that shows then, and whether of the force."""
     with np.errstate(all="ignore"):

@@ -14,6 +14,9 @@ from springcheck.identify.search import search
 from springcheck.identify.starts import Terms
 from springcheck.schemes import SCHEMES
 
+FALLS = 12.0
+"""Factor by which an explanation must bring the misfit down."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:

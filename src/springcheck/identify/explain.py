@@ -5,26 +5,23 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from springcheck.arrays import Extended, Floats
+from springcheck.arrays import Floats
 from springcheck.identify.coarse import irregular
-from springcheck.identify.evidence import Evidence, distance, matched, title
+from springcheck.identify.evidence import FALLS, Evidence, distance, matched, title
 from springcheck.identify.fit import Map, fit
+from springcheck.identify.interrupted import few_bad_frames
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.search import FEW, distinct, search
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import misfit, wrong_map
 
-FEW_BAD = 0.06
-"""Largest share of pairs that may be bad where the others make one motion."""
+FEWEST_MISSES = 24.0
+"""Pairs that count in what is left over from which its pattern shows."""
 
 DRIFTING = 64.0
 """Roundings that may be left over where a constant that is added to the position is the cause."""
-
-FALLS = 12.0
-"""Factor by which an explanation must bring the misfit down."""
 
 
 def explain(
@@ -43,7 +40,7 @@ def explain(
     if evidence.found.drifts:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (_few_bad_frames, _alternation, _solver, _neighbours(moving, maps), _shape):
+        for look in (few_bad_frames, _alternation, _solver, _neighbours(moving, maps), _shape):
             out += look(evidence)
             if out:
                 break
@@ -54,125 +51,17 @@ def explain(
     return (*out, *([] if out else [misfit(evidence)]))
 
 
-# bad frames ---------------------------------------------------------------------------------------------
-
-
-def _few_bad_frames(e: Evidence) -> list[Explanation]:
-    """A motion that a few pairs of frames interrupt."""
-    kept = np.ones(e.pairs, dtype=bool)
-    found = e.found
-    for _ in range(8):
-        z = (e.found.z * e.found.size + e.found.centre - found.centre) / found.size
-        off = np.max(np.abs((z[1:] - z[:-1] @ found.entries.T).astype(np.float64)), axis=1) / e.unit
-        limit = max(8 * float(np.median(off[kept])), 2.0)
-        now = off <= limit
-        if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
-            break
-        kept = now
-        found = fit(e.record, e.j, kept=kept)
-    bad = np.flatnonzero(~kept)
-    if not len(bad) or np.count_nonzero(kept) < 8:
-        return []
-    before = float(np.max(np.abs(e.misses)))
-    after = float(
-        np.sqrt(np.mean((found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)[kept] ** 2))
-    )
-    if before < FALLS * after:
-        return []
-    fitting = matched(found, e.terms)
-    if not fitting and after > 8 * float(np.median(e.unit)):
-        # the rest is no single motion either, as a solver's that begins with small steps
-        return []
-    whose = f" of {title(fitting[0].scheme)}" if fitting else ""
-    runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
-    spacing = set(np.diff([run[0] for run in runs]).tolist())
-    cause, remedy = _interruption(e, found, runs[0], whose)
-    if len(runs) > 2 and len(spacing) == 1:
-        cause = f"{cause}, and so every {spacing.pop()} steps"
-    elif len(runs) > 1:
-        at = ", ".join(str(run[0] + 1) for run in runs[1:5])
-        cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
-    return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
-
-
-def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
-    """What happened at a run of bad pairs, the rest of the motion being `found`'s."""
-    z, b = found.z, found.entries
-    first, last = int(run[0]), int(run[-1])
-
-    def near(x: Extended, y: Extended) -> bool:
-        # as near as the other pairs, or a thousandth of what is missing
-        missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
-        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit)), 1e-3 * missing)
-
-    if len(run) == 1:
-        from_, to = z[first], z[first + 1]
-        if near(to, from_):
-            return (
-                f"The motion{whose} stands still for a step: it is repeated at frame {first + 1}",
-                "write each frame once, or look for a step that is left out",
-            )
-        power = b @ b
-        for n in range(2, 9):
-            if near(to, power @ from_):
-                more = (
-                    f"frame {first + 1} is missing"
-                    if n == 2
-                    else f"{n - 1} frames are missing from frame {first + 1} on"
-                )
-                return (
-                    f"The motion is one{whose}, but {more}",
-                    "write every frame, or give a part without a gap",
-                )
-            power = b @ power
-        if first == 0:
-            return (
-                f"The motion is one{whose}, but frame 0 does not belong to it",
-                "look at how the start is set and recorded, or leave frame 0 out",
-            )
-        off = (to - b @ from_).astype(np.float64)
-        if first + 1 == len(z) - 1:
-            return (
-                f"The motion is one{whose}, but frame {first + 1}, the last, is wrong: {_amount(off, to)}",
-                ("look at how the last frame is written"),
-            )
-        back = np.linalg.solve(b.astype(np.float64), off)
-        if abs(back[0]) < 1e-2 * abs(back[1]):
-            kick = back[1] * float(found.size[1] / e.record.interval)
-            return (
-                f"The motion is one{whose}, but for one kick of {kick:+.3g} of the velocity between frames "
-                f"{first} and {first + 1}",
-                "look for what acts at that step alone",
-            )
-        digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
-        return (
-            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and "
-            f"{first + 1}, as after a restart from numbers of {max(1, round(digits))} digits",
-            "write restarts in full precision",
-        )
-    if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
-        off = (z[last] - b @ z[first]).astype(np.float64)
-        return (
-            f"The motion is one{whose}, but frame {last} is wrong: {_amount(off, z[last])}",
-            "look at how that frame is written",
-        )
-    if len(run) == 3 and near(z[first + 2], b @ z[first]):
-        return f"The motion is one{whose}, but frames {first + 1} and {first + 2} have changed places", (
-            "sort the frames by time"
-        )
-    return (
-        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}",
-        "look at what happens there, or give the part before it",
-    )
-
-
-def _amount(off: Floats, state: Extended) -> str:
-    share = np.abs(off) / max(float(np.max(np.abs(state))), 1e-300)
-    name = "velocity" if share[1] > share[0] else "position"
-    return f"its {name} is off by {float(np.max(share)):.2g} of the state's size"
-
-
 # two maps in turn ---------------------------------------------------------------------------------------
+
+
+PARTS = 3.0
+"""Factor by which two maps in turn must bring the misses down in each half of the time."""
+
+
+def _missed(half: Map, whole: Map) -> Floats:
+    """What the map of half of the pairs leaves over in all (f - 1, 2), in the frame of the whole's."""
+    z = (whole.z * whole.size + whole.centre - half.centre) / half.size
+    return ((z[1:] - z[:-1] @ half.entries.T) * half.size / whole.size).astype(np.float64)
 
 
 def _alternation(e: Evidence) -> list[Explanation]:
@@ -186,6 +75,13 @@ def _alternation(e: Evidence) -> list[Explanation]:
     # a smooth residual is no parity: two maps must do much better than one
     if before < FALLS * left:
         return []
+    # and in the beginning as at the end
+    own = np.where(odd[:, None], *(_missed(x, e.found) for x in (halves[1], halves[0])))
+    both = np.abs(e.misses) * e.found.weight[:, None], np.abs(own) * e.found.weight[:, None]
+    for part in np.array_split(np.arange(e.pairs), 2):
+        joint, apart = (float(np.sqrt(np.mean(x[part] ** 2))) for x in both)
+        if joint < PARTS * apart:
+            return []
     dets = [float(np.linalg.det(x.entries.astype(np.float64))) - 1 for x in halves]
     loose = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
     found = [matched(x, loose) for x in halves]
@@ -322,15 +218,18 @@ def _shape(e: Evidence) -> list[Explanation]:
         "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
     }
+    # what a few pairs miss follows any law of as many numbers
+    square = np.sum((weight * missing) ** 2, axis=1)
+    counted = float(np.sum(square) ** 2 / np.sum(square**2)) if np.any(square) else 0.0
     left = {
         name: _left(weight * np.stack(columns, axis=1), weight * missing)
         for name, columns in groups.items()
-        if e.pairs > 3 * len(columns)
+        if counted > 3 * len(columns)
     }
     size = float(np.max(e.found.residual))
     fitting = [name for name, share in left.items() if share < 0.35]
     if not fitting:
-        return [_noise(e, size)]
+        return [_noise(e, size, counted)]
     best = min(left[name] for name in fitting)
     # of those that explain nearly as much, the one of the fewest numbers
     good = [name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02)]
@@ -398,8 +297,15 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
     )
 
 
-def _noise(e: Evidence, size: float) -> Explanation:
-    """What is left over is irregular."""
+def _noise(e: Evidence, size: float, counted: float) -> Explanation:
+    """What is left over is irregular, or goes with nothing that is known, or stands in too few frames."""
+    if counted < FEWEST_MISSES:
+        return Explanation(
+            cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about {counted:.0f} "
+            "frames: too few to show its cause",
+            remedy="record more of the motion before it dies down, or after it has begun to grow",
+            misfit=size,
+        )
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"

@@ -197,8 +197,9 @@ def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
     """Weights (f - 1,) of the pairs, whose weighted states have a mean square of 2."""
     states = z.astype(np.float64)
     length = np.sqrt(np.sum((states - rest) ** 2, axis=1)) + np.sqrt(np.sum(rest**2))
-    noise = np.sqrt((ROUNDING * length) ** 2 + np.sum(quanta**2, axis=1) / 12)[:-1]
-    length = length[:-1]
+    noise = np.sqrt((ROUNDING * length) ** 2 + np.sum(quanta**2, axis=1) / 12)
+    # of both states of a pair: a start that is 0, or near it, is finer than what follows from it
+    noise, length = (np.maximum(x[:-1], x[1:]) for x in (noise, length))
     # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
     moving = length > 0
     lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0

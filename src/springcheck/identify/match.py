@@ -93,6 +93,7 @@ class Targets:
         if terms[0].log_stiffness is not None:
             self.log_stiffness = np.array([x.log_stiffness for x in terms], np.float64)
         self.log_mass = np.array([x.log_mass for x in terms], np.longdouble)
+        self.scaled = bool(self.log_mass.size)
         covariance = np.stack([found.covariance for found in maps])
         diagonal = np.stack(
             [np.repeat(x.bias * found.residual, 2) for found, x in zip(maps, terms, strict=True)]
@@ -114,7 +115,9 @@ class Targets:
 
     def log_masses(self, x: Guesses, values: Reals) -> Reals:
         if self.log_stiffness is None:
-            return values[:, 2] + self.log_mass[x.of].astype(values.dtype)
+            if not self.scaled:
+                return values[:, 2]
+            return np.asarray(values[:, 2] + self.log_mass[x.of, x.s.astype(int)].astype(values.dtype))
         return np.asarray(self.log_stiffness[x.of] - 2 * np.log(x.s) - np.log(np.abs(values[:, 0])))
 
     def entries(self, every: Table, x: Guesses, values: Reals) -> Reals:

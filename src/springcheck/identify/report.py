@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
-from springcheck.identify.candidates import candidates_of, common, other_names, rows, stated_stiffness
+from springcheck.identify.candidates import (
+    candidates_of,
+    common,
+    nearest_stiffness,
+    other_names,
+    rows,
+    stated_stiffness,
+)
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD, substeps
@@ -111,7 +118,7 @@ def identify_arrays(
     if stated is not None:
         joints = [x for x in joints if not disagreements(record, moving, x, stated)] or [
             x for x in joints if stated_stiffness(record, moving, x, stated, explained[x][0].precision)[0]
-        ] or joints  # fmt: skip
+        ] or nearest_stiffness(record, moving, joints, stated)  # fmt: skip
     if stride is not None and stride > 0:
         # a step that divides the interval leaves the flow, which has none, and schemes of that stride
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
@@ -179,22 +186,24 @@ def _single_parameters(
     if record.momenta:
         return [], ""
     masses = [1.0 if record.mass is None else float(record.mass[j]) for j in moving]
-    heavier = [float(np.log(np.longdouble(np.float32(m)) / np.longdouble(m))) for m in masses]
+    heavier = [_shortened(m) for m in masses]
+    strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
+    longer = [0.0, *(_shortened(record.interval / s) for s in range(1, strides.stop))]
     for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
-        for s in range(stride, stride + 1) if stride is not None and stride > 0 else range(1, 13):
-            h = record.interval / s
-            longer = float(np.log(np.longdouble(np.float32(h)) / h))
-            for what, scales in (
-                ("step", [-longer] * len(masses)),
-                ("mass", heavier),
-                ("step and the mass", [m - longer for m in heavier]),
-            ):
-                loose = [replace(x, log_mass=y) for x, y in zip(base, scales, strict=True)]
-                joints = [x for x in search(maps, loose, range(s, s + 1), families) if x.accepted]
-                if joints and any(scales):
-                    remark = f"the {what} was rounded to single precision in double arithmetic"
-                    return sorted(joints, key=lambda x: x.plainness), remark
+        for what, of_mass, of_step in (("step", 0, 1), ("mass", 1, 0), ("step and the mass", 1, 1)):
+            scales = [tuple(of_mass * m - of_step * h for h in longer) for m in heavier]
+            if not any(any(row[1:]) for row in scales):
+                continue
+            loose = [replace(x, log_mass=row) for x, row in zip(base, scales, strict=True)]
+            if joints := [x for x in search(maps, loose, strides, families) if x.accepted]:
+                remark = f"the {what} was rounded to single precision in double arithmetic"
+                return sorted(joints, key=lambda x: x.plainness), remark
     return [], ""
+
+
+def _shortened(x: np.longdouble | float) -> float:
+    """Log of a number in single precision over the number."""
+    return float(np.log(np.longdouble(np.float32(x)) / np.longdouble(x)))
 
 
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:

@@ -43,8 +43,8 @@ class Terms:
     coarse rounding that cuts off, or repeats itself from turn to turn, is no noise that averages away."""
     log_stiffness: float | None = None
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
-    log_mass: float = 0.0
-    """Log of the scale of momenta over velocities, where it is known beforehand."""
+    log_mass: tuple[float, ...] = ()
+    """Log of the scale of momenta over velocities at each stride from 0 on, where it is known beforehand."""
     growing: bool = False
     """Whether friction of the wrong sign is looked for."""
 

@@ -1,0 +1,131 @@
+"""A motion that a few bad frames interrupt: which they are, and what happened at them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.arrays import Extended, Floats
+from springcheck.identify.evidence import FALLS, Evidence, matched, title
+from springcheck.identify.fit import Map, fit
+from springcheck.identify.result import Explanation
+
+FEW_BAD = 0.06
+"""Largest share of pairs that may be bad where the others make one motion."""
+
+
+def few_bad_frames(e: Evidence) -> list[Explanation]:
+    """A motion that a few pairs of frames interrupt."""
+    kept = np.ones(e.pairs, dtype=bool)
+    found = e.found
+    for _ in range(8):
+        z = (e.found.z * e.found.size + e.found.centre - found.centre) / found.size
+        off = np.max(np.abs((z[1:] - z[:-1] @ found.entries.T).astype(np.float64)), axis=1) / e.unit
+        limit = max(8 * float(np.median(off[kept])), 2.0)
+        now = off <= limit
+        if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
+            break
+        kept = now
+        found = fit(e.record, e.j, kept=kept)
+    bad = np.flatnonzero(~kept)
+    if not len(bad) or np.count_nonzero(kept) < 8:
+        return []
+    before = float(np.max(np.abs(e.misses)))
+    after = float(
+        np.sqrt(np.mean((found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)[kept] ** 2))
+    )
+    if before < FALLS * after:
+        return []
+    fitting = matched(found, e.terms)
+    if not fitting and after > 8 * float(np.median(e.unit)):
+        # the rest is no single motion either, as a solver's that begins with small steps
+        return []
+    whose = f" of {title(fitting[0].scheme)}" if fitting else ""
+    runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
+    spacing = set(np.diff([run[0] for run in runs]).tolist())
+    cause, remedy = _interruption(e, found, runs[0], whose)
+    if len(runs) > 2 and len(spacing) == 1:
+        cause = f"{cause}, and so every {spacing.pop()} steps"
+    elif len(runs) > 1:
+        at = ", ".join(str(run[0] + 1) for run in runs[1:5])
+        cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
+    return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
+
+
+def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
+    """What happened at a run of bad pairs, the rest of the motion being `found`'s."""
+    z, b = found.z, found.entries
+    first, last = int(run[0]), int(run[-1])
+
+    def near(x: Extended, y: Extended) -> bool:
+        # as near as the other pairs, or a thousandth of what is missing
+        missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
+        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit)), 1e-3 * missing)
+
+    if len(run) == 1:
+        from_, to = z[first], z[first + 1]
+        if near(to, from_):
+            return (
+                f"The motion{whose} stands still for a step: it is repeated at frame {first + 1}",
+                "write each frame once, or look for a step that is left out",
+            )
+        power = b @ b
+        for n in range(2, 9):
+            if near(to, power @ from_):
+                more = (
+                    f"frame {first + 1} is missing"
+                    if n == 2
+                    else f"{n - 1} frames are missing from frame {first + 1} on"
+                )
+                return (
+                    f"The motion is one{whose}, but {more}",
+                    "write every frame, or give a part without a gap",
+                )
+            power = b @ power
+        if first == 0:
+            return (
+                f"The motion is one{whose}, but frame 0 does not belong to it",
+                "look at how the start is set and recorded, or leave frame 0 out",
+            )
+        off = (to - b @ from_).astype(np.float64)
+        if first + 1 == len(z) - 1:
+            return (
+                f"The motion is one{whose}, but frame {first + 1}, the last, is wrong: {_amount(off, to)}",
+                ("look at how the last frame is written"),
+            )
+        back = np.linalg.solve(b.astype(np.float64), off)
+        if abs(back[0]) < 1e-2 * abs(back[1]):
+            kick = back[1] * float(found.size[1] / e.record.interval)
+            return (
+                f"The motion is one{whose}, but for one kick of {kick:+.3g} of the velocity between frames "
+                f"{first} and {first + 1}",
+                "look for what acts at that step alone",
+            )
+        digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
+        return (
+            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and "
+            f"{first + 1}, as after a restart from numbers of {max(1, round(digits))} digits",
+            "write restarts in full precision",
+        )
+    if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
+        off = (z[last] - b @ z[first]).astype(np.float64)
+        return (
+            f"The motion is one{whose}, but frame {last} is wrong: {_amount(off, z[last])}",
+            "look at how that frame is written",
+        )
+    if len(run) == 3 and near(z[first + 2], b @ z[first]):
+        return f"The motion is one{whose}, but frames {first + 1} and {first + 2} have changed places", (
+            "sort the frames by time"
+        )
+    return (
+        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}",
+        "look at what happens there, or give the part before it",
+    )
+
+
+def _amount(off: Floats, state: Extended) -> str:
+    share = np.abs(off) / max(float(np.max(np.abs(state))), 1e-300)
+    name = "velocity" if share[1] > share[0] else "position"
+    return f"its {name} is off by {float(np.max(share)):.2g} of the state's size"
