@@ -113,8 +113,7 @@ def test_a_journal_without_work_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("large", [0, 1 << 40])
-@pytest.mark.parametrize("final", [True, False])
+@pytest.mark.parametrize(("large", "final"), [(0, True), (1 << 40, False)])
 def test_a_writer_that_dies_anywhere_in_a_commit_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, large: int, final: bool
 ) -> None:
@@ -329,6 +328,6 @@ def test_a_loss_of_power_at_any_moment_loses_nothing(monkeypatch: pytest.MonkeyP
     with warnings.catch_warnings():
         # parts that a loss has torn were never reported
         warnings.simplefilter("ignore", store.StoreWarning)
-        assert power.losses(100, promises=True) == 0
-        # the check sees losses
-        assert power.losses(20, promises=False) > 0
+        assert power.losses(30, promises=True) == 0
+        # the check sees losses: nine of ten such states lose something
+        assert power.losses(5, promises=False) > 0

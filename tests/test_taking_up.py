@@ -105,7 +105,8 @@ def test_a_killed_study_of_precision_keeps_its_points(
     begun = killed([*arguments, "--budget", "600"], path, 3)
     kept = {name: POINTS.found(table) for name, table in begun.items()}
     # what the killed call took counts, on a slow machine more
-    assert cli.main([*arguments, "-o", str(path), "--json", "--budget", "30"]) == 0
+    budget = 3 + max(float(table.attributes["study_seconds"]) for table in begun.values())
+    assert cli.main([*arguments, "-o", str(path), "--json", "--budget", f"{budget:.0f}"]) == 0
     whole = {name: POINTS.found(table) for name, table in store.read_tables(path).items() if ":" in name}
     assert sum(map(len, kept.values())) >= 3
     for name, points in kept.items():
@@ -117,13 +118,15 @@ def test_a_killed_study_of_precision_keeps_its_points(
 
 def test_points_are_read_back_as_they_were() -> None:
     scene = scenes.load_scene("anharmonic")
-    found = precision.study(scene, [engines.parse(name) for name in OWN[::2]], budget=3.0)
+    found = precision.study(scene, [engines.parse(name) for name in OWN[::2]], budget=1.0)
     for method in found.methods:
         points = found.of(method.method)
-        assert len(points) > 3
+        # how many there are is a matter of the machine
+        assert len(points) > 1
         assert POINTS.found(points_of(scene).table(method.method, points)) == list(points)
 
 
+@pytest.mark.usefixtures("steady_clock")
 def test_an_interrupted_study_of_precision_goes_on(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = list(map(engines.parse, OWN))
@@ -173,7 +176,8 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
         measured.append(label)
         return measure(label)
 
-    arguments = ["stability", "spring-uneven", "--method", "own:*", "-o", str(tmp_path / "study.h5")]
+    methods = [x for name in OWN for x in ("--method", name)]
+    arguments = ["stability", "spring-uneven", *methods, "-o", str(tmp_path / "study.h5")]
     with monkeypatch.context() as patch:
         patch.setattr(limits, "measure", interrupted)
         assert cli.main(arguments) == cli.INTERRUPTED
@@ -188,18 +192,19 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
     assert not set(map(str, measured)) & set(map(str, again))
 
 
-@pytest.mark.parametrize("what", ["springcheck", "processor", "numpy"])
 def test_work_of_another_version_or_machine_is_not_taken_up(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "study.h5"
     with pytest.raises(KeyboardInterrupt):
         extremes.record(path, OWN, quick=True, progress=raising(2))
     machine = store.machine()
-    monkeypatch.setattr(store, "machine", lambda: machine | {what: "another"})
-    with pytest.raises(StoreError, match="other versions"):
-        extremes.record(path, OWN, quick=True)
-    monkeypatch.undo()
+    for what in ("springcheck", "processor", "numpy"):
+        other = machine | {what: "another"}
+        with monkeypatch.context() as patch:
+            patch.setattr(store, "machine", lambda other=other: other)
+            with pytest.raises(StoreError, match="other versions"):
+                extremes.record(path, OWN, quick=True)
     with pytest.raises(StoreError, match="another command"):
         extremes.record(path, OWN)
     assert extremes.record(path, OWN, quick=True).taken_up == 1
@@ -239,8 +244,8 @@ def test_every_version_that_a_study_runs_on_is_in_its_command() -> None:
 def test_a_study_of_stability_can_be_forced_to_start_over(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     with pytest.raises(KeyboardInterrupt):
-        stability.record(scene, path, ["own:*"], progress=raising(3))
-    assert stability.record(scene, path, ["own:*"], force=True).taken_up == 0
+        stability.record(scene, path, OWN, progress=raising(3))
+    assert stability.record(scene, path, OWN, force=True).taken_up == 0
 
 
 def test_a_forced_study_goes_on_with_what_it_has_finished_itself(tmp_path: Path) -> None:
@@ -249,10 +254,10 @@ def test_a_forced_study_goes_on_with_what_it_has_finished_itself(tmp_path: Path)
     before = path.read_bytes()
     for piece in (2, 3):
         with pytest.raises(KeyboardInterrupt):
-            stability.record(scene, path, ["own:*"], force=True, progress=raising(piece))
+            stability.record(scene, path, OWN, force=True, progress=raising(piece))
         assert path.read_bytes() == before
-    whole = stability.record(scene, path, ["own:*"], force=True)
+    whole = stability.record(scene, path, OWN, force=True)
     assert whole.taken_up >= 2
     assert len(whole.limits) > len(old.limits)
     # finished: the next one starts over
-    assert stability.record(scene, path, ["own:*"], force=True).taken_up == 0
+    assert stability.record(scene, path, OWN, force=True).taken_up == 0

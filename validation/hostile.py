@@ -642,8 +642,8 @@ def show(command: tuple[str, ...], path: Path, label: str, folder: Path) -> Resu
     )
 
 
-def every_command(path: Path, label: str = LABEL) -> list[Result]:
-    """A store before every command; the folder it lies in must not change."""
+def every_command(path: Path, label: str = LABEL, *, drawn: bool = True) -> list[Result]:
+    """A store before every command; the folder it lies in must not change.  `drawn`: by plot too."""
     found = []
     before = {p.name for p in path.parent.iterdir()}
     # once for all of them: what is forked from here inherits the answer
@@ -651,6 +651,8 @@ def every_command(path: Path, label: str = LABEL) -> list[Result]:
         with contextlib.suppress(StoreError):
             trust.guarded(path, way)
     for command in COMMANDS:
+        if command[0] == "plot" and not drawn:
+            continue
         with tempfile.TemporaryDirectory() as name:
             found.append(show(command, path, label, Path(name)))
     beside = {p.name for p in path.parent.iterdir()} - before
@@ -670,13 +672,13 @@ def warm() -> None:
 
 
 def serve() -> None:
-    """Answer lines of JSON [path, label] with the results: one process that forks, without threads."""
+    """Answer lines of JSON [path, label, drawn] with the results: one process that forks, without threads."""
     warm()
     for line in sys.stdin:
-        path, label = json.loads(line)
+        path, label, drawn = json.loads(line)
         answer = [
             [x.command, x.status, x.seconds, x.memory, x.out, x.err, x.wrong]
-            for x in every_command(Path(path), label)
+            for x in every_command(Path(path), label, drawn=drawn)
         ]
         print(json.dumps(answer), flush=True)
 
@@ -692,11 +694,11 @@ class Server:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, **threads},
         )  # fmt: skip
 
-    def __call__(self, path: Path, label: str = LABEL) -> list[Result]:
+    def __call__(self, path: Path, label: str = LABEL, *, drawn: bool = True) -> list[Result]:
         """What every command makes of a store."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        print(json.dumps([str(path), label]), file=self._process.stdin, flush=True)
+        print(json.dumps([str(path), label, drawn]), file=self._process.stdin, flush=True)
         return [
             Result(
                 command=tuple(c), status=status, seconds=seconds, memory=memory, out=out, err=err,
