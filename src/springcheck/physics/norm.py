@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.arrays import Extended, Floats, Integers, Reals
-from springcheck.physics.term import Term
+from springcheck.physics.term import Term, in_pieces
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
 """Below it squares lose digits to underflow."""
@@ -53,6 +53,9 @@ class Norm:
             return np.asarray(size)
 
     def _energy(self, dq: Reals, dp: Reals) -> Reals:
+        return in_pieces(self._energy_at_once, max(map(len, self.terms), default=0))(dq, dp)
+
+    def _energy_at_once(self, dq: Reals, dp: Reals) -> Reals:
         total = kinetic_energy(self.m, dp)
         for term in self.terms:
             du = term.stretch(dq)

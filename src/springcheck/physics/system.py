@@ -19,7 +19,7 @@ from springcheck.physics import graph
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
-from springcheck.physics.term import Term
+from springcheck.physics.term import Term, in_pieces
 from springcheck.physics.terms import Damping, Spring, WallSpring
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ class System:
     def force_of(self, terms: Iterable[Term]) -> Force:
         """The force of some terms on the scene's particles."""
         parts = tuple(terms)
-        return self._sum(parts, [term.add_force for term in parts])
+        return in_pieces(self._sum(parts, [term.add_force for term in parts]), sum(map(len, parts)))
 
     def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
         """What these functions of (q, v, out), one a term, add up to, as a function of (q, p)."""
@@ -178,7 +178,12 @@ class System:
     def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None, *, exact: bool = False) -> Force:
         """The magnitude of some terms' force; `exact` says that `near` are the positions to the last bit."""
         parts = tuple(terms)
-        return self._sum(parts, [partial(term.add_rounding, near=near, exact=exact) for term in parts])
+
+        def law(q: Reals, p: Reals, *near: Reals) -> Reals:
+            how = {"near": near[0] if near else None, "exact": exact}
+            return self._sum(parts, [partial(term.add_rounding, **how) for term in parts])(q, p)
+
+        return in_pieces(law, sum(map(len, parts)), *(() if near is None else (near,)))
 
     def strongest(self, q: Reals, terms: Iterable[Term] | None = None) -> Reals:
         """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""
@@ -275,7 +280,7 @@ class System:
         """Total energy of states q, p (..., n) -> (...) [M L2/T2]."""
         total = self.kinetic_energy(p)
         for term in self.terms:
-            total = total + term.energy(q)
+            total = total + in_pieces(lambda q, _, term=term: term.energy(q), len(term))(q, p)
         return np.asarray(total)
 
     @cached_property
