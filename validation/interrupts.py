@@ -148,7 +148,11 @@ class Fresh:
 
     def wait(self) -> tuple[int, str, str]:
         """Exit status, output, errors."""
-        out, err = self._process.communicate(timeout=120)
+        try:
+            out, err = self._process.communicate(timeout=120)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.pid, signal.SIGKILL)
+            out, err = self._process.communicate()
         return self._process.returncode, out, err
 
 
