@@ -180,8 +180,10 @@ class System:
         parts = tuple(terms)
 
         def law(q: Reals, p: Reals, *near: Reals) -> Reals:
-            how = {"near": near[0] if near else None, "exact": exact}
-            return self._sum(parts, [partial(term.add_rounding, **how) for term in parts])(q, p)
+            at = near[0] if near else None
+            return self._sum(parts, [partial(term.add_rounding, near=at, exact=exact) for term in parts])(
+                q, p
+            )
 
         return in_pieces(law, sum(map(len, parts)), *(() if near is None else (near,)))
 
