@@ -1,11 +1,14 @@
 """What the judge would see by h w: the smallest relative error of stiffness, step and friction that fails.
 
-    python validation/detection.py [STEPS]
+    python validation/detection.py [STEPS SCENES]
 
 One particle on a spring, every step recorded, an engine in extended precision whose states are rounded once
 a step.  Each limit is the least of those that the verdicts of the right run say (`Verdict.sees`), and each is
-put to the test: an engine that is off by three limits must fail, one that is off by a tenth must pass.  It
+put to the test: an engine that is off by three limits must fail, one that is off by a tenth must pass; so
+are the limits of as many random scenes of every term, scheme and distance of frames as are asked for.  It
 prints a table of the limits; exit status 1 where one of them is wrong.
+
+Measured with 400 steps and 250 random scenes: 815 and 945 limits, none wrong.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from arguments import arguments
+from judge_campaign import FIXED, random_scene
 from springcheck import checks, schemes
 from springcheck.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -99,7 +103,7 @@ def least(scene: Scene, name: str) -> Limits:
 
 
 if __name__ == "__main__":
-    asked = arguments(__doc__, steps=1000)
+    asked = arguments(__doc__, steps=400, scenes=100)
     for name in ("stiffness", "step"):
         print(f"| {name}, h w = | {' | '.join(f'{hw:g}' for hw in TURNS)} |")
         print(f"|---|{'---|' * len(TURNS)}")
@@ -118,7 +122,15 @@ if __name__ == "__main__":
                 scene = replace(spring(hw, min(asked.steps, 60), damped=damped), quantities=("q", "p"))
                 count, found = wrong(scene, schemes.SCHEMES[method])
                 tried, failed = tried + count, failed + found
-    print(f"{tried} limits tried, at 3 and at 0.1 of each: {len(failed)} wrong")
+    print(f"{tried} limits tried, at 3 and at 0.1 of each: {len(failed)} wrong", flush=True)
+    tried = 0
+    for seed in range(asked.scenes):
+        rng = np.random.default_rng([13, seed])
+        scheme = schemes.SCHEMES[str(rng.choice(FIXED))]
+        with np.errstate(all="ignore"):
+            count, found = wrong(random_scene(rng, scheme), scheme)
+        tried, failed = tried + count, failed + found
+    print(f"{tried} limits of {asked.scenes} random scenes likewise: {len(failed)} wrong in all")
     for line in failed:
         print(" ", line)
     sys.exit(bool(failed))
