@@ -64,6 +64,8 @@ LOOKS = {
     "scipy-radau": Look(_WINE, DASH_DOT),
     "scipy-bdf": Look(_BLACK, TWO_DOTS),
     "scipy-lsoda": Look(_BLACK, SPARSE),
+    "rebound-ias15": Look("#666666", LONG),
+    "adaptive": Look("#666666", SOLID),
     "force-held-2": Look(_OLIVE, SOLID),
     "force-held-4": Look(_OLIVE, LONG),
     "force-held-5": Look(_OLIVE, DASHED),

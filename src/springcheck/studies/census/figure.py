@@ -23,7 +23,7 @@ def draw(census: Census, folder: Path) -> list[Path]:
 
 def portrait(census: Census, axes: Axes | None = None) -> Figure:
     """Orbits in the plane of q and p: one colour and line a scheme, a dot where each orbit ends."""
-    figure = Figure(figsize=(9.2, 5.2), layout="constrained")
+    figure = Figure(figsize=(9.8, 5.2), layout="constrained")
     axes = figure.add_subplot()
     turn = np.linspace(0, 2 * np.pi, 400)
     axes.plot(np.cos(turn), np.sin(turn), color="#bbbbbb", linewidth=4, label="exact", zorder=1)
@@ -58,5 +58,5 @@ def portrait(census: Census, axes: Axes | None = None) -> Figure:
         f"The blog's spring by {len(census.entries)} methods: how it is attached\n"
         "decides the scheme (m = k = 1, h = 0.1, 200 steps)"
     )
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=6.5)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=7.2)
     return figure

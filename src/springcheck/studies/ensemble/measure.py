@@ -172,7 +172,7 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     for name, x in zip(("q0", "p0"), states, strict=True):
         found[name][chosen] = x[frames - 1, np.arange(copies), 0]
     with np.errstate(all="ignore"):
-        drift = _drifts(many, q, p, copies)
+        drift = _drifts(scene, changes, chosen, many, q, p)
         error = _errors(scene, changes, chosen, many, q, p)
     held = np.arange(len(q))[:, None] < frames
     found["energy_drift"][chosen] = np.take_along_axis(
@@ -186,14 +186,36 @@ def _of_copies(values: Reals, copies: int) -> Reals:
     return np.asarray(np.sum(values.reshape(len(values), copies, -1), axis=2))
 
 
-def _drifts(many: Scene, q: Floats, p: Floats, copies: int) -> Floats:
-    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies)."""
+def _energies(many: Scene, q: Reals, p: Reals, copies: int) -> Reals:
+    """Energy of each copy (f, copies)."""
     energy = _of_copies(0.5 * (p * p) / many.m, copies)
     for term in many.terms:
         if term.is_potential:
             energy = energy + _of_copies(term.potential(term.elongation(q), *term.parameters), copies)
+    return energy
+
+
+def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
+    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies).
+
+    With friction the energy of the exact solution stands for H0, where that is known.
+    """
+    copies = len(chosen)
+    energy = _energies(many, q, p, copies)
+    right = np.broadcast_to(energy[0], energy.shape).copy()
+    if many.system.is_damped:
+        steps = np.arange(len(q)) * many.every
+        if many.system.is_separate and many.system.is_linear:
+            right = np.asarray(
+                _energies(many, *exact.true_motion(many, steps, many.step), copies), np.float64
+            )
+        else:
+            for j in range(copies):
+                one = together(scene, changes, chosen[j : j + 1])
+                if exact.has_true_motion(one):
+                    right[:, j] = one.system.energy(*exact.true_motion(one, steps, one.step))
     start = np.abs(energy[0])
-    return np.asarray((energy - energy[0]) / np.where(start > 0, start, 1.0), np.float64)
+    return np.asarray((energy - right) / np.where(start > 0, start, 1.0), np.float64)
 
 
 def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:

@@ -16,8 +16,8 @@ from springcheck.studies.tables import Form
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
 """Numbers of each cell that are summed up and drawn: largest distance from the exact solution relative to
-the initial energy norm (NaN where it is not known), (H - H0)/|H0| where it is largest, and steps with finite
-numbers."""
+the initial energy norm (NaN where it is not known), (H - H0)/|H0| where it is largest (with friction the
+exact solution's H for H0), and steps with finite numbers."""
 
 Columns = Mapping[str, np.ndarray]
 

@@ -23,7 +23,10 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
         *taken_up(found.taken_up, "chunk"),
         plain(),
         table(titles, rows),
-        plain("error: largest distance from the exact solution; energy: (H - H0)/|H0| where largest", "dim"),
+        plain(
+            "error: largest distance from the exact solution; energy: (H - H0)/|H0| where it is largest",
+            "dim",
+        ),
         *left_out(found.left_out),
     ]
     return [*out, plain(f"Stored in {found.path}")] if found.path else out
