@@ -73,17 +73,21 @@ def stated_stiffness(
     )
 
 
+SINGLE_ROOM = 8 * 2.0**-24
+"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
+
+
 def nearest_stiffness(record: Record, moving: list[int], joints: list[Joint], stated: Floats) -> list[Joint]:
-    """Those of several schemes whose stiffness comes nearest to the stated one, which none has."""
-    off = {}
+    """Those of several schemes whose stiffness comes nearest to the stated one, which none has: all that a
+    constant in single precision or their own errors leave room for."""
+    off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = numbers(record, moving, joint)
-        known = [
-            abs(k / float(stated[j]) - 1) for j, k in zip(moving, stiffness or (), strict=False) if stated[j]
-        ]
-        off[joint] = max(known, default=0.0)
+        known = zip(moving, stiffness or (), strict=False)
+        off[joint] = max((abs(k / float(stated[j]) - 1) for j, k in known if stated[j]), default=0.0)
+        room[joint] = SINGLE_ROOM + max(6 * part.a_error / abs(part.a) for part in joint.parts)
     least = min(off.values())
-    return [joint for joint in joints if off[joint] <= 2 * least]
+    return [joint for joint in joints if off[joint] <= 2 * least + room[joint]]
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:

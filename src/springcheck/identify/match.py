@@ -99,6 +99,8 @@ class Targets:
             [np.repeat(x.bias * found.residual, 2) for found, x in zip(maps, terms, strict=True)]
         )
         diagonal = diagonal**2 + (terms[0].jitter * sizes * [0, 1, 1, 0]) ** 2
+        shear = terms[0].scale * self.observed.astype(np.float64) * [0, 1, -1, 0]
+        covariance = covariance + shear[:, :, None] * shear[:, None, :]
         values, self.axes = np.linalg.eigh(covariance + diagonal[:, :, None] * np.eye(4))
         self.variance = np.maximum(values, 1e-15 * values[:, -1:])
 

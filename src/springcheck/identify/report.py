@@ -29,6 +29,7 @@ from springcheck.identify.record import Record, read
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import (
     FEW,
+    SINGLE,
     Joint,
     difference,
     disagreements,
@@ -151,7 +152,8 @@ def _terms(record: Record, j: int, stated: Floats | None) -> Terms:
     log_stiffness = None
     if record.momenta and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
-    return Terms(mass_unknown=record.momenta, jitter=record.jitter, log_stiffness=log_stiffness)
+    scale = 0.0 if record.fine else SINGLE
+    return Terms(mass_unknown=record.momenta, jitter=record.jitter, log_stiffness=log_stiffness, scale=scale)
 
 
 def _explained(

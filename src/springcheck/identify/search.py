@@ -307,15 +307,15 @@ def disagreements(
 ) -> list[str]:
     """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
 
-    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  Text does
-    not show whether h k and h/m were rounded to single precision, and the state with them.
+    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  A
+    coarse file does not show whether h, m, h k or h/m were rounded to single precision.
     """
     _, stiffness, _ = numbers(record, moving, joint)
     path = FAMILIES[joint.family].path
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
-        error += 8 * SINGLE if record.text else 0.0
+        error += 0.0 if record.fine else 8 * SINGLE
         # a step or a mass in single precision moves the stiffness that is worked out with the stated one
         error += 0.0 if record.momenta else 3 * abs(part.log_mass)
         pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))

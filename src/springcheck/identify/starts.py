@@ -45,6 +45,9 @@ class Terms:
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
     log_mass: tuple[float, ...] = ()
     """Log of the scale of momenta over velocities at each stride from 0 on, where it is known beforehand."""
+    scale: float = 0.0
+    """Relative error of the scale of velocities: in a coarse file a step or a mass may be in single precision
+    as well, and others than the true scheme would fit if it were taken for exact."""
     growing: bool = False
     """Whether friction of the wrong sign is looked for."""
 
