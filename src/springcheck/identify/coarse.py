@@ -164,13 +164,13 @@ LAGS = range(2, 26)
 schemes."""
 
 
-def irregular(missing: Floats, bias: Floats | None = None, lags: range = LAGS) -> bool:
+def irregular(missing: Floats, bias: Floats | None = None) -> bool:
     """Whether what frames miss (f, c) is white, as rounding is, once it is freed of a bias (f, b).
 
     What goes with position, velocity, their powers, time, parity or a neighbour comes back after some
     frames; the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
     """
-    lags = range(lags.start, min(lags.stop, len(missing) // 4))
+    lags = range(LAGS.start, min(LAGS.stop, len(missing) // 4))
     if not lags:
         return True
     limit = float(chdtri(len(lags), 1e-7))
