@@ -108,6 +108,18 @@ def test_several_functions_and_programs_run_in_one_call(
     assert found["status"] == (2 if commands else 0)
 
 
+def test_a_scheme_is_stated_for_one_of_several(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+    command = ("--command", f"one=sh {EXAMPLES / 'euler.sh'} {{scene}} {{out}}")
+    if shutil.which("awk"):
+        found = run(capsys, "--stepper", "mine.py:leapfrog", *command, "--scheme", "one=semi-implicit-euler")
+        assert [x["scheme"] for x in found["runs"][1:]] == ["velocity-verlet", "semi-implicit-euler"]
+        assert found["status"] == 0
+    assert "no function and no program has this name" in refused(
+        capsys, "--stepper", "mine.py:leapfrog", "--scheme", "leapfroq=rk4"
+    )
+
+
 def test_names_that_would_be_one_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(VERLET)
     stepper = ("--stepper", "mine.py:leapfrog")

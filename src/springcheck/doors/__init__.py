@@ -22,7 +22,8 @@ class Brought:
     engines: tuple[str, ...] = ()
     steppers: tuple[str, ...] = ()
     programs: tuple[str, ...] = ()
-    scheme: str = ""
+    schemes: tuple[str, ...] = ()
+    """A scheme for all functions and programs, or as ``name=scheme`` for one."""
     seconds: float = command.SECONDS
 
     def bring(self) -> list[str]:
@@ -34,13 +35,24 @@ class Brought:
         ]
         if self.steppers:
             files = [function.file_of(spec) for spec in self.steppers]
-            made = function.engine(self.steppers, self.scheme)
+            made = function.engine(self.steppers, self._stated)
             labels += _labels(engines.bring(made, files[0], _digest(*files)))
         if self.programs:
-            made = command.engine(self.programs, self.scheme, self.seconds)
+            made = command.engine(self.programs, self._stated, self.seconds)
             files = [file for text in self.programs for file in command.files(text)]
             labels += _labels(engines.bring(made, self.programs[0], _digest(*files)))
+        names = {label.partition(":")[2] for label in labels}
+        unknown = [text for text in self.schemes if "=" in text and text.partition("=")[0] not in names]
+        if unknown:
+            raise MethodError(f"--scheme {unknown[0]}: no function and no program has this name")
         return labels
+
+    def _stated(self, name: str) -> str:
+        """The scheme that is stated for a function or a program, or ""."""
+        own = [
+            text.partition("=")[2] for text in self.schemes if text.partition("=")[0] == name and "=" in text
+        ]
+        return next(iter([*own, *(text for text in self.schemes if "=" not in text)]), "")
 
 
 @cache
@@ -62,7 +74,7 @@ def bring(options: Namespace) -> None:
         engines=tuple(options.engine),
         steppers=tuple(getattr(options, "stepper", ())),
         programs=tuple(getattr(options, "program", ())),
-        scheme=getattr(options, "scheme", None) or "",
+        schemes=tuple(getattr(options, "scheme", ())),
         seconds=command.SECONDS if seconds is None else seconds,
     )
     before = terms.known()

