@@ -93,7 +93,7 @@ def changed(case: Case, name: str, change: float) -> Case | None:
         run = replace(run, step=run.step * (1 + change), t=run.t * (1 + change))
         return Case(trajectory=run, scene=scene)
     mine = [term for term in scene.terms if term.is_potential == (name == "stiffness")]
-    if not any(np.any(getattr(term, term.columns[0].field) != 0) for term in mine):
+    if not any(np.any(term.parameters[0] != 0) for term in mine):
         return None
     return Case(trajectory=run, scene=_scaled(scene, mine, 1 + change))
 
