@@ -12,7 +12,7 @@ import springcheck
 from springcheck import checks, schemes
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Morse, Quartic, Term, WallSpring
+from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory, Verdict
 
@@ -150,3 +150,18 @@ def test_a_motion_that_escapes_in_finite_time_ends_with_its_reason(monkeypatch: 
     assert run.outcome.status in ("stopped", "diverged")
     assert run.outcome.message
     assert simulation.most_steps(replace(scene, every=100), 1e6) > 10**7
+
+
+def test_an_implicit_step_without_a_solution_is_no_crash() -> None:
+    """1 + h**2 K/m is 0 for the difference of two masses that push each other apart, h**2 2 k/m = -1."""
+    apart = Spring(a=np.array([0]), b=np.array([1]), k=np.array([-0.5]), rest=np.zeros(1))
+    scene = clean.scene(np.ones(2), (apart,), np.array([0.3, 1.1]), np.zeros(2), step=1.0, steps=5)
+    with np.errstate(all="ignore"):
+        run = plain(scene, "implicit-euler")
+        found = checks.judge(scene, plain(scene, "implicit-midpoint"))
+        checks.judge(
+            scene, replace(run, q=np.zeros((3, 2)), p=np.zeros((3, 2)), t=np.arange(3.0), energy=None)
+        )
+    assert len(run.t) == 1
+    assert run.outcome.status == "diverged"
+    assert alarms(found) == []

@@ -164,7 +164,9 @@ def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.f
 
     def motion(name: str) -> States | None:
         matrices = changed_matrices(case, name, change)
-        return None if matrices is None else states(matrices)
+        # beside a step without a solution the change may reverse orientation
+        turns = matrices is not None and np.all(schemes.rotation(matrices).determinant > 0)
+        return states(matrices) if matrices is not None and turns else None
 
     right = states(case.matrices)
     return limits(right, motion, change, lambda off: part(at, right, off))

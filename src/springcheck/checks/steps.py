@@ -50,6 +50,8 @@ def closed_or_not(case: Case) -> str | None:
     if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
         return "a mode under a constant pull has no closed form here"
     determinant = schemes.rotation(case.matrices).determinant
+    if not np.all(np.isfinite(determinant)):
+        return "the equation of an implicit step has no solution here"
     if np.any(determinant <= 0):
         return "the step reverses orientation (det <= 0): it has no phase"
     if np.any(determinant < CONTRACTED):

@@ -178,9 +178,9 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
         return np.asarray(solve(residual))
     matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[:, None], np.float64)
     right = residual.astype(np.float64)
-    if matrix.ndim == 2:
-        return np.asarray(right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T)
     try:
+        if matrix.ndim == 2:
+            return np.asarray(right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T)
         return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
     except np.linalg.LinAlgError:
         return np.full_like(residual, np.nan)
