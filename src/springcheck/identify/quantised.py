@@ -24,9 +24,6 @@ EXPLAINED = 0.3
 """Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
 unlike forces more than all is left, 1.4 of it."""
 
-HOPELESS = 0.9
-"""The same after three steps of refinement, beyond which it will not fall any more."""
-
 REFINED = 12
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
 
@@ -121,7 +118,7 @@ def reproduced(
             share = float(np.sqrt(np.mean(left**2))) / before
             if share <= EXPLAINED:
                 return True
-            if not share < (HOPELESS if turn > 2 else np.inf):
+            if not np.isfinite(share):
                 break
             weight = np.ones(len(left))
             if 2 * turn > REFINED:
