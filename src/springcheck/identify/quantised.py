@@ -24,7 +24,7 @@ EXPLAINED = 0.3
 """Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
 unlike forces more than all is left, 1.4 of it."""
 
-REFINED = 12
+REFINED = 30
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
 
 Force: TypeAlias = Callable[[float, Floats], Floats]
