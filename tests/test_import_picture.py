@@ -15,7 +15,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "slips", "workers", "arrays", "stats", "physics", "schemes", "engines",
+    "interrupts", "errors", "slips", "workers", "arrays", "wording", "stats", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
     "doors", "figures", "studies", "explain", "inspect", "plot", "page", "listing", "api", "output",
     "commands", "cli", "__main__",

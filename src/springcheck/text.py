@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
 from rich.text import Text
@@ -118,32 +117,3 @@ def hanging(head: str, text: str) -> Lines:
     """Text of 80 columns, its further lines indented as far as its head is long."""
     broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
     return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]
-
-
-def ordinal(n: int) -> str:
-    """A number's place in a row: 1st, 2nd, 3rd, 11th, 41st."""
-    ending = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
-    return f"{n}{ending}"
-
-
-def count(n: int, noun: str) -> str:
-    """So many of something: 1 cell, 2 cells."""
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
-
-
-def seconds(value: float | None) -> str:
-    """A time with three digits and its unit."""
-    if value is None or not np.isfinite(value):
-        return "-"
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value / 1e-9:.0f} ns"
-
-
-def duration(value: float) -> str:
-    """Seconds, hours or years, roughly."""
-    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("h", 3600.0)):
-        if value >= size:
-            return f"{value / size:.2g} {unit}"
-    return seconds(value)

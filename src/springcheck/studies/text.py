@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from springcheck.studies.choose import LeftOut
-from springcheck.text import Lines, count, plain
+from springcheck.text import Lines, plain
+from springcheck.wording import count
 
 
 def left_out(left: Sequence[LeftOut]) -> Lines:

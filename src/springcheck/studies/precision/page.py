@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from springcheck.studies.charts import Bank, Chart, Curve, Scale, scheme_of
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
-from springcheck.text import seconds
+from springcheck.wording import seconds
 
 MOST_SHOWN = 30.0
 """Errors above this are out of the picture at first: nothing is read off them."""

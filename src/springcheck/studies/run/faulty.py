@@ -12,10 +12,8 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import Draft
+from springcheck.studies.run.result import FAULT
 from springcheck.trajectory import Trajectory
-
-ENGINE = "fault"
-"""What stands for an engine in the labels of faults."""
 
 MOST_NUMBERS = 10**7
 """Of one trajectory: a fault is recorded in memory, by loops in Python."""
@@ -31,7 +29,7 @@ class Broken:
     @property
     def label(self) -> str:
         """Of its trajectory."""
-        return f"{ENGINE}:{self.fault.name}"
+        return f"{FAULT}:{self.fault.name}"
 
     @property
     def about(self) -> str:
@@ -57,7 +55,7 @@ class Broken:
 
 def _record(made: Trajectory, broken: Broken) -> simulate.Record:
     return simulate.Record(
-        label=Label(engine=ENGINE, method=broken.fault.name),
+        label=Label(engine=FAULT, method=broken.fault.name),
         scheme=made.scheme,
         step=made.step,
         every=made.every,

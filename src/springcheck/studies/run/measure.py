@@ -21,14 +21,13 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose
-from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
+from springcheck.studies.run.result import FAULT, MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.study import Progress
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
-from springcheck.studies.run.changes import changed
-from springcheck.studies.run.faulty import ENGINE, broken
+    from springcheck.studies.run.faulty import Broken
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
@@ -62,7 +61,12 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    scene = changed(options) if changes else scenefile.load_scene(options.scene)
+    if changes:
+        from springcheck.studies.run.changes import changed
+
+        scene = changed(options)
+    else:
+        scene = scenefile.load_scene(options.scene)
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
@@ -102,7 +106,11 @@ def run(
     """
     path = Path(path)
     labels, left = choose(scene, methods)
-    wrong = [broken(text) for text in dict.fromkeys(faults)]
+    wrong: list[Broken] = []
+    if faults:
+        from springcheck.studies.run.faulty import broken
+
+        wrong = [broken(text) for text in dict.fromkeys(faults)]
     bar = _Bar(progress, len(labels) * (1 + thorough))
     command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
     with keeper.kept(path, command, force=force) as kept:
@@ -123,7 +131,7 @@ def run(
                 left.append(LeftOut(method=str(label), reason=str(error)))
         for one in wrong:
             if one.label not in resumed:
-                with kept.draft(Label(engine=ENGINE, method=one.fault.name), scene) as draft:
+                with kept.draft(Label(engine=FAULT, method=one.fault.name), scene) as draft:
                     one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = kept.sources()
@@ -316,7 +324,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
     if not chosen:
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(known)}")
     for name in chosen:
-        if name.startswith(f"{ENGINE}:"):
+        if name.startswith(f"{FAULT}:"):
             raise StoreError(
                 f"{path}: {name} is of an engine broken on purpose, which --from does not run; "
                 "name the others with --method"

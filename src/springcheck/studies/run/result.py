@@ -16,6 +16,9 @@ from springcheck.studies.keeper import plain
 from springcheck.studies.run.drawable import Drawable, drawable
 from springcheck.trajectory import Comparison, Verdict
 
+FAULT = "fault"
+"""What stands for an engine in the labels of engines broken on purpose."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodRun:
