@@ -350,6 +350,8 @@ def main() -> int:
     if sys.argv[1:2] == ["--serve"]:
         return serve()
     given = arguments(__doc__, interrupts=500, seed=11)
+    # a shell starts a command in the background with SIGINT ignored, and every child would inherit that
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     rng = random.Random(given.seed)
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as home:
