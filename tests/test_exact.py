@@ -251,6 +251,19 @@ def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
     assert known >= 4
 
 
+def test_a_bond_that_has_broken_is_followed_however_far() -> None:
+    """Its stretch grows as the logarithm of what overflows; here steepness times length is 11,900."""
+    ends = np.array([0]), np.array([1])
+    bond = Morse(
+        a=ends[0], b=ends[1], depth=np.array([0.0013]), steepness=np.array([9.7]), rest=np.array([0.27])
+    )
+    for t in (0.014, 0.05, 1.0):
+        scene = made([0.0017, 0.2665], (bond,), [0.236, 0.657], [2.05, 2.05], t)
+        off = exact_check.ratio(scene)
+        assert off is not None
+        assert off <= 1, t
+
+
 def test_the_stated_error_is_small_enough_to_see_a_mistake_of_the_exact_solution() -> None:
     scene = exact_check.pendulum(np.random.default_rng([3, 0]))
     solution = scene.system.solution

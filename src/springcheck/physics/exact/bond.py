@@ -24,6 +24,10 @@ def _bonds(scene: Scene) -> list[tuple[Morse, _Bond]] | None:
     return [(term, _bond(scene, term)) for term in terms]
 
 
+FAR = 64.0
+"""A phase whose exponential leaves nothing of 1 in any precision that is used here."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bond:
     """Relative motion of each bond: reduced mass, elongation, relative momentum, E / depth, and that less 1.
@@ -101,8 +105,8 @@ def _morse(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: Extended) -> State
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
     for term, bond in bonds:
-        z, dz = _stretched(bond, wide(term.steepness), t)
-        u, pull = np.log1p(z) / term.steepness, bond.mass * dz / (term.steepness * (1 + z))
+        stretch, speed = _stretched(bond, wide(term.steepness), t)
+        u, pull = stretch / term.steepness, bond.mass * speed / term.steepness
         ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
         total = wide(scene.p[term.a]) + scene.p[term.b]
         share = bond.share
@@ -115,14 +119,17 @@ def _morse(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: Extended) -> State
 
 
 def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
-    """z = s - 1 and z' at times t.
+    """log(s) and its time derivative at times t.
 
     At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
-    root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.
+    root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.  Far beyond
+    dissociation only root exp(|phase|) / (2 excess) of it is left, whose logarithm cannot overflow.
     """
     root, bound, edge = np.sqrt(bond.energy), bond.excess < 0, bond.excess == 0
     phase = bond.rate * t + bond.start
     turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
+    far = np.abs(run) > FAR
+    endless, run = np.where(far, run, FAR), np.where(far, 0, run)
     half, whole = (
         np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
         np.where(bound, np.sin(turn), np.sinh(run)),
@@ -132,7 +139,12 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     # at the edge of dissociation a parabola
     z0, dz0 = np.expm1(a * bond.u), a * bond.p / bond.mass * np.exp(a * bond.u)
     z = np.where(edge, z0 + dz0 * t + bond.w**2 * t * t / 2, z)
-    return np.asarray(z), np.asarray(np.where(edge, dz0 + bond.w**2 * t, dz))
+    dz = np.where(edge, dz0 + bond.w**2 * t, dz)
+    leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
+    return (
+        np.where(far, leaving, np.log1p(z)),
+        np.where(far, bond.rate * np.sign(endless), dz / (1 + z)),
+    )
 
 
 def _morse_doubt(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: np.longdouble) -> States:
