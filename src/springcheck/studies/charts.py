@@ -14,9 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import engines
 from springcheck.arrays import Floats
-from springcheck.errors import SpringcheckError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,11 +122,3 @@ def _chart(chart: Chart) -> dict[str, Any]:
             "notes": [[at[note] for note in row] for row in chart.tiles.notes],
         }
     return found
-
-
-def scheme_of(method: str) -> str:
-    """The scheme that colours a method; its own name where its engine is not here."""
-    try:
-        return engines.method(engines.parse(method)).scheme
-    except (SpringcheckError, KeyError):
-        return method

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.studies.charts import Bank, Chart, Curve, Scale, scheme_of
+from springcheck.figures.looks import scheme_of
+from springcheck.studies.charts import Bank, Chart, Curve, Scale
 from springcheck.studies.ensemble.measure import columns
 from springcheck.studies.ensemble.result import Ensemble
 

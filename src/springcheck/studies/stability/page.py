@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from springcheck.studies.charts import Bank, Chart, Curve, Rule, Scale, Tiles, scheme_of
+from springcheck.figures.looks import scheme_of
+from springcheck.studies.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
