@@ -15,6 +15,7 @@ from springcheck.errors import StoreError, plain
 from springcheck.page.content import Content
 from springcheck.store import files
 from springcheck.trajectory import Verdict
+from springcheck.wording import ordinal
 
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
@@ -35,7 +36,7 @@ def html(content: Content) -> str:
         # what a file says is text without control characters
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
-    around.filters |= {"short": short, "fraction": fraction}
+    around.filters |= {"short": short, "fraction": fraction, "ordinal": ordinal}
     script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
     style = (HERE / "page.css").read_text(encoding="utf-8")
     return around.get_template("page.html").render(
