@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from springcheck.studies.extremes import figure as figures
 from springcheck.studies.extremes import grid, judging, refusals, running
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
+from springcheck.studies.extremes.planes import planes
 
 Need = Callable[[str], None]
 METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
@@ -133,3 +135,16 @@ def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
         assert np.array_equal(drawn, (wanted > 0) & np.isfinite(wanted))
         np.testing.assert_allclose(columns[f"log10_{name}"][drawn], np.log10(wanted[drawn]), rtol=1e-15)
     assert {path.suffix for path in figures.draw(atlas, tmp_path)} == {".png", ".svg"}
+
+
+def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
+    atlas = extremes.measure(["own:semi-implicit-euler"], quick=True)
+    (plane,) = planes(atlas.cells)
+    untold = next(cell for row in plane.cells for cell in row if cell)
+    cells = tuple(replace(cell, outcome="not measured") if cell is untold else cell for cell in atlas.cells)
+    for shown, count in ((atlas, 0), (replace(atlas, cells=cells), 1)):
+        drawn = figures.picture(shown)
+        (image,) = drawn.axes[0].images
+        wanted = keeping.OUTCOMES.index("not measured")
+        assert np.any(np.ma.filled(image.get_array(), -1) == wanted) == bool(count)
+        assert [text.get_text() for text in drawn.legends[0].get_texts()].count("not measured") == count

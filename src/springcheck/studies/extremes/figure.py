@@ -13,10 +13,12 @@ from matplotlib.patches import Patch
 from springcheck.arrays import Floats
 from springcheck.figures.style import save, style
 from springcheck.studies.extremes.planes import planes
-from springcheck.studies.extremes.result import Atlas
+from springcheck.studies.extremes.result import OUTCOMES, Atlas
 
-OUTCOMES = ("right", "unstable, as theory says", "engine's limit", "refused", "silently wrong")
-SHADES = ("#9ecae1", "#fee391", "#d94801", "#bdbdbd", "#000000")
+SHADES = ("#9ecae1", "#fee391", "#d94801", "#bdbdbd", "#000000", "#8c6bb1")
+"""Of the outcomes, in their order."""
+RARE = "not measured"
+"""It stands in the legend only where there is one."""
 
 
 def draw(atlas: Atlas, folder: Path) -> list[Path]:
@@ -44,8 +46,8 @@ def picture(atlas: Atlas) -> Figure:
         gaps |= bool(np.isnan(plane).any())
         axes.grid(False)
         axes.imshow(
-            plane, origin="lower", aspect="auto", cmap=ListedColormap(list(SHADES)), vmin=-0.5, vmax=4.5,
-            interpolation="nearest",
+            plane, origin="lower", aspect="auto", cmap=ListedColormap(list(SHADES)), vmin=-0.5,
+            vmax=len(SHADES) - 0.5, interpolation="nearest",
         )  # fmt: skip
         shown = [i for i, force in enumerate(forces) if force in (-200, -50, -20, -10, 0, 10, 20, 50, 200)]
         axes.set_xticks(shown, [str(forces[i]) for i in shown], fontsize=7)
@@ -59,7 +61,8 @@ def picture(atlas: Atlas) -> Figure:
             axes.set_xlabel("$\\log_{10}$ force")
     for axes in grid[len(found) :]:
         axes.set_axis_off()
-    handles = [Patch(facecolor=shade, label=name) for shade, name in zip(SHADES, OUTCOMES, strict=True)]
+    named = [one for one in zip(SHADES, OUTCOMES, strict=True) if one[1] != RARE or atlas.counts()[RARE]]
+    handles = [Patch(facecolor=shade, label=name) for shade, name in named]
     if gaps:
         handles.append(Patch(facecolor="white", edgecolor="#bbbbbb", label="not tried"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(6, 2 * columns), frameon=False)
