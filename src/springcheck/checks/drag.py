@@ -8,15 +8,12 @@ along the momenta, sum d p, where a friction c adds -c h p**2 at every step and 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.arrays import Extended
-
-if TYPE_CHECKING:
-    from springcheck.checks.case import Case
+from springcheck.checks.case import Case
 
 BLOCKS = 16
 """Parts of a run whose sums tell the standard error: noise may be alike in steps that follow each other."""
@@ -35,8 +32,6 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
     rebuilds = run.rebuilds_velocity and not run.arithmetic.keeps_displacement
     if not rebuilds or ahead is None or np.count_nonzero(told) < BLOCKS * FEWEST:
         return None
-    from springcheck.checks.case import Case
-
     plain = Case(trajectory=replace(run, rebuilds_velocity=False), scene=case.scene).ahead
     assert plain is not None
     p = run.p[:-1][told].astype(np.longdouble)

@@ -11,21 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
 from springcheck.arrays import ROUNDOFF, Extended, Integers, Reals
+from springcheck.checks.case import Case, advance
 from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.trajectory import NOT_KNOWN, Limits
-
-if TYPE_CHECKING:
-    from springcheck.checks.case import Case
 
 CHANGE = 2.0**-20
 """Relative change of which the quotients are taken, over the phase of the motion: what is left out of them is
@@ -82,8 +80,6 @@ def rows(case: Case, count: int, told: NDArray[np.bool_] | None = None) -> Integ
 
 def changed(case: Case, name: str, change: float) -> Case | None:
     """The case with its stiffness, step or friction larger by a fraction; None where it has none."""
-    from springcheck.checks.case import Case
-
     run, scene = case.trajectory, case.judged
     # the parameters are the judged ones already: they are not rounded once more
     how = replace(run.arithmetic, parameters=Arithmetic().parameters, excess=0.0)
@@ -141,8 +137,6 @@ def _solution(case: Case, at: Integers) -> States | None:
 
 def _ends(case: Case, at: Integers) -> States:
     """The scheme's own next frame after these frames."""
-    from springcheck.checks.case import advance
-
     run = case.trajectory
     q, p = (x[at].astype(np.longdouble) for x in (run.q, run.p))
     if run.every > 1:

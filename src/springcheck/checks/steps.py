@@ -85,7 +85,7 @@ def step_defect(case: Case) -> Verdict:
         why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
     why = _beyond_range(case, off) or why + _where(case, off)
     value, most = float(seen[worst]), float(bound)
-    if (slow := drag(case, told)) and not np.any(off) and not slow[0] <= slow[1]:
+    if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
         value, most, why = slow
     return case.verdict("step-defect", value, most, "roundings", why, _sees(case, told))
 
