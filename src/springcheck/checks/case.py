@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from springcheck.physics.term import Term
 from springcheck.schemes.stepping import Slope
 from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
@@ -28,6 +30,16 @@ class Case:
 
     trajectory: Trajectory
     scene: Scene
+
+    @cached_property
+    def _made(self) -> dict[Callable[[Case], Any], Any]:
+        return {}
+
+    def once(self, work: Callable[[Case], T]) -> T:
+        """What a function makes of this case, worked out at its first call: several checks may ask for it."""
+        if work not in self._made:
+            self._made[work] = work(self)
+        return self._made[work]  # type: ignore[no-any-return]
 
     @property
     def scheme(self) -> schemes.Scheme:

@@ -147,6 +147,12 @@ def _ends(case: Case, at: Integers) -> States:
 def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.floating]) -> Limits:
     """The limits of a check of normal modes: `part(rows, right, change)` says how many bounds a change of
     the closed-form motion about the centres is, in mode coordinates (r, n)."""
+    at, change, right, motions = case.once(_mode_motions)
+    return limits(right, motions.get, change, lambda off: part(at, right, off))
+
+
+def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States]]:
+    """Rows, relative change, the modes' motion there, and that with each parameter changed."""
     at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
@@ -156,14 +162,15 @@ def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.f
     def states(matrices: Extended) -> States:
         return schemes.propagate(matrices, *start, steps, area_preserving=case.area_preserving)
 
-    def motion(name: str) -> States | None:
-        matrices = changed_matrices(case, name, change)
+    with np.errstate(all="ignore"):
+        found = ((name, changed_matrices(case, name, change)) for name in NAMES)
         # beside a step without a solution the change may reverse orientation
-        turns = matrices is not None and np.all(schemes.rotation(matrices).determinant > 0)
-        return states(matrices) if matrices is not None and turns else None
-
-    right = states(case.matrices)
-    return limits(right, motion, change, lambda off: part(at, right, off))
+        motions = {
+            name: states(matrices)
+            for name, matrices in found
+            if matrices is not None and np.all(schemes.rotation(matrices).determinant > 0)
+        }
+        return at, change, states(case.matrices), motions
 
 
 def changed_matrices(case: Case, name: str, change: float) -> Extended | None:

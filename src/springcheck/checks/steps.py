@@ -62,6 +62,11 @@ def closed_or_not(case: Case) -> str | None:
 @check("step", family="motion", needs="a fixed step and two frames", unless=no_map)
 def step_defect(case: Case) -> Verdict:
     """Each step is the scheme's own step, to rounding."""
+    # `arithmetic` asks for it too
+    return case.once(_step_defect)
+
+
+def _step_defect(case: Case) -> Verdict:
     run = case.trajectory
     if case.ahead is None:
         return _by_norm(case)
