@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import matplotlib as mpl
@@ -35,6 +36,27 @@ def test_every_scheme_has_a_look_of_its_own() -> None:
     assert len({looks.LOOKS[name] for name in looks.LOOKS}) == len(looks.LOOKS)
     assert looks.look("a plug-in's") == looks.look("a plug-in's")
     assert looks.look("a plug-in's") not in looks.LOOKS.values()
+
+
+def test_every_colour_is_seen_on_white_and_on_black() -> None:
+    assert {look.color for look in (*looks.LOOKS.values(), *looks._REST)} <= set(looks.ON_SCREEN)
+    css = (Path(looks.__file__).parents[1] / "page" / "page.css").read_text()
+    white, black = re.findall(r"--paper: (#[0-9a-f]+)", css)[:2]
+    assert (white, black) == ("#fff", "#161616")
+    for pair in looks.ON_SCREEN.values():
+        for colour, paper in zip(pair, ("#ffffff", black), strict=True):
+            high, low = sorted((luminance(colour), luminance(paper)), reverse=True)
+            # the least that the Web Content Accessibility Guidelines 2.1 (1.4.11) ask of a graphic
+            assert (high + 0.05) / (low + 0.05) >= 3, (colour, paper)
+    for shades in zip(*looks.ON_SCREEN.values(), strict=True):
+        assert len(set(shades)) == len(shades)
+
+
+def luminance(colour: str) -> float:
+    """Of #rrggbb, relative to white, as those guidelines define it."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
+    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from browser import Browser
 from springcheck import page, schemes, store
 from springcheck.cli import main
 from springcheck.errors import StoreError
+from springcheck.figures import looks
 from springcheck.page.content import drawn
 from springcheck.page.sections import Piece, Section, Sheet
 from springcheck.physics import exact
@@ -513,6 +514,22 @@ def test_a_pointer_reads_a_point_and_a_drag_zooms(spring: Path, content: page.Co
 def _shape(svg: str) -> str:
     """A picture without the numbers of its clips and the ring around what was read."""
     return re.sub(r'clip\d+|<circle class="ring"[^>]*>', "", svg)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_scheme_has_the_colour_that_it_has_in_figures(
+    content: page.Content, opened: Any, dark: bool
+) -> None:
+    chromium = opened(content, dark=dark)
+    for place in ("#motion", "#orbits"):
+        drawn_in = chromium.run(
+            f"[...document.querySelectorAll('{place} .plot')[0].querySelectorAll('.curve')]"
+            ".map((x) => getComputedStyle(x).stroke)"
+        )
+        for scheme in LOOPS.values():
+            shade = looks.ON_SCREEN[looks.look(scheme).color][dark]
+            rgb = ", ".join(str(int(shade[i : i + 2], 16)) for i in (1, 3, 5))
+            assert f"rgb({rgb})" in drawn_in, (place, scheme)
 
 
 def test_methods_are_switched_on_and_off(content: page.Content, opened: Any) -> None:

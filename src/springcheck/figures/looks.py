@@ -1,4 +1,4 @@
-"""One colour for one scheme, one mark for one engine, in every figure; axes in readable units.
+"""One colour for one scheme, in every figure and page, one mark for one engine; axes in readable units.
 
 Relatives share a colour and differ by their line.  Colours are those of Okabe & Ito (2008) and two dark ones
 of Tol (2021), told apart by people with any colour vision; the common schemes also differ by their lines, so
@@ -22,6 +22,7 @@ SOLID, DASHED, DOTTED, DASH_DOT = "-", "--", ":", "-."
 LONG: Line = (0, (8, 1.5))
 TWO_DOTS: Line = (0, (5, 1.5, 1, 1.5, 1, 1.5))
 SPARSE: Line = (0, (1, 2.5))
+LINES = (SOLID, DASHED, DOTTED, DASH_DOT, LONG, TWO_DOTS, SPARSE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,21 @@ class Look:
 
 _BLUE, _RED, _GREEN, _PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 _ORANGE, _SKY, _BLACK, _WINE, _OLIVE = "#E69F00", "#56B4E9", "#000000", "#882255", "#999933"
+_GREY = "#666666"
+
+ON_SCREEN = {
+    _BLUE: (_BLUE, "#56B4E9"),
+    _RED: (_RED, "#FF7A33"),
+    _GREEN: ("#00805C", "#2FC79A"),
+    _PINK: ("#B0508C", "#E79FC8"),
+    _ORANGE: ("#B87D00", _ORANGE),
+    _SKY: ("#3A97CC", "#A6D8F5"),
+    _BLACK: (_BLACK, "#F0F0F0"),
+    _WINE: (_WINE, "#D6608F"),
+    _OLIVE: ("#85852B", "#C8C850"),
+    _GREY: (_GREY, "#A0A0A0"),
+}
+"""Each colour where it must be seen on white and on black: the same, as far as its contrast is 3 to 1."""
 
 LOOKS = {
     "explicit-euler": Look(_RED, DASHED),
@@ -64,8 +80,8 @@ LOOKS = {
     "scipy-radau": Look(_WINE, DASH_DOT),
     "scipy-bdf": Look(_BLACK, TWO_DOTS),
     "scipy-lsoda": Look(_BLACK, SPARSE),
-    "rebound-ias15": Look("#666666", LONG),
-    "adaptive": Look("#666666", SOLID),
+    "rebound-ias15": Look(_GREY, LONG),
+    "adaptive": Look(_GREY, SOLID),
     "force-held-2": Look(_OLIVE, SOLID),
     "force-held-4": Look(_OLIVE, LONG),
     "force-held-5": Look(_OLIVE, DASHED),

@@ -2,12 +2,9 @@
 // What charts are made of: elements of SVG, colours and dashes, ticks, ranges.
 
 const SVG = "http://www.w3.org/2000/svg";
-// Okabe & Ito (2008), told apart by people with any colour vision; lightened where they vanish on black
 const DARK = matchMedia("(prefers-color-scheme: dark)");
-const COLOURS = DARK.matches
-  ? ["#56B4E9", "#E69F00", "#2FC79A", "#E79FC8", "#F0E442", "#c8c8c8", "#FF7A33"]
-  : ["#0072B2", "#D55E00", "#00805C", "#B0508C", "#8A6100", "#000000", "#6A3D9A"];
-const DASHES = ["", "7 4", "2 3", "9 3 2 3", "14 4", "4 2"];
+// in the order of the lines of springcheck/figures/looks.py
+const DASHES = ["", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6"];
 const SHAPES = [
   (x, y) => `M${x - 3} ${y}a3 3 0 1 0 6 0a3 3 0 1 0-6 0`,
   (x, y) => `M${x - 3} ${y - 3}h6v6h-6z`,
@@ -35,25 +32,21 @@ function number(x, digits = 3) {
   return String(Number(x.toPrecision(Math.min(17, Math.max(1, digits)))));
 }
 
-// One colour for one scheme everywhere in the page.
-const GROUPS = ["explicit-euler", "semi-implicit-euler", "implicit-euler", "velocity-verlet"];
+// Schemes in the order in which they are drawn: on paper, where all are black, their dashes differ by it.
+const GROUPS = [];
 
 function groupOf(name) {
   if (!GROUPS.includes(name)) GROUPS.push(name);
   return GROUPS.indexOf(name);
 }
 
-function colourOf(name) {
-  return COLOURS[groupOf(name) % COLOURS.length];
-}
-
-// Colour, dash, mark and dash on paper, where all are black, of the count-th curve of a group.
+// Colour, dash, mark and dash on paper of the count-th curve of a group; colour and dash are those of figures.
 function lookOf(group, count) {
   if (group === "exact") return { colour: "var(--soft)", dash: "1 5", printed: "1 5", shape: SHAPES[0] };
-  const which = groupOf(group);
+  const which = groupOf(group), [light, dark, line] = DATA.looks[group];
   return {
-    colour: colourOf(group),
-    dash: DASHES[(count + Math.floor(which / COLOURS.length)) % DASHES.length],
+    colour: DARK.matches ? dark : light,
+    dash: DASHES[(line + count) % DASHES.length],
     printed: DASHES[(which + count) % DASHES.length],
     shape: SHAPES[(which + count) % SHAPES.length],
   };

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from springcheck.errors import StoreError, plain
+from springcheck.figures import looks
 from springcheck.page.content import Content
 from springcheck.store import files
 from springcheck.trajectory import Verdict
@@ -22,6 +24,8 @@ MARK = '<meta name="generator" content="springcheck report">'
 """In the first lines of every report: no other file is replaced."""
 SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
 """In the order in which they need one another."""
+LOOPS = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
+"""Schemes that the page itself carries out, whatever the store holds."""
 HEAD = 1024
 """Bytes in which the mark stands."""
 
@@ -49,7 +53,7 @@ def html(content: Content) -> str:
         style_digest=_digest(style),
         script=Markup(script),
         script_digest=_digest(script),
-        data=_json(content.data),
+        data=_json({**content.data, "looks": _looks(content.data)}),
     )
 
 
@@ -70,6 +74,19 @@ def write(content: Content, path: Path) -> int:
     except OSError as error:
         raise StoreError(f"{path}: the report cannot be written: {error.strerror or error}") from error
     return len(page)
+
+
+def _looks(data: Mapping[str, Any]) -> dict[str, tuple[str, str, int]]:
+    """Of each scheme that is drawn: its colour on white and on black, and the number of its line."""
+    curves = (
+        curve for bank in data["banks"].values() for chart in bank["charts"] for curve in chart["curves"]
+    )
+    names = (*LOOPS, *(run["scheme"] for run in data["runs"]), *(curve["group"] for curve in curves))
+    found = {name: looks.look(name) for name in names}
+    return {
+        name: (*looks.ON_SCREEN[look.color], looks.LINES.index(look.linestyle))
+        for name, look in found.items()
+    }
 
 
 def _json(data: Any) -> Markup:
