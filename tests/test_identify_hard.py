@@ -443,3 +443,20 @@ def test_a_coarse_force_is_certain_many_steps_apart_too(force, precision: str, e
         "velocity-verlet", every, precision, True,
     )  # fmt: skip
     assert not found.undecided
+
+
+@pytest.mark.parametrize("m", [1e-50, 1e-20, 1e-12, 1e42])
+def test_noise_of_a_force_far_below_a_quantum_is_no_arithmetic(m: float) -> None:
+    rng = np.random.default_rng(1)
+    q, v, states = 0.3, 0.2, [(0.3, 0.2)]
+    pull = -K / M * q
+    for _ in range(400):
+        v += H / 2 * pull
+        q += H * v
+        pull = -K / M * q * (1 + 1e-7 * rng.standard_normal())
+        v += H / 2 * pull
+        states.append((q, v))
+    positions, velocities = np.array(states).T
+    found = identify(H * np.arange(401), positions, v=velocities, mass=m)
+    assert not found.fits
+    assert "arithmetic explains" not in found.statement

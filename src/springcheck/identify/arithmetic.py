@@ -139,7 +139,9 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
             note = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
         elif record.fine:
             if visible and not schemes[i].flow:
-                precision, note, certain = _coarse(record, j, found, match, signed[i])
+                # forces may lie beyond the range of single precision
+                with np.errstate(over="ignore", invalid="ignore"):
+                    precision, note, certain = _coarse(record, j, found, match, signed[i])
         elif stored[i]:
             precision = _stored(record, found)
         elif coarse_file[i]:

@@ -55,6 +55,13 @@ class Forces:
     relative: float
 
 
+def over_single(x: float | np.longdouble) -> np.longdouble:
+    """A number over its value in single precision; 1 where that has no such number."""
+    with np.errstate(over="ignore", under="ignore"):
+        short = np.longdouble(np.float32(x))
+    return np.longdouble(x) / short if short and np.isfinite(short) else np.longdouble(1)
+
+
 def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str]:
     """Precision and note where what single frames miss, (f-1, 2), has the size and place of a force's error.
 
@@ -133,7 +140,7 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
     mass = 1.0 if record.mass is None else float(record.mass[j])
     for name, quantum, factor, note in (
         ("mixed", single, 1.0, "single-precision numbers"),
-        ("mixed", single, mass / float(np.float32(mass)), "single-precision numbers, and so is the mass"),
+        ("mixed", single, float(over_single(mass)), "single-precision numbers, and so is the mass"),
         ("fixed-point force", fixed, 1.0, "whole multiples of 2**-32, a 64-bit fixed-point sum"),
         (
             "fixed-point force",
@@ -144,8 +151,10 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
     ):
         # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
         off = forces.values / (quantum * factor)
-        clear = forces.noise < 0.05 * float(np.median(quantum))
-        if clear and float(np.mean(np.abs(off - np.rint(off)))) < 0.1:
+        whole = np.rint(off)
+        # forces far below a quantum are near 0 of them, and cannot be sums of quanta
+        clear = forces.noise < 0.05 * float(np.median(quantum)) and np.any(whole)
+        if clear and float(np.mean(np.abs(off - whole))) < 0.1:
             return name, f"states are double, and forces are {note}"
     if not forces.noise < 0.05 * float(np.median(single)):
         return None

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck.arrays import Floats
+from springcheck.identify.coarse import over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.match import Match
@@ -108,7 +109,7 @@ def reproduced(
         shift[i] = 1e-6 * match.a if i == 0 else 1e-6
         slopes.append((missed(start + shift, None) - missed(start - shift, None)) / (2 * shift[i]))
     columns = np.stack(slopes, axis=1) * scale[:, None]
-    single = mass / float(np.float32(mass))
+    single = float(over_single(mass))
     factors = [x * y for x in (1.0, 1.0 + excess) for y in dict.fromkeys((1.0, single))]
     ways = (False, True) if family.name == "velocity-verlet" else (False,)
     for leaps, cut, factor in product(ways, FORCES[precision], factors):

@@ -19,6 +19,7 @@ from springcheck.identify.candidates import (
     rows,
     stated_stiffness,
 )
+from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD, substeps
@@ -205,7 +206,7 @@ def _single_parameters(
 
 def _shortened(x: np.longdouble | float) -> float:
     """Log of a number in single precision over the number."""
-    return float(np.log(np.longdouble(np.float32(x)) / np.longdouble(x)))
+    return -float(np.log(over_single(x)))
 
 
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
