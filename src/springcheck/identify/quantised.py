@@ -17,6 +17,7 @@ from springcheck.arrays import Floats
 from springcheck.identify.coarse import over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
+from springcheck.identify.maps import KINDS
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.schemes import SCHEMES, number
@@ -148,16 +149,8 @@ def _step(
         c = float(number(part, np.longdouble))
         if kind == "drift":
             q = q + c * v
-        elif kind == "kick":
-            v = v + c * pull(q)
-        elif kind == "friction":
-            v = v * np.exp(-c * g)
-        elif kind == "explicit":
-            v = v + c * (pull(q) - g * v)
-        elif kind == "implicit":
-            v = (v + c * pull(q)) / (1 + c * g)
-        elif kind == "centred":
-            v = ((1 - c * g / 2) * v + c * pull(q)) / (1 + c * g / 2)
         else:
-            v = v + c * (pull(q) - g * (v - c * pull(q)) / (1 - c * g))
+            before, after, decay = KINDS[kind]
+            force = 0 if kind == "friction" else pull(q)
+            v = ((1 - before * c * g) * v + c * force) / (1 + after * c * g) * np.exp(-decay * c * g)
     return q, v
