@@ -119,10 +119,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     plain = (ulp <= np.minimum(path, 4 + 2 * np.sqrt(stride))) | ((ulp <= path) & visible)
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
-        quanta = np.stack(
-            [record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1
-        )
-        quanta = quanta / found.size.astype(np.float64)
+        quanta = record.quanta(j) / found.size.astype(np.float64)
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
         rebuilt = (size + difference) * path[:, None, None]
         # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding

@@ -36,15 +36,13 @@ class Evidence:
     @property
     def misses(self) -> Floats:
         """What the map leaves over in each pair (f - 1, 2), in units of the states' size."""
-        z = self.found.z
-        return (z[1:] - z[:-1] @ self.found.entries.T).astype(np.float64)
+        return self.found.misses()
 
     @property
     def unit(self) -> Floats:
         """Rounding of each state (f - 1,): a few units in the last place, and half a quantum of the file."""
         z = np.abs(self.found.z.astype(np.float64))
-        quanta = np.stack([self.record.q_quantum[:, self.j], self.record.v_quantum[:, self.j]], axis=1)
-        quanta = quanta * [1, abs(float(self.record.interval))] / self.found.size.astype(np.float64)
+        quanta = self.record.quanta(self.j) / self.found.size.astype(np.float64)
         size = (
             z[1:].max(axis=1)
             + z[:-1].max(axis=1)

@@ -58,12 +58,6 @@ PARTS = 3.0
 """Factor by which two maps in turn must bring the misses down in each half of the time."""
 
 
-def _missed(half: Map, whole: Map) -> Floats:
-    """What the map of half of the pairs leaves over in all (f - 1, 2), in the frame of the whole's."""
-    z = (whole.z * whole.size + whole.centre - half.centre) / half.size
-    return ((z[1:] - z[:-1] @ half.entries.T) * half.size / whole.size).astype(np.float64)
-
-
 def _alternation(e: Evidence) -> list[Explanation]:
     """Two kinds of step in turn."""
     if e.pairs < 24:
@@ -76,7 +70,7 @@ def _alternation(e: Evidence) -> list[Explanation]:
     if before < FALLS * left:
         return []
     # and in the beginning as at the end
-    own = np.where(odd[:, None], *(_missed(x, e.found) for x in (halves[1], halves[0])))
+    own = np.where(odd[:, None], *(x.misses(e.found) * x.size / e.found.size for x in (halves[1], halves[0])))
     both = np.abs(e.misses) * e.found.weight[:, None], np.abs(own) * e.found.weight[:, None]
     for part in np.array_split(np.arange(e.pairs), 2):
         joint, apart = (float(np.sqrt(np.mean(x[part] ** 2))) for x in both)

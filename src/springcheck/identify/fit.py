@@ -57,6 +57,13 @@ class Map:
         """The map on (q, v T), both lengths."""
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
 
+    def misses(self, other: Map | None = None) -> Floats:
+        """What the map leaves over in each pair of its states, or of those of another fit, (f - 1, 2)."""
+        z = self.z
+        if other is not None:
+            z = (other.z * other.size + other.centre - self.centre) / self.size
+        return np.asarray(z[1:] - z[:-1] @ self.entries.T, np.float64)
+
 
 def _least_squares(columns: Extended, right: Extended) -> Extended:
     """Solution x of columns x = right by normal equations in extended precision, refined twice.
@@ -102,8 +109,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     z = z / size
     chosen = np.ones(len(z) - 1, dtype=bool) if kept is None else kept
     pairs = int(np.count_nonzero(chosen))
-    quanta = np.stack([record.q_quantum[:, j], record.v_quantum[:, j] * abs(float(record.interval))], axis=1)
-    quanta = quanta / size.astype(np.float64)
+    quanta = record.quanta(j) / size.astype(np.float64)
     first = _preliminary(z, chosen)
     # at rest beside 0 the numbers' rounding is all that is left, and the same in every step
     away = np.sqrt(np.sum((z[:-1].astype(np.float64) - first) ** 2, axis=1))

@@ -21,8 +21,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
-        z = (e.found.z * e.found.size + e.found.centre - found.centre) / found.size
-        off = np.max(np.abs((z[1:] - z[:-1] @ found.entries.T).astype(np.float64)), axis=1) / e.unit
+        off = np.max(np.abs(found.misses(e.found)), axis=1) / e.unit
         limit = max(8 * float(np.median(off[kept])), 2.0)
         now = off <= limit
         if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
@@ -33,9 +32,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if not len(bad) or np.count_nonzero(kept) < 8:
         return []
     before = float(np.max(np.abs(e.misses)))
-    after = float(
-        np.sqrt(np.mean((found.z[1:] - found.z[:-1] @ found.entries.T).astype(np.float64)[kept] ** 2))
-    )
+    after = float(np.sqrt(np.mean(found.misses()[kept] ** 2)))
     if before < FALLS * after:
         return []
     fitting = matched(found, e.terms)

@@ -75,6 +75,10 @@ class Record:
         """Whether all numbers have the digits of double precision."""
         return self.q_storage.name == self.v_storage.name == "double"
 
+    def quanta(self, j: int) -> Floats:
+        """Distance of neighbouring numbers around each state (f, 2) of an oscillator, on (q, v interval)."""
+        return np.stack([self.q_quantum[:, j], self.v_quantum[:, j] * abs(float(self.interval))], axis=1)
+
     @property
     def text(self) -> bool:
         """Whether some numbers were written as decimal text of few digits."""
