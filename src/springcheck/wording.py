@@ -1,8 +1,9 @@
-"""Numbers in words: places, counts and times."""
+"""Numbers and names in words: places, counts, times, alternatives."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 
 def ordinal(n: int) -> str:
@@ -14,6 +15,11 @@ def ordinal(n: int) -> str:
 def count(n: int, noun: str) -> str:
     """So many of something: 1 cell, 2 cells."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def either(names: Sequence[str]) -> str:
+    """One of several: a, b or c."""
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def seconds(value: float | None) -> str:

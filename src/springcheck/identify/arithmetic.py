@@ -130,7 +130,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     for i, match in enumerate(matches):
         precision, note, certain = "", "", True
         if plain[i]:
-            precision, note = "double", _written(record, "")
+            precision, note = "double", _written(record)
         elif _is_rebuilt(match, missing[i], size[i], difference[i]):
             precision = "double"
             note = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
@@ -185,9 +185,9 @@ def _largest(missing: Floats, unit: Floats) -> Floats:
     return np.asarray(np.max(missing / np.maximum(unit, np.finfo(np.float64).tiny), axis=(1, 2)))
 
 
-def _written(record: Record, otherwise: str) -> str:
-    coarse = {s.name for s in (record.q_storage, record.v_storage)} - {"double"}
-    return f"the numbers happen to be exact as {' and '.join(sorted(coarse))}" if coarse else otherwise
+def _written(record: Record) -> str:
+    short = {s.name for s in (record.q_storage, record.v_storage)} - {"double"}
+    return f"the numbers happen to be exact as {' and '.join(sorted(short))}" if short else ""
 
 
 def _stored(record: Record, found: Map) -> str:

@@ -15,7 +15,15 @@ from springcheck.identify.families import FAMILIES
 from springcheck.identify.notes import LEAPFROG
 from springcheck.identify.record import Record
 from springcheck.identify.result import Candidate, Explanation
-from springcheck.identify.search import Joint, aliases, coincident, disagreements, frictionless, numbers
+from springcheck.identify.search import (
+    SINGLE_ROOM,
+    Joint,
+    aliases,
+    coincident,
+    disagreements,
+    frictionless,
+    numbers,
+)
 from springcheck.identify.wrong import stiffness_ratio
 from springcheck.schemes import SCHEMES
 
@@ -39,7 +47,7 @@ def stated_stiffness(
     """Whether the stated stiffness is that of the states, notes, and what may be wrong with it."""
     quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = disagreements(record, moving, plainest, stated)
-    if not against or not disagreements(record, moving, plainest, stated, quantum):
+    if not against or (quantum and not disagreements(record, moving, plainest, stated, quantum)):
         return True, [], []
     room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
     may_be = ""
@@ -71,10 +79,6 @@ def stated_stiffness(
             )
         ],
     )
-
-
-SINGLE_ROOM = 8 * 2.0**-24
-"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
 
 
 def nearest_stiffness(record: Record, moving: list[int], joints: list[Joint], stated: Floats) -> list[Joint]:

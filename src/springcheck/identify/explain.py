@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,19 +36,17 @@ def explain(
         stiffness=None if stated is None else float(stated[j]),
     )  # fmt: skip
     out: list[Explanation] = []
-    rough = float(np.median(np.max(np.abs(evidence.misses), axis=1) / evidence.unit))
-    loud = float(np.max(np.max(np.abs(evidence.misses), axis=1) / evidence.unit))
+    off = np.max(np.abs(evidence.misses), axis=1) / evidence.unit
+    rough, loud = float(np.median(off)), float(np.max(off))
     if evidence.found.drifts:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (few_bad_frames, _alternation, _solver, _neighbours(moving, maps), _shape):
+        for look in (few_bad_frames, _alternation, _solver, _neighbours(maps), _shape):
             out += look(evidence)
             if out:
                 break
     if not out and rough <= 64:
         out += wrong_map(evidence)
-    if not out:
-        out += wrong_map(evidence) if loud <= 4 else []
     return (*out, *([] if out else [misfit(evidence)]))
 
 
@@ -167,7 +166,7 @@ def _hats(x: Floats, count: int) -> Floats:
     return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
 
 
-def _neighbours(moving: list[int], maps: list[Map]):  # type: ignore[no-untyped-def]
+def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
     def look(e: Evidence) -> list[Explanation]:
         if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
             return []

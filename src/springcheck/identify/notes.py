@@ -11,6 +11,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.record import Record
 from springcheck.identify.search import Joint, coincident, numbers, search, separation
 from springcheck.identify.starts import Terms
+from springcheck.wording import either
 
 APART = 10.0
 """Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
@@ -74,8 +75,7 @@ def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_st
         told.append("the mass")
     elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
         told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
-    listed = " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
-    return [why, *([f"what would tell them apart: {listed}"] if told else [])]
+    return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:

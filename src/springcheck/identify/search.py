@@ -24,6 +24,9 @@ last place and a deviation of 0.29; the rest of the factor is for roundings that
 SINGLE = 2.0**-24
 """Unit roundoff of single precision."""
 
+SINGLE_ROOM = 8 * SINGLE
+"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
+
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
 
@@ -315,7 +318,7 @@ def disagreements(
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
         error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
-        error += 0.0 if record.fine else 8 * SINGLE
+        error += 0.0 if record.fine else SINGLE_ROOM
         # a step or a mass in single precision moves the stiffness that is worked out with the stated one
         error += 0.0 if record.momenta else 3 * abs(part.log_mass)
         pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))

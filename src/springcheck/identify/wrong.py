@@ -15,6 +15,7 @@ from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.search import Joint, distinct, same_map, search
 from springcheck.identify.starts import Terms
+from springcheck.wording import either
 
 
 @cache
@@ -103,8 +104,7 @@ def _scales(e: Evidence) -> list[Explanation]:
         x, (cause, remedy) = meant[0]
         # schemes that differ by less than the numbers show would each mean the same
         names = list(dict.fromkeys(title(y.scheme) for y, _ in meant))
-        whose = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
-        return [_found(f"{whose}, but {cause}", remedy, x)]
+        return [_found(f"{either(names)}, but {cause}", remedy, x)]
     if not fitting:
         return []
     x = fitting[0]
