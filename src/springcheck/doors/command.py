@@ -21,7 +21,7 @@ import numpy as np
 from springcheck import formats, schemes
 from springcheck.arrays import Floats
 from springcheck.doors.function import UNKNOWN
-from springcheck.engines import EVERY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation
+from springcheck.engines import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.scene import Scene
 
@@ -53,7 +53,7 @@ def engine(
                 name=name,
                 scheme=known[name],
                 about=f"{shlex.join(words)}; its time is the whole command's",
-                terms=EVERY_POTENTIAL | {"damping"},
+                terms=EVERY_FORCE,
             )
             for name, words in commands.items()
         },

@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck import engines, schemes
 from springcheck.arrays import Floats
-from springcheck.engines import EVERY_POTENTIAL, Engine, Label, Method, Simulation, Stopped
+from springcheck.engines import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper, load_stepper
 from springcheck.physics.scene import Scene
@@ -65,7 +65,7 @@ def engine(specs: Sequence[str], stated: Callable[[str], str] = lambda name: "")
         scheme = stated(name)
         known = schemes.scheme(scheme).name if scheme else _identified(function)
         about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
-        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_POTENTIAL | {"damping"})
+        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE)
     return Engine(
         name="stepper",
         title=f"the function {specs[0]}" if len(specs) == 1 else "functions",

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
+    EVERY_FORCE,
     EVERY_POTENTIAL,
     Arithmetic,
     Engine,
@@ -42,8 +43,8 @@ from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics.scene import Scene
 
 __all__ = [
-    "ANY_POTENTIAL", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method", "Need",
-    "Simulation", "Stopped", "absence", "bring", "engine", "from_file", "guarded",
+    "ANY_POTENTIAL", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method",
+    "Need", "Simulation", "Stopped", "absence", "bring", "engine", "from_file", "guarded",
     "installed_version", "internal_steps", "load", "match", "method", "module_name", "module_of",
     "named", "names", "origin", "parse", "refusal", "start", "unusable",
 ]  # fmt: skip

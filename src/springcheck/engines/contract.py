@@ -32,6 +32,11 @@ ANY_POTENTIAL = "any potential"
 EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse"})
 """The terms of a method that takes the force as a function: the potentials that are known, and all others."""
 
+EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
+"""The same where the force may also depend on the velocity."""
+
+SPRINGS = frozenset({"wall-spring", "spring"})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
@@ -47,7 +52,7 @@ class Method:
     default: bool = True
     """Whether `*` names it, which is what a scene runs by unless it says otherwise.  Methods that are not
     default are run by name, or by a glob that spells part of it."""
-    terms: frozenset[str] = frozenset({"wall-spring", "spring"})
+    terms: frozenset[str] = SPRINGS
     """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})
     """Kinds of scenes that it moves: particles, circuit, rotor."""

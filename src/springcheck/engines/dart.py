@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
@@ -92,7 +92,7 @@ ENGINE = Engine(
             name="force",
             scheme="semi-implicit-euler",
             about="Skeleton.setForces before each step",
-            terms=EVERY_POTENTIAL | {"damping"},
+            terms=EVERY_FORCE,
             default=False,
         ),
         Method(

@@ -20,6 +20,7 @@ from springcheck.arrays import Floats
 from springcheck.engines import bonds
 from springcheck.engines.contract import (
     EVERY_POTENTIAL,
+    SPRINGS,
     Engine,
     Label,
     Method,
@@ -32,8 +33,6 @@ from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
-
-SPRINGS = frozenset({"wall-spring", "spring"})
 
 INNER = 8
 """Steps of the fast springs in one of r-RESPA, as its scheme has them."""

@@ -16,7 +16,8 @@ import numpy as np
 
 from springcheck.arrays import Floats
 from springcheck.engines.contract import (
-    EVERY_POTENTIAL,
+    EVERY_FORCE,
+    SPRINGS,
     Arithmetic,
     Engine,
     Label,
@@ -29,9 +30,7 @@ from springcheck.engines.contract import (
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, WallSpring
 
-SPRINGS = frozenset({"wall-spring", "spring"})
 DAMPED = SPRINGS | {"damping"}
-FORCES = EVERY_POTENTIAL | {"damping"}
 
 IMPLICIT_FRICTION = "semi-implicit-euler-implicit-friction"
 
@@ -213,9 +212,11 @@ ENGINE = Engine(
             DAMPED,
             Need.DAMPING,
         ),
-        _method("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", FORCES),
-        _method("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", FORCES),
-        _method("motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", FORCES),
+        _method("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
+        _method("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),
+        _method(
+            "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE
+        ),
     ),
     start=start,
     version=version,

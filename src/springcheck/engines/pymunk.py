@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import EVERY_POTENTIAL, Arithmetic, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation, named
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
@@ -104,7 +104,7 @@ ENGINE = Engine(
             name="force",
             scheme="explicit-euler",
             about="Body.force, set before each step",
-            terms=EVERY_POTENTIAL | {"damping"},
+            terms=EVERY_FORCE,
             default=False,
         ),
         Method(

@@ -105,8 +105,10 @@ SCHEMES = (
 )
 
 
-def _method(name: str, scheme: str, about: str) -> Method:
-    return Method(name=name, scheme=scheme, about=about, terms=EVERY_POTENTIAL, default=False)
+def _method(name: str, scheme: str, about: str, *, adaptive: bool = False) -> Method:
+    return Method(
+        name=name, scheme=scheme, about=about, adaptive=adaptive, terms=EVERY_POTENTIAL, default=False
+    )
 
 
 ENGINE = Engine(
@@ -117,13 +119,8 @@ ENGINE = Engine(
     methods=named(
         _method("leapfrog", "position-verlet", "additional_forces, integrator leapfrog"),
         _method("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0"),
-        Method(
-            name="ias15",
-            scheme="rebound-ias15",
-            about="additional_forces, integrator IAS15, Aarseth's step",
-            adaptive=True,
-            default=False,
-            terms=EVERY_POTENTIAL,
+        _method(
+            "ias15", "rebound-ias15", "additional_forces, integrator IAS15, Aarseth's step", adaptive=True
         ),
     ),
     schemes=SCHEMES,

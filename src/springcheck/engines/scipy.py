@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.arrays import Floats
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, Stopped, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped, named
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 
@@ -115,7 +115,7 @@ ENGINE = Engine(
                 about=f"scipy.integrate.{solver}, as solve_ivp steps it",
                 adaptive=True,
                 default=False,
-                terms=EVERY_POTENTIAL | {"damping"},
+                terms=EVERY_FORCE,
                 kinds=frozenset({"particles", "circuit", "rotor"}),
             )
             for name, solver in SOLVERS.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, deferred, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Method, deferred, named
 
 ENGINE = Engine(
     name="ase",
@@ -13,7 +13,7 @@ ENGINE = Engine(
             name="velocity-verlet",
             scheme="velocity-verlet",
             about="ase.md.verlet.VelocityVerlet",
-            terms=frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse"}),
+            terms=EVERY_POTENTIAL,
         )
     ),
     step_seconds=3e-4,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import Engine, Method, Need, deferred, named
+from springcheck.engines.contract import ANY_POTENTIAL, EVERY_POTENTIAL, Engine, Method, Need, deferred, named
 
-_TERMS = frozenset({"wall-spring", "spring", "quartic", "cosine", "morse"})
+_TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL}
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")

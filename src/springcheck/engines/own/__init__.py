@@ -6,11 +6,8 @@ are there for whoever names them, in a scene's `include` or by `--method`.
 
 from __future__ import annotations
 
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Need, deferred, named
+from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Method, Need, deferred, named
 from springcheck.schemes import SCHEMES, Scheme
-
-_LINEAR = frozenset({"wall-spring", "spring", "damping"})
-_TERMS = _LINEAR | {"quartic", "cosine", "morse", ANY_POTENTIAL}
 
 NAMES = {"explicit-euler": "euler"}
 """Methods named otherwise than their scheme."""
@@ -34,7 +31,7 @@ def _method(scheme: Scheme) -> Method:
         name=NAMES.get(scheme.name, scheme.name),
         scheme=scheme.name,
         about=ABOUT.get(scheme.name, scheme.title),
-        terms=_LINEAR if scheme.implicit else _TERMS,
+        terms=SPRINGS | {"damping"} if scheme.implicit else EVERY_FORCE,
         kinds=frozenset({"particles", "circuit", "rotor"}),
         requires=_requires(scheme),
         default=scheme.name in ABOUT,

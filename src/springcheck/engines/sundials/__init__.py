@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, deferred, named
+from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Method, deferred, named
 
 
 def _method(name: str, about: str) -> Method:
@@ -13,7 +13,7 @@ def _method(name: str, about: str) -> Method:
         scheme=name,
         about=about,
         adaptive=True,
-        terms=frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse", "damping"}),
+        terms=EVERY_FORCE,
         kinds=frozenset({"particles", "circuit", "rotor"}),
     )
 
@@ -37,7 +37,7 @@ ENGINE = Engine(
             scheme="ida",
             about="IDA: Kirchhoff's laws as they stand, unsolved for the currents",
             adaptive=True,
-            terms=frozenset({"wall-spring", "spring", "damping"}),
+            terms=SPRINGS | {"damping"},
             kinds=frozenset({"circuit"}),
         ),
     ),
