@@ -44,3 +44,8 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
             "its length alone"
         )
     return rest
+
+
+def lengths(term: Spring, origins: Floats) -> Floats:
+    """Rest lengths of bonds between coordinates that are counted from these origins [L]."""
+    return np.asarray(np.abs(term.rest - (origins[term.b] - origins[term.a])))

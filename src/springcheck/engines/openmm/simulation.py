@@ -161,10 +161,8 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                     x.append(at)
                 group.addBond(anchors[at], i, 0.0, k)
         elif isinstance(term, Spring):
-            lengths = np.abs(term.rest - (origins[term.b] - origins[term.a]))
-            for a, b, k, length in zip(
-                term.a.tolist(), term.b.tolist(), term.k.tolist(), lengths.tolist(), strict=True
-            ):
+            rest = bonds.lengths(term, origins).tolist()
+            for a, b, k, length in zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), rest, strict=True):
                 group.addBond(a, b, length, k)
     for group in (slow, fast):
         if group.getNumBonds():
