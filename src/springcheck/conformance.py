@@ -123,9 +123,8 @@ def _served(label: Label) -> list[Scene]:
 
 
 def _serves(label: Label, scene: Scene) -> bool:
-    rates = scene.system.friction_rates
-    one_rate = bool(np.ptp(rates) <= 2.0**-52 * np.max(rates))
-    return engines.refusal(scene, label) is None and (one_rate or not engines.method(label).one_friction)
+    right_friction = scene.system.has_one_friction_rate or not engines.method(label).one_friction
+    return engines.refusal(scene, label) is None and right_friction
 
 
 def _damped(scene: Scene) -> Scene:

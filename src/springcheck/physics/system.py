@@ -80,16 +80,19 @@ class System:
     def has_modes(self) -> bool:
         """Whether the motion falls apart into modes: linear, uncoupled by friction, and they can be had.
 
-        Friction does not couple modes where no term joins two particles, or where every particle is slowed
-        down at the same rate (to a rounding of c/m).
+        Friction does not couple modes where no term joins two particles, or where it has one rate.
         """
         if not self.is_linear:
             return False
         if self.is_separate:
             return True
+        return self.has_one_friction_rate and (self.n <= MOST_JOINED or self.is_uniform_chain)
+
+    @property
+    def has_one_friction_rate(self) -> bool:
+        """Whether every particle is slowed down at the same rate, to a rounding of c/m."""
         rate = self.friction_rates
-        alike = bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
-        return alike and (self.n <= MOST_JOINED or self.is_uniform_chain)
+        return bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
 
     @cached_property
     def acting(self) -> dict[str, NDArray[np.bool_]]:
