@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from springcheck import cli, inspect, store
+from springcheck import cli, store
+from springcheck.cli import inspect
 
 MEASURE = """
 from dataclasses import dataclass, replace

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import output, store
-from springcheck.cli import main
+from springcheck import store
+from springcheck.cli import main, output
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
 from springcheck.text import table

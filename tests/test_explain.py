@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from springcheck import checks, engines, explain, schemes
-from springcheck.cli import main
+from springcheck import checks, engines, schemes
+from springcheck.cli import explain, main
 from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
 from springcheck.physics import scenefile

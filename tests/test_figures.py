@@ -40,7 +40,7 @@ def test_every_scheme_has_a_look_of_its_own() -> None:
 
 def test_every_colour_is_seen_on_white_and_on_black() -> None:
     assert {look.color for look in (*looks.LOOKS.values(), *looks._REST)} <= set(looks.ON_SCREEN)
-    css = (Path(looks.__file__).parents[1] / "page" / "page.css").read_text()
+    css = (Path(looks.__file__).parents[1] / "cli" / "page" / "page.css").read_text()
     white, black = re.findall(r"--paper: (#[0-9a-f]+)", css)[:2]
     assert (white, black) == ("#fff", "#161616")
     for pair in looks.ON_SCREEN.values():

@@ -15,24 +15,28 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "slips", "workers", "arrays", "wording", "stats", "physics", "schemes", "engines",
+    "interrupts", "errors", "workers", "arrays", "wording", "stats", "physics", "schemes", "engines",
     "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
-    "doors", "figures", "studies", "explain", "inspect", "plot", "page", "listing", "api", "output",
-    "commands", "cli", "__main__",
+    "doors", "figures", "plot", "studies", "api", "cli", "__main__",
 ]  # fmt: skip
 
 STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py"))
 
 HOMES = {
     "h5py": ("store",),
-    "matplotlib": ("plot.py", "figures", *(f"studies/{name}/figure.py" for name in STUDIES)),
+    "matplotlib": (
+        "plot.py",
+        "cli/drawing.py",
+        "figures",
+        *(f"studies/{name}/figure.py" for name in STUDIES),
+    ),
     "openmm": ("engines/openmm/simulation.py",),
     "ase": ("engines/ase/simulation.py", "formats/molecular.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),
-    "jinja2": ("page/writing.py",),
-    "markupsafe": ("page/writing.py",),
-    "rich": ("text.py", "studies/run/text.py", "output.py"),
+    "jinja2": ("cli/page/writing.py",),
+    "markupsafe": ("cli/page/writing.py",),
+    "rich": ("text.py", "studies/run/text.py", "cli/output.py"),
     "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
 }
 
@@ -111,7 +115,9 @@ def test_the_keeper_alone_of_the_studies_knows_the_store(path: Path) -> None:
     assert not uses or own in ("studies/keeper.py", "studies/tables.py", "studies/study.py"), uses
 
 
-@pytest.mark.parametrize("place", ["cli.py", "commands.py", "inspect.py", "plot.py"])
+@pytest.mark.parametrize(
+    "place", ["cli/__init__.py", "cli/commands.py", "cli/inspect.py", "cli/drawing.py", "plot.py"]
+)
 def test_no_study_is_named_outside_of_the_list(place: str) -> None:
     named = {name for name in _imports(HOME / place) if name.startswith("springcheck.studies.")}
     for study in STUDIES:

@@ -19,8 +19,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import springcheck
-from springcheck import engines, output, store
-from springcheck.cli import main
+from springcheck import engines, store
+from springcheck.cli import main, output
 from springcheck.errors import StoreError
 from springcheck.figures import overlay
 from springcheck.figures.motion import true_motion

@@ -21,7 +21,8 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, cli, engines, interrupts, listing, simulate, store, workers
+from springcheck import checks, cli, engines, interrupts, simulate, store, workers
+from springcheck.cli import listing
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -221,7 +222,8 @@ def test_an_interrupt_waits_where_files_must_not_be_left_half_done() -> None:
 
 CAUGHT = """
 import os, signal, sys, time
-from springcheck import __main__, listing
+from springcheck import __main__
+from springcheck.cli import listing
 def deaf():
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     os.kill(os.getpid(), signal.SIGINT)

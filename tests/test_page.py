@@ -15,12 +15,12 @@ import pytest
 
 import browser
 from browser import Browser
-from springcheck import page, schemes, store
-from springcheck.cli import main
+from springcheck import schemes, store
+from springcheck.cli import main, page
+from springcheck.cli.page.content import drawn
+from springcheck.cli.page.sections import Piece, Section, Sheet
 from springcheck.errors import StoreError
 from springcheck.figures import looks
-from springcheck.page.content import drawn
-from springcheck.page.sections import Piece, Section, Sheet
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import STUDIES, charts, keeper

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import checks, engines, listing, simulate
+from springcheck import checks, engines, simulate
 from springcheck.arrays import Floats
-from springcheck.cli import main
+from springcheck.cli import listing, main
 from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import output, store
-from springcheck.cli import main
+from springcheck import store
+from springcheck.cli import main, output
 from springcheck.physics import scenefile
 from springcheck.studies.census import result as census_result
 from springcheck.studies.census import text as census_text

@@ -663,7 +663,7 @@ def every_command(path: Path, label: str = LABEL, *, drawn: bool = True) -> list
 
 def warm() -> None:
     """Import what the commands import, so that a forked one need not."""
-    from springcheck import inspect  # noqa: F401
+    from springcheck.cli import inspect  # noqa: F401
     from springcheck.identify import files  # noqa: F401
     from springcheck.studies.extremes import figure  # noqa: F401
     from springcheck.studies.precision import figure as f1  # noqa: F401

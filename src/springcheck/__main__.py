@@ -11,7 +11,8 @@ def main() -> int:
     """The command line as a program of its own, which can be interrupted from its first line on."""
     interrupts.install()
     try:
-        from springcheck import cli, slips
+        from springcheck import cli
+        from springcheck.cli import slips
 
         slips.open_streams()
         if not sys.warnoptions:

@@ -1,90 +1,14 @@
-"""`springcheck plot`: everything in a store that can be drawn; and trajectories on axes of one's own."""
+"""Trajectories on axes of one's own."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from springcheck import inspect, store
-from springcheck.errors import SpringcheckError, plain
-from springcheck.figures import folder
+from springcheck.errors import SpringcheckError
 from springcheck.trajectory import Trajectory
-
-MOST_COORDINATES = 8
-"""Coordinates of a file of other programs that are drawn."""
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-def draw(path: Path, into: Path, *, particle: int | None = None) -> tuple[list[Path], list[str]]:
-    """Draw the studies of a store into a folder -> the files, and notes on what they leave out.
-
-    `particle`: the motion of this one alone.  Figures of this store are replaced, and nothing else.
-    SpringcheckError where there is nothing to draw.
-    """
-    if into.exists() and not into.is_dir():
-        raise SpringcheckError(f"{into} is a file: figures need a folder, name another one with -o")
-    summary = store.summary(path)
-    studies = list(inspect.held(summary))
-    if not studies:
-        rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
-        raise SpringcheckError(f"{path}: holds no trajectory and no study to draw{rest}")
-    if particle is not None:
-        studies = [(study, found) for study, found in studies if study.trajectories]
-        if not studies:
-            raise SpringcheckError(f"{path}: --particle goes with trajectories, and it holds none")
-    chosen = {} if particle is None else {"particle": particle}
-    notes: list[str] = []
-    with tempfile.TemporaryDirectory() as name:
-        written: list[Path] = []
-        for study, found in studies:
-            written += study.draw(found, Path(name), **chosen)
-            notes += getattr(found, "notes", ())
-        if not written:
-            raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
-        return folder.put(written, into, path), notes
-
-
-def draw_foreign(
-    path: Path,
-    into: Path,
-    *,
-    particle: int | None = None,
-    columns: Sequence[str] = (),
-    step: float | None = None,
-    trajectory: str | None = None,
-) -> tuple[list[Path], list[str]]:
-    """Draw the states in a file of any program, as `draw`; `particle` counts coordinates from 0 on."""
-    from matplotlib.figure import Figure
-
-    from springcheck.doors.file import states_in
-    from springcheck.figures.style import save, style
-
-    found = states_in(path, columns, step, trajectory)
-    other, name = (found.p, "p") if found.p is not None else (np.asarray(found.v), "v")
-    n = found.q.shape[1]
-    if particle is not None and not 0 <= particle < n:
-        raise SpringcheckError(f"{path}: --particle {particle}: it has coordinates 0 to {n - 1}")
-    moving = np.flatnonzero(np.ptp(found.q, axis=0) > 0)
-    chosen = moving[:MOST_COORDINATES] if particle is None else np.array([particle])
-    left = len(moving) - len(chosen)
-    notes = [f"{left} more coordinates move, which --particle draws"] if particle is None and left else []
-    with style(), tempfile.TemporaryDirectory() as made:
-        figure = Figure(figsize=(9.2, 4.2), layout="constrained")
-        portrait, motion = figure.subplots(1, 2)
-        for i in chosen.tolist() or [0]:
-            portrait.plot(found.q[:, i], other[:, i], label=f"coordinate {i}")
-            motion.plot(found.t, found.q[:, i])
-        _finished(portrait, "q", name)
-        motion.set_xlabel("t")
-        motion.set_ylabel("q")
-        figure.suptitle(plain(f"{path.name}: {len(found.t)} frames"))
-        return folder.put(save(figure, Path(made), "states"), into, path), notes
 
 
 def phase(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import output
+from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
 from springcheck.studies.study import JSON, QUIET, Argument, engine_option
 
@@ -39,7 +39,7 @@ class Command:
 
 
 def _inspect(options: Namespace) -> int:
-    from springcheck import inspect
+    from springcheck.cli import inspect
 
     rows = 20 if options.rows is None else options.rows
     if rows < 1:
@@ -55,7 +55,8 @@ def _inspect(options: Namespace) -> int:
 
 
 def _plot(options: Namespace) -> int:
-    from springcheck import formats, plot, store
+    from springcheck import formats, store
+    from springcheck.cli import drawing
     from springcheck.figures import folder
 
     path = Path(options.file)
@@ -63,10 +64,10 @@ def _plot(options: Namespace) -> int:
     doubts: list[dict[str, str]] = []
     if path.is_file() and (options.columns or not formats.is_hdf5(path) or store.is_foreign(path)):
         which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
-        written, notes = plot.draw_foreign(path, into, particle=options.particle, **which)
+        written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     else:
         doubts = output.doubts(options.file)
-        written, notes = plot.draw(path, into, particle=options.particle)
+        written, notes = drawing.draw(path, into, particle=options.particle)
     output.warn(options.file, doubts)
     if not options.quiet:
         for line in (*notes, *written):
@@ -75,7 +76,7 @@ def _plot(options: Namespace) -> int:
 
 
 def _report(options: Namespace) -> int:
-    from springcheck import page
+    from springcheck.cli import page
 
     path = Path(options.file)
     into = Path(options.output or f"{path.stem}.html")
@@ -104,7 +105,7 @@ def _show(options: Namespace) -> int:
 
 
 def _explain(options: Namespace) -> int:
-    from springcheck import explain
+    from springcheck.cli import explain
 
     for line in explain.lines(options.word):
         print(line)
@@ -186,7 +187,7 @@ def _export(options: Namespace) -> int:
 
 
 def _list(options: Namespace) -> int:
-    from springcheck import listing
+    from springcheck.cli import listing
 
     found = listing.listing()
     if options.json:

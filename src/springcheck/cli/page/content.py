@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import checks, compare, explain, schemes, store
+from springcheck import checks, compare, schemes, store
+from springcheck.cli import explain
+from springcheck.cli.page.sections import Section, sections
 from springcheck.compare import EXACT, Same
 from springcheck.errors import SpringcheckError
-from springcheck.page.sections import Section, sections
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring

@@ -16,8 +16,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from springcheck import interrupts, output, slips
-from springcheck.commands import COMMANDS
+from springcheck import interrupts
+from springcheck.cli import output, slips
+from springcheck.cli.commands import COMMANDS
 from springcheck.errors import SpringcheckError, StoreError, StoreWarning
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from springcheck import inspect
+from springcheck.cli import inspect
 from springcheck.store import Summary
 from springcheck.studies import charts
 from springcheck.text import Table

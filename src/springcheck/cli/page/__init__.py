@@ -5,7 +5,7 @@ that reads back as the stored doubles, and where a scene is one particle on one 
 loops of three methods again in the reader's browser and compares (`loops.js`).
 """
 
-from springcheck.page.content import Content, gather
-from springcheck.page.writing import html, write
+from springcheck.cli.page.content import Content, gather
+from springcheck.cli.page.writing import html, write
 
 __all__ = ["Content", "gather", "html", "write"]

@@ -12,9 +12,9 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
-from springcheck.page.content import Content
 from springcheck.store import files
 from springcheck.trajectory import Verdict
 from springcheck.wording import ordinal
