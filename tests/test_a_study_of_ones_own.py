@@ -50,7 +50,7 @@ def stored(path):
     return keeper.restored(path, "squares", build)
 """
 TEXT = """
-from springcheck.text import table
+from springcheck.text.lines import table
 def lines(found, options=None):
     return [table(("number", "square"), [(str(x.number), str(x.square)) for x in found.rows])]
 """

@@ -11,9 +11,8 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes
-from springcheck.arrays import WIDE
-from springcheck.engines.contract import Arithmetic
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import WIDE, Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.studies.faults import clean, steppers

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from springcheck import checks, schemes, simulate
-from springcheck.arrays import WIDE
 from springcheck.checks import experiments, laws
 from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.stats import student
 from springcheck.studies.faults import clean, steppers

@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import checks, compare, schemes
-from springcheck.arrays import WIDE, Floats
-from springcheck.checks import experiments, laws, verdicts
-from springcheck.engines.contract import Arithmetic
+from springcheck import checks, schemes
+from springcheck.checks import compare, experiments, laws, verdicts
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import WIDE, Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
 from springcheck.studies.faults import clean, steppers

@@ -19,7 +19,7 @@ from springcheck import store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
-from springcheck.text import table
+from springcheck.text.lines import table
 
 OWN = ["--method", "own:*"]
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 import springcheck
-from springcheck import compare
+from springcheck.checks import compare
 from springcheck.physics.scene import Scene
 
 LABELS = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:leapfrog", "openmm:verlet")

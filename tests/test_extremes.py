@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from springcheck import engines, store
-from springcheck.arrays import WIDE
+from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import figure as figures
 from springcheck.studies.extremes import grid, judging, refusals, running
 from springcheck.studies.extremes import measure as extremes

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from springcheck.arrays import Floats, Force
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify, identify_stepper, load_stepper
 from springcheck.identify.search import aliases
+from springcheck.physics.arrays import Floats, Force
 from springcheck.schemes import SCHEMES, matrix, step
 
 STEPPING = [s.name for s in SCHEMES.values() if s.one_step and not s.mixes]

@@ -10,8 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck.arrays import Floats
 from springcheck.cli import main
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, step
 
 M, K, H = 3.7, 2.9, 0.31

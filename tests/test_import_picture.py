@@ -15,8 +15,8 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 ROWS = [
-    "interrupts", "errors", "workers", "arrays", "wording", "stats", "physics", "schemes", "engines",
-    "trajectory", "store", "formats", "text", "simulate", "checks", "conformance", "compare", "identify",
+    "interrupts", "errors", "physics", "stats", "schemes", "trajectory", "engines",
+    "store", "formats", "text", "simulate", "checks", "conformance", "identify",
     "doors", "figures", "plot", "studies", "api", "cli", "__main__",
 ]  # fmt: skip
 
@@ -36,7 +36,7 @@ HOMES = {
     "numba": ("engines/own",),
     "jinja2": ("cli/page/writing.py",),
     "markupsafe": ("cli/page/writing.py",),
-    "rich": ("text.py", "studies/run/text.py", "cli/output.py"),
+    "rich": ("text/lines.py", "studies/run/text.py", "cli/output.py"),
     "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
 }
 

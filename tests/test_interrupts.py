@@ -21,11 +21,12 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, cli, engines, interrupts, simulate, store, workers
+from springcheck import checks, cli, engines, interrupts, simulate, store
 from springcheck.cli import listing
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.studies import workers
 from springcheck.studies.run import measure as session
 
 ROOT = Path(__file__).parents[1]

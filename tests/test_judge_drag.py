@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from springcheck import checks, schemes, simulate
-from springcheck.arrays import WIDE, Floats
 from springcheck.checks.drag import drag
+from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Term
 from springcheck.studies.faults import clean, steppers

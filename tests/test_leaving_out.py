@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from springcheck import simulate
-from springcheck.arrays import Reals
 from springcheck.engines.own import forces, kernels, layout
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Reals
 from springcheck.physics.terms import Damping, Spring
 from springcheck.studies.run import measure as session
 

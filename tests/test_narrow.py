@@ -12,7 +12,7 @@ import narrow
 from dataclasses import replace
 import springcheck
 from springcheck import checks
-from springcheck.arrays import ROUNDOFF, WIDE
+from springcheck.physics.arrays import ROUNDOFF, WIDE
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.extremes import measure

@@ -21,10 +21,10 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes, simulate
-from springcheck.arrays import Floats
 from springcheck.engines import Need, parse
 from springcheck.engines.own import ENGINE, compiled, forces, kernels, simulation, solver, tiles, updates
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import (
     Column,

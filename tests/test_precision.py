@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from springcheck import engines, simulate, store
-from springcheck.arrays import WIDE
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
 from springcheck.studies.precision import accuracy, figure, fits, sweeps

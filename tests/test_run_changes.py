@@ -13,7 +13,7 @@ from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.studies import keeper
 from springcheck.studies.stability.result import fastest
-from springcheck.wording import count, ordinal
+from springcheck.text.wording import count, ordinal
 
 Captured = pytest.CaptureFixture[str]
 EULER = ["--method", "own:euler"]

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, simulate
-from springcheck.arrays import Floats
 from springcheck.cli import listing, main
 from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Floats
 from springcheck.physics.exact import normal
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from springcheck import engines, schemes
-from springcheck.arrays import Extended
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Extended
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance, result
 from springcheck.studies.stability import figure as figures
 from springcheck.studies.stability import measure as stability

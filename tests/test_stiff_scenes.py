@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes, simulate
-from springcheck.arrays import Extended
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Extended
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
 

@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from springcheck import store
-from springcheck.engines.contract import Arithmetic
 from springcheck.errors import StoreError
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.store import draft, reading
 from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict

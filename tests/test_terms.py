@@ -13,11 +13,11 @@ import pytest
 
 import springcheck
 from springcheck import checks, simulate, store
-from springcheck.arrays import Floats, Integers
 from springcheck.cli import main
 from springcheck.errors import SceneError
 from springcheck.physics import scenefile as scenes
 from springcheck.physics import termcheck, terms
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Column, OnPairs, OnParticles, Term, known, register
 from springcheck.studies.faults import seeded
 

@@ -23,7 +23,7 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
-from springcheck.text import GAP, Lines, Table, table
+from springcheck.text.lines import GAP, Lines, Table, table
 
 WIDTHS = (60, 80, 100, 200)
 

@@ -23,7 +23,7 @@ import numpy as np
 from arguments import arguments
 from judge_campaign import FIXED, random_scene
 from springcheck import checks, schemes
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping

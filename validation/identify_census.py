@@ -34,11 +34,11 @@ from typing import Any
 import numpy as np
 
 from arguments import arguments
-from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import DAMPED, UNDAMPED, Family
 from springcheck.identify.search import aliases, frictionless
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 
 BLOCK = 100

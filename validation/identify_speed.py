@@ -22,9 +22,9 @@ import numpy as np
 
 from arguments import arguments
 from identify_census import Draw, written
-from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import identify
+from springcheck.physics.arrays import Floats
 
 ROUNDS = 2
 

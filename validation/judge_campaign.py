@@ -33,7 +33,7 @@ import numpy as np
 
 from arguments import arguments
 from springcheck import checks, schemes
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring

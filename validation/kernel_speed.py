@@ -44,8 +44,8 @@ from typing import Any
 import numpy as np
 
 from arguments import arguments
-from springcheck.arrays import Floats
 from springcheck.engines.own import simulation, solver, tiles
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, Term, WallSpring
 

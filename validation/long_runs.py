@@ -39,8 +39,8 @@ import numpy as np
 
 from arguments import arguments
 from springcheck import engines, simulate, store
-from springcheck.arrays import Floats
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 PIECE = 1 << 16

@@ -21,9 +21,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from arguments import arguments
-from springcheck.arrays import Floats
 from springcheck.checks import laws
 from springcheck.figures import looks, style
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.simulate import run

@@ -28,9 +28,9 @@ from sksundae.cvode import CVODE
 
 from arguments import arguments
 from springcheck import engines, load_scene
-from springcheck.arrays import Floats
 from springcheck.engines.ase.simulation import Springs
 from springcheck.engines.sundials.simulation import MOST_STEPS, absolute_tolerance
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 FRAMES = 2000

@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from arguments import arguments
-from springcheck import compare, load_scene
-from springcheck.checks import judge
+from springcheck import load_scene
+from springcheck.checks import compare, judge
 from springcheck.simulate import run
 from springcheck.studies.run import figure as trajectories
 

@@ -48,8 +48,8 @@ from time import perf_counter
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import Floats
 from springcheck.engines.own import simulation
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from springcheck import plot
-    from springcheck.api import exact, judge, read, run
+    from springcheck.api import compare, exact, judge, read, run
     from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
@@ -38,6 +38,7 @@ _HOMES = {
     "Trajectory": "trajectory",
     "Verdict": "trajectory",
     "chain": "physics.builders",
+    "compare": "api",
     "exact": "api",
     "judge": "api",
     "load_scene": "physics.scenefile",
@@ -45,7 +46,7 @@ _HOMES = {
     "run": "api",
     "spring": "physics.builders",
 }
-_MODULES = {"compare", "identify", "simulate"}
+_MODULES = {"identify", "simulate"}
 """Modules that are called as the public function of their name, which stands in `api`."""
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import checks
-from springcheck import compare as comparing
 from springcheck import simulate as driver
+from springcheck.checks import compare as comparing
 from springcheck.errors import SpringcheckError
 from springcheck.physics import exact as solutions
 from springcheck.physics import scenefile

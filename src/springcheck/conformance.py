@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, engines, simulate
-from springcheck.arrays import Floats
 from springcheck.engines import Engine, Label
 from springcheck.errors import MethodError, SpringcheckError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring

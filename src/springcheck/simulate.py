@@ -14,9 +14,9 @@ from typing import Literal, Protocol
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic, Label, Simulation, Stopped
+from springcheck.engines.contract import Label, Simulation, Stopped
 from springcheck.errors import MethodError, SceneError
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

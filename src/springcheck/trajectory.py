@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Literal
 
-from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic
 from springcheck.errors import SpringcheckError
+from springcheck.physics.arrays import Arithmetic, Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,17 +25,17 @@ import numpy as np
 from springcheck.checks import check, experiments, laws
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
-from springcheck.checks.motion import closed_form, frequency, growth_bound, momentum, shadow_energy
+from springcheck.checks.motion import closed_form, frequency, momentum, shadow_energy
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import CONTRACTED, arithmetic, fastest, first_off, step_defect
+from springcheck.checks.steps import CONTRACTED, arithmetic, first_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Limits, Trajectory, Verdict
 
 __all__ = [
     "ALL", "CHECKS", "CONTRACTED", "TELLING", "THOROUGH", "Bench", "Case", "Check", "Experiment", "Run",
-    "arithmetic", "closed_form", "energies", "fastest", "first_off", "frequency", "growth_bound", "judge",
+    "arithmetic", "closed_form", "energies", "first_off", "frequency", "judge",
     "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "start", "step_defect", "tolerance",
     "tolerance_bound", "worst",
 ]  # fmt: skip

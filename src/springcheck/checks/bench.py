@@ -10,10 +10,10 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Floats
 from springcheck.checks import verdicts
 from springcheck.checks.case import Case
 from springcheck.physics import exact
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 

@@ -10,11 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.checks import rounding, verdicts
 from springcheck.checks.stretch import JOINED, Stretch, follow
-from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
+from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended
 from springcheck.checks.case import Case
+from springcheck.physics.arrays import Extended
 
 BLOCKS = 16
 """Parts of a run whose sums tell the standard error: noise may be alike in steps that follow each other."""

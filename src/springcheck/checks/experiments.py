@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Floats, Integers, Reals
 from springcheck.checks import sight
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import fastest
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Verdict
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Extended, Floats
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.experiments import symmetric
 from springcheck.physics import exact
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic

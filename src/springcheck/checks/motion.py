@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import STILL, closed_or_not
+from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.trajectory import Verdict
 
 

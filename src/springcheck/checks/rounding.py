@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import ROUNDOFF, Extended, Force, Integers, Reals
+from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme

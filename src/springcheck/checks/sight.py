@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import ROUNDOFF, Extended, Integers, Reals
 from springcheck.checks.case import Case, advance
-from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
+from springcheck.physics.arrays import ROUNDOFF, Arithmetic, Extended, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.trajectory import NOT_KNOWN, Limits

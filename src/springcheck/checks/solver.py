@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
 from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import fastest
 from springcheck.physics import exact
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.trajectory import Verdict
 
 

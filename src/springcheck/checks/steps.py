@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.arrays import Floats, Integers, Reals
 from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import check
 from springcheck.checks.drag import drag
 from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch
-from springcheck.engines.contract import Arithmetic
+from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.system import MOST_JOINED
 from springcheck.trajectory import Limits, Verdict
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck.arrays import Extended, Force, Reals
 from springcheck.checks import rounding
+from springcheck.physics.arrays import Extended, Force, Reals
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 

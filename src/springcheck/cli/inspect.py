@@ -12,9 +12,9 @@ from springcheck import store
 from springcheck.studies import STUDIES
 from springcheck.studies.keeper import plain as plainly
 from springcheck.studies.study import Result, Study
-from springcheck.text import Lines, Table, plain, table
+from springcheck.text.lines import Lines, Table, plain, table
+from springcheck.text.wording import ordinal
 from springcheck.trajectory import Trajectory
-from springcheck.wording import ordinal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from springcheck import formats, schemes
-from springcheck.arrays import Floats
 from springcheck.doors.function import UNKNOWN
 from springcheck.engines import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 SECONDS = 600.0

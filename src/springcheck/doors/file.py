@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, schemes, store
-from springcheck.arrays import Floats
 from springcheck.engines import Arithmetic
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.formats import States, is_hdf5, read, read_hdf5
 from springcheck.identify.files import identify_states, of_arrays
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.text import Lines, plain, table
+from springcheck.text.lines import Lines, plain, table
 from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
 
 

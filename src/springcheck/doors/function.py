@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, schemes
-from springcheck.arrays import Floats
 from springcheck.engines import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper, load_stepper
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 

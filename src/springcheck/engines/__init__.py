@@ -18,7 +18,6 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     EVERY_FORCE,
     EVERY_POTENTIAL,
-    Arithmetic,
     Engine,
     Label,
     Method,
@@ -40,6 +39,7 @@ from springcheck.engines.registry import (
     unusable,
 )  # fmt: skip
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 __all__ = [

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.schemes import scheme

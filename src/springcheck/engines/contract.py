@@ -1,4 +1,4 @@
-"""The engine contract: what an engine declares, how its arithmetic rounds, and what a simulation does."""
+"""The engine contract: what an engine declares, and what a simulation does."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from importlib import import_module
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 
@@ -61,29 +61,6 @@ class Method:
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
     one_friction: bool = False
     """One friction rate serves all particles of a run."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Arithmetic:
-    """How a platform rounds.  The defaults are IEEE double precision throughout."""
-
-    name: str = "double"
-    state: float = 2.0**-53
-    """Unit roundoff of stored positions and momenta."""
-    force: float = 2.0**-53
-    """Unit roundoff of the force."""
-    quantum: float = 0.0
-    """Fixed-point unit of force [M L/T2]: each term's force on a particle is cut off to a multiple of it."""
-    overflow: float = float("inf")
-    """Largest force that the fixed-point sum holds."""
-    parameters: Literal["double", "single"] = "double"
-    """Width in which force constants and rest lengths are kept."""
-    excess: float = 0.0
-    """Every force is too large by this fraction."""
-    stale: float = 0.0
-    """Forces are kept while no position has moved by more than this since they were computed [L]."""
-    keeps_displacement: bool = False
-    """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
 

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines import bonds
 from springcheck.engines.contract import (
     EVERY_POTENTIAL,
@@ -30,6 +29,7 @@ from springcheck.engines.contract import (
     named,
 )
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring

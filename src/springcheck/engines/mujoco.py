@@ -14,11 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.contract import (
     EVERY_FORCE,
     SPRINGS,
-    Arithmetic,
     Engine,
     Label,
     Method,
@@ -27,6 +25,7 @@ from springcheck.engines.contract import (
     Stopped,
     named,
 )
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, WallSpring
 

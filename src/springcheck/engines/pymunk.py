@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.arrays import Floats
-from springcheck.engines.contract import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 

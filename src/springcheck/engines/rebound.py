@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 

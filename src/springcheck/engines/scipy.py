@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped, named
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springcheck.arrays import Floats, Reals
 from springcheck.figures import overlay
 from springcheck.figures.motion import Exact, true_motion
 from springcheck.figures.overlay import TRUTH, Frame, Group, every
 from springcheck.figures.views import with_unit
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
 from springcheck.physics import exact
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory
 

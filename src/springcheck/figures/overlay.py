@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from springcheck.arrays import Floats
 from springcheck.figures import looks
 from springcheck.figures.views import units
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory
 

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from springcheck.arrays import Floats
 from springcheck.figures import looks, overlay
 from springcheck.figures.motion import Motion, periods, smooth
 from springcheck.figures.overlay import TRUTH, Frame, Group, every
 from springcheck.figures.views import State, View, with_unit
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Trajectory
 

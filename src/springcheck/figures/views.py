@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from springcheck.arrays import Floats, Reals
 from springcheck.errors import SpringcheckError
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine
 

@@ -10,8 +10,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import StoreError
+from springcheck.physics.arrays import Floats
 
 Columns: TypeAlias = Mapping[str, Floats]
 """Columns (f,) or (f, n) by name."""

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import StoreError
 from springcheck.formats.columns import ALONE, States
 from springcheck.formats.tables import roundoff
+from springcheck.physics.arrays import Floats
 
 MOST_FRAMES = 1 << 20
 

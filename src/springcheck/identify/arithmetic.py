@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
 from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES
@@ -14,6 +13,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.maps import table
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
+from springcheck.physics.arrays import Extended, Floats
 
 __all__ = ["QUANTUM", "Defect", "defects", "misses"]
 

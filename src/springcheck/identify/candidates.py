@@ -8,7 +8,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.identify import arithmetic
 from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES
@@ -25,6 +24,7 @@ from springcheck.identify.search import (
     numbers,
 )
 from springcheck.identify.wrong import stiffness_ratio
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 
 T = TypeVar("T")

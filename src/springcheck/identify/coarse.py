@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from springcheck.arrays import Extended, Floats, Reals
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import power, unit
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.schemes import SCHEMES, magnitude_step
 
 QUANTUM = 2.0**-32

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
 from springcheck.identify.record import Record
+from springcheck.physics.arrays import Extended, Floats
 
 SPARE = 6
 """Pairs of states beyond the unknowns of a row that a map of all coordinates needs."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.identify.search import search
 from springcheck.identify.starts import Terms
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 
 FALLS = 12.0

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.identify.coarse import irregular
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched, title
 from springcheck.identify.fit import Map, fit
@@ -17,6 +16,7 @@ from springcheck.identify.result import Explanation
 from springcheck.identify.search import FEW, distinct, search
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import misfit, wrong_map
+from springcheck.physics.arrays import Floats
 
 FEWEST_MISSES = 24.0
 """Pairs that count in what is left over from which its pattern shows."""

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from springcheck import formats, schemes, store
-from springcheck.arrays import Floats, Integers
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.trajectory import Trajectory
 
 MOST_FRAMES = 20_000

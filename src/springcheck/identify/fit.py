@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended, Floats
 from springcheck.identify.orbit import orbit, repeats
 from springcheck.identify.record import Record
+from springcheck.physics.arrays import Extended, Floats
 
 ROUNDING = 2.0**-53
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended, Floats
 from springcheck.identify.evidence import FALLS, Evidence, matched, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.result import Explanation
+from springcheck.physics.arrays import Extended, Floats
 
 FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""

@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats, Integers, Reals
 from springcheck.identify.families import EULER, FAMILIES, POSITION, VERLET, Family, Stage
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.schemes import number, rotation
 
 KINDS: dict[str, tuple[float, float, float]] = {

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtri
 
-from springcheck.arrays import Extended, Floats, Reals
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
 from springcheck.identify.starts import Guesses, Terms, joined, least_squares, real_starts, starts
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.schemes import rotation
 
 CHANCE = 1e-7

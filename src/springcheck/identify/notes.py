@@ -11,7 +11,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.record import Record
 from springcheck.identify.search import Joint, coincident, numbers, search, separation
 from springcheck.identify.starts import Terms
-from springcheck.wording import either
+from springcheck.text.wording import either
 
 APART = 10.0
 """Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance

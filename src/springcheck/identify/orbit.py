@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats
+from springcheck.physics.arrays import Extended, Floats
 
 CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two is called: exp(-14) bounds the chance of a mistake."""

@@ -13,13 +13,13 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.identify.coarse import over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import KINDS
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 
 EXPLAINED = 0.3

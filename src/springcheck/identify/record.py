@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springcheck.arrays import Extended, Floats
 from springcheck.errors import IdentificationError
+from springcheck.physics.arrays import Extended, Floats
 
 ROUNDING = 2.0**-53
 

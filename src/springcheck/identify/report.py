@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
@@ -43,6 +42,7 @@ from springcheck.identify.search import (
 )
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import faults_of
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 
 VELOCITY_OFFSET = {

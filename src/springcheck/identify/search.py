@@ -8,13 +8,13 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.arrays import Floats, Reals
 from springcheck.identify.families import DAMPED, FAMILIES, HELD, UNDAMPED, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.match import Match, match
 from springcheck.identify.record import Record
 from springcheck.identify.starts import Terms, solved
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.schemes import SCHEMES
 
 BIAS = 3.0

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from springcheck.arrays import Floats, Integers
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table, unit
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.schemes import rotation
 
 NEAR = 3e-4

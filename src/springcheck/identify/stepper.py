@@ -12,11 +12,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify.evidence import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 
 Stepper: TypeAlias = Callable[..., Any]

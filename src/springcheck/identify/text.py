@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from springcheck.identify.result import Identification
-from springcheck.text import Lines, hanging, plain
+from springcheck.text.lines import Lines, hanging, plain
 
 IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",

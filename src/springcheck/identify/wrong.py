@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.identify.evidence import Evidence, distance, title
 from springcheck.identify.families import FAMILIES, FAULTS, HELD, Family
 from springcheck.identify.fit import ROUNDING, Map
@@ -15,7 +14,8 @@ from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.search import Joint, distinct, same_map, search
 from springcheck.identify.starts import Terms
-from springcheck.wording import either
+from springcheck.physics.arrays import Floats
+from springcheck.text.wording import either
 
 
 @cache

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springcheck.arrays import Floats
 from springcheck.errors import SceneError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from springcheck.arrays import Floats, Integers
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.term import Term, in_pieces
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps

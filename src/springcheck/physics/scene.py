@@ -12,8 +12,8 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import SceneError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.system import System
 from springcheck.physics.term import Term, check_sign, frozen, refrozen
 from springcheck.physics.terms import in_order

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.errors import SceneError
 from springcheck.physics import graph
+from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy

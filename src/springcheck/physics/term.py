@@ -16,8 +16,8 @@ from typing import Any, ClassVar, Literal, Self, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Floats, Integers, Reals
 from springcheck.errors import SceneError
+from springcheck.physics.arrays import Floats, Integers, Reals
 
 Where: TypeAlias = "slice | Integers"
 

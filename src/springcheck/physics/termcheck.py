@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Reals
+from springcheck.physics.arrays import Reals
 from springcheck.physics.term import Term
 
 STEP = 2.0**-7

@@ -12,8 +12,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from springcheck.arrays import Floats, Integers, Reals
 from springcheck.physics import termcheck
+from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.term import Column, OnPairs, OnParticles, Term
 
 __all__ = [

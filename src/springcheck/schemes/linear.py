@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Extended, Floats, Integers, Reals
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.stepping import step

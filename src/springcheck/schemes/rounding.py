@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Force, Reals
+from springcheck.physics.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.stepping import acting, sparse_solver, weighted_sum
 

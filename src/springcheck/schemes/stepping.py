@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Floats, Force, Reals
+from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
 
 Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]

@@ -18,7 +18,7 @@ from types import TracebackType
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.store import digests, files, layout, seal
 from springcheck.store.access import Scalar

@@ -11,8 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import StoreError
+from springcheck.physics.arrays import Floats
 from springcheck.store import access, files, layout, trust
 
 MOST_NUMBERS = 1 << 24

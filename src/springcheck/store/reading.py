@@ -15,8 +15,8 @@ import h5py
 import msgspec
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import StoreError, nearest
+from springcheck.physics.arrays import Floats
 from springcheck.store import access, digests, files, layout, records, seal, tables, trust
 from springcheck.store.access import Scalar
 from springcheck.store.records import Record

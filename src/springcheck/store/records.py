@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 import msgspec
 import numpy as np
 
-from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic
 from springcheck.errors import StoreError
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Kind, Units
 from springcheck.store.access import Scalar
 from springcheck.trajectory import Outcome, Timing, Trajectory

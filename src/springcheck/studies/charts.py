@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from springcheck.store import Summary
     from springcheck.studies.charts import Bank
-    from springcheck.text import Lines
+    from springcheck.text.lines import Lines
 
 
 class Progress(Protocol):

@@ -41,7 +41,7 @@ class Processes:
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
         """Numbers and results of the parts, as they finish."""
-        from springcheck.workers import carried_out
+        from springcheck.studies.workers import carried_out
 
         numbered = [partial(_numbered, i, part) for i, part in enumerate(parts)]
         if self.workers > 1 and self.brought is not None:

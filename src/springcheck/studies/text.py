@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from springcheck.studies.choose import LeftOut
-from springcheck.text import Lines, plain
-from springcheck.wording import count
+from springcheck.text.lines import Lines, plain
+from springcheck.text.wording import count
 
 
 def left_out(left: Sequence[LeftOut]) -> Lines:

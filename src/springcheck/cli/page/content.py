@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import checks, compare, schemes, store
+from springcheck import checks, schemes, store
+from springcheck.checks import compare
+from springcheck.checks.compare import EXACT, Same
 from springcheck.cli import explain
 from springcheck.cli.page.sections import Section, sections
-from springcheck.compare import EXACT, Same
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene

@@ -9,7 +9,7 @@ from typing import Any
 from springcheck.cli import inspect
 from springcheck.store import Summary
 from springcheck.studies import charts
-from springcheck.text import Table
+from springcheck.text.lines import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

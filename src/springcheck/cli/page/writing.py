@@ -16,8 +16,8 @@ from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
 from springcheck.store import files
+from springcheck.text.wording import ordinal
 from springcheck.trajectory import Verdict
-from springcheck.wording import ordinal
 
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'

@@ -17,8 +17,8 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
-from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic, Label, Method, Simulation
+from springcheck.engines.contract import Label, Method, Simulation
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 import openmm as mm
 
-from springcheck.arrays import Floats, Force
 from springcheck.engines import bonds, quiet
-from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
+from springcheck.engines.contract import Label, Method, Simulation, Stopped
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Arithmetic, Floats, Force
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
 

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Floats, Integers
 from springcheck.engines.own.forces import Slot
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, known
 
 KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping")

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.own.kernels import (
     DRIFT,
     EULER,
@@ -26,6 +25,7 @@ from springcheck.engines.own.kernels import (
     MIDPOINT,
 )
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes import Scheme, number

@@ -20,10 +20,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Floats
-from springcheck.engines.contract import Arithmetic, Label, Method
+from springcheck.engines.contract import Label, Method
 from springcheck.engines.own import kernels, layout, solver, tiles, vectors
 from springcheck.engines.own.operations import Program, program, terms_of
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme

@@ -6,9 +6,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Floats, Integers
 from springcheck.engines.own.layout import NO_INDEX, NOTHING
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 

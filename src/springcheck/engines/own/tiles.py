@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.engines.own import layout
+from springcheck.physics.arrays import Floats
 
 WIDTH = 4096
 """Particles of a tile: 6 rows of 32 KiB stay in the second-level cache."""

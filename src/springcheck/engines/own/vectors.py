@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.arrays import Floats, Force
 from springcheck.engines.own.kernels import DRIFT, EULER, FRICTION, KICK, KICK_DRIFT
 from springcheck.engines.own.operations import Program, terms_of
+from springcheck.physics.arrays import Floats, Force
 from springcheck.physics.scene import Scene
 
 

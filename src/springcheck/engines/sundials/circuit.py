@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from sksundae.ida import IDA
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import sksundae
 from sksundae.cvode import CVODE
 
-from springcheck.arrays import Floats
 from springcheck.engines import quiet
-from springcheck.engines.contract import Arithmetic, Label, Method, Simulation, Stopped
+from springcheck.engines.contract import Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 
-from springcheck.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 
 LARGE = 32

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.exact.normal import Modes
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
 from springcheck.physics.exact.well import CANCELS, LAST, States, Well, one_each, wide
 from springcheck.physics.terms import Morse

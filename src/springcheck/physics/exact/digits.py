@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 
 Wide: TypeAlias = NDArray[np.object_]
 """An array of Decimal numbers."""

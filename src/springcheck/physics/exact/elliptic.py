@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.arrays import ROUNDOFF, Extended
+from springcheck.physics.arrays import ROUNDOFF, Extended
 
 EPS = 2 * ROUNDOFF
 """Spacing of the numbers above 1 in extended precision: 1.1e-19 on x86-64."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.exact.normal import Modes
 

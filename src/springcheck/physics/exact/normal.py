@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springcheck.arrays import Extended, Integers, Reals
+from springcheck.physics.arrays import Extended, Integers, Reals
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
 from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.terms import Damping, Spring

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, States, Well, latency, wide

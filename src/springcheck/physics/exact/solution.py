@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springcheck.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact import linear, wells
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from springcheck.arrays import Extended
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.elliptic import EPS
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import SceneError
 from springcheck.physics import builders
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Kind, Scene, Units
 from springcheck.physics.scenefile import tables
 from springcheck.physics.terms import Column, Damping, Spring, Term, WallSpring

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.builders import standing
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term

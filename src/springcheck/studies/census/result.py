@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import schemes
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.tables import Record

@@ -8,8 +8,8 @@ import numpy as np
 
 from springcheck.studies.census.result import Census, Entry, title
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, Row, plain, table
-from springcheck.wording import seconds
+from springcheck.text.lines import Lines, Row, plain, table
+from springcheck.text.wording import seconds
 
 TITLES = (
     "method", "amplitude", "det - 1", "velocity", "friction", "arithmetic", "forces", "time", "same bits as"

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import Floats, Reals
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics import exact, scenefile
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies import team as teams

@@ -6,8 +6,8 @@ from argparse import Namespace
 
 from springcheck.studies.ensemble.result import Ensemble, Tally
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, plain, table
-from springcheck.wording import count
+from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import count
 
 
 def lines(found: Ensemble, options: Namespace | None = None) -> Lines:

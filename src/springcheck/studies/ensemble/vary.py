@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.arrays import Floats
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 CHUNK = 10_000

@@ -10,8 +10,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from springcheck.arrays import Floats
 from springcheck.figures.style import save, style
+from springcheck.physics.arrays import Floats
 from springcheck.studies.extremes.planes import planes
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
 

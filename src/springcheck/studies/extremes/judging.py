@@ -15,9 +15,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from springcheck import checks, engines, schemes, trajectory
-from springcheck.arrays import Extended, Floats
 from springcheck.checks.case import keeps, least_moved, overflows
-from springcheck.engines.contract import Arithmetic, Label
+from springcheck.engines.contract import Label
+from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.tables import column

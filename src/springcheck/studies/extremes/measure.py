@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import WIDE
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError
+from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut

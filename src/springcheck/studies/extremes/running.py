@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import Floats
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes import grid, judging
 from springcheck.studies.extremes.grid import Spec

@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from springcheck.studies.extremes.result import Atlas
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, plain, table
+from springcheck.text.lines import Lines, plain, table
 
 SHORT = {
     "right": "right",

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.arrays import Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, Term, WallSpring
 

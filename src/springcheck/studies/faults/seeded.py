@@ -12,9 +12,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Floats, Reals
-from springcheck.engines.contract import Arithmetic
 from springcheck.physics import exact
+from springcheck.physics.arrays import Arithmetic, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.trajectory import Outcome, Trajectory

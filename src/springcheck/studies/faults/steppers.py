@@ -11,8 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import Floats, Force, Reals
-from springcheck.engines.contract import Arithmetic
+from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.schemes.stepping import Slope
 from springcheck.trajectory import Outcome, Timing, Trajectory

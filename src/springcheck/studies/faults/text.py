@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.faults.result import FaultReport
-from springcheck.text import Lines, Row, plain, table
+from springcheck.text.lines import Lines, Row, plain, table
 
 
 def lines(found: FaultReport, options: Namespace | None = None) -> Lines:

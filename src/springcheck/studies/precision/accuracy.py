@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from springcheck import schemes
-from springcheck.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.checks.steps import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.physics import exact
+from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring

@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 from springcheck import schemes
-from springcheck.engines.contract import Arithmetic, Method
+from springcheck.engines.contract import Method
+from springcheck.physics.arrays import Arithmetic
 from springcheck.stats import line
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import Point

@@ -8,7 +8,7 @@ from springcheck.figures.looks import scheme_of
 from springcheck.studies.charts import Bank, Chart, Curve, Scale
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
-from springcheck.wording import seconds
+from springcheck.text.wording import seconds
 
 MOST_SHOWN = 30.0
 """Errors above this are out of the picture at first: nothing is read off them."""

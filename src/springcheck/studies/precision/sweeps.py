@@ -10,8 +10,9 @@ from time import perf_counter
 import numpy as np
 
 from springcheck import engines, schemes, simulate
-from springcheck.engines.contract import Arithmetic, Label, Method, Stopped
+from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import FRAMES, Truth

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, Row, Table, plain, table
-from springcheck.wording import duration, seconds
+from springcheck.text.lines import Lines, Row, Table, plain, table
+from springcheck.text.wording import duration, seconds
 
 
 def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:

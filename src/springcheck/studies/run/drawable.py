@@ -9,8 +9,8 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
+from springcheck.text.wording import ordinal
 from springcheck.trajectory import Trajectory
-from springcheck.wording import ordinal
 
 MOST_FRAMES = 4001
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""

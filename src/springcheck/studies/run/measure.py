@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck import checks, compare, engines, simulate
-from springcheck.arrays import Floats
+from springcheck import checks, engines, simulate
+from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
 from springcheck.physics import exact, scenefile
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose

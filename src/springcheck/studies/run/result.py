@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from springcheck import checks
-from springcheck.compare import Same
+from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import plain

@@ -16,9 +16,9 @@ from springcheck.studies.ensemble import text as ensemble
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
-from springcheck.text import Lines, Row, Table, plain, table
+from springcheck.text.lines import Lines, Row, Table, plain, table
+from springcheck.text.wording import seconds
 from springcheck.trajectory import Comparison, Limits, Verdict
-from springcheck.wording import seconds
 
 
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:

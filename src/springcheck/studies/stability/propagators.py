@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck import engines, schemes, simulate
-from springcheck.arrays import Extended, Floats
-from springcheck.engines.contract import Arithmetic, Label, Need
+from springcheck.engines.contract import Label, Need
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from springcheck import engines
-from springcheck.arrays import Floats
 from springcheck.engines.contract import Label
+from springcheck.physics.arrays import Floats
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
 from springcheck.studies.tables import column

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, schemes, simulate
-from springcheck.arrays import Extended, Floats, Reals
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
 from springcheck.physics import exact
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies.tables import column
 

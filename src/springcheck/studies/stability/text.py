@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, taken_up
-from springcheck.text import Lines, plain, table
+from springcheck.text.lines import Lines, plain, table
 
 
 def lines(study: Stability, options: Namespace | None = None) -> Lines:

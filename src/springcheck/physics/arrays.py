@@ -1,4 +1,4 @@
-"""The array types that travel through springcheck, and the glossary of its letters.
+"""The array types that travel through springcheck, how numbers are rounded, and the glossary of its letters.
 
 Glossary, used in every module:
 
@@ -18,7 +18,8 @@ numbers for "reduced".
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +39,26 @@ WIDE = ROUNDOFF < 2.0**-53
 Integers: TypeAlias = NDArray[np.int64]
 Force: TypeAlias = Callable[[Reals, Reals], Reals]
 """(q, p), each (..., n) -> force on every particle (..., n) [M L/T2]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arithmetic:
+    """How a platform rounds.  The defaults are IEEE double precision throughout."""
+
+    name: str = "double"
+    state: float = 2.0**-53
+    """Unit roundoff of stored positions and momenta."""
+    force: float = 2.0**-53
+    """Unit roundoff of the force."""
+    quantum: float = 0.0
+    """Fixed-point unit of force [M L/T2]: each term's force on a particle is cut off to a multiple of it."""
+    overflow: float = float("inf")
+    """Largest force that the fixed-point sum holds."""
+    parameters: Literal["double", "single"] = "double"
+    """Width in which force constants and rest lengths are kept."""
+    excess: float = 0.0
+    """Every force is too large by this fraction."""
+    stale: float = 0.0
+    """Forces are kept while no position has moved by more than this since they were computed [L]."""
+    keeps_displacement: bool = False
+    """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""

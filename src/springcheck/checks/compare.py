@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import checks
-from springcheck.arrays import Extended, Floats
+from springcheck.checks.case import Case
+from springcheck.checks.motion import growth_bound
+from springcheck.checks.solver import tolerance_bound
+from springcheck.checks.steps import fastest
 from springcheck.physics import exact
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Comparison, Trajectory
 
@@ -32,7 +35,7 @@ def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
     longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)
     if longest is not None and exact.has_true_motion(scene):
-        steps = checks.Case(trajectory=longest, scene=scene).steps
+        steps = Case(trajectory=longest, scene=scene).steps
         states[EXACT] = exact.true_motion(scene, steps, longest.step)
     frames = len(longest.t) if longest is not None else 0
     states.update((label, (piece.q, piece.p)) for label, piece in pieces.items())
@@ -54,21 +57,19 @@ def merge(comparisons: Sequence[Comparison]) -> Comparison:
 
 def allowed(scene: Scene, trajectory: Trajectory) -> float:
     """How far rounding, or the tolerance, may take a trajectory from the motion that it stands for."""
-    case = checks.Case(trajectory=trajectory, scene=scene)
+    case = Case(trajectory=trajectory, scene=scene)
     if not case.scheme.one_step:
-        return checks.tolerance_bound(case)
+        return tolerance_bound(case)
     if len(trajectory.t) < 2:
         return 0.0
     if case.linear:
-        bound, unit = checks.growth_bound(case)
+        bound, unit = growth_bound(case)
         # before the first step there is nothing to round
         with np.errstate(over="ignore", invalid="ignore"):
             return float(np.max((bound * unit)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
     steps = float(case.steps[-1])
-    return (
-        case.roundings * case.rounding * steps * (1 + steps * checks.fastest(case) * abs(trajectory.step) / 2)
-    )
+    return case.roundings * case.rounding * steps * (1 + steps * fastest(case) * abs(trajectory.step) / 2)
 
 
 def _telling(scene: Scene, trajectory: Trajectory) -> float:

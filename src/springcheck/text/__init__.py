@@ -1,0 +1,1 @@
+"""Words, lines and tables: what reports, messages and pages are written with."""
