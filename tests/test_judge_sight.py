@@ -19,7 +19,8 @@ from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic
+from springcheck.physics.terms import Quartic, Spring
+from springcheck.store import tables
 from springcheck.studies.faults import clean
 from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 
@@ -47,7 +48,12 @@ SCENES: dict[str, Scene] = {
     "chain": replace(scenefile.load_scene("chain"), steps=20),
     "well": WELL,
     "well, every 6 steps": replace(WELL, every=6),
-}
+    "free chain": clean.scene(
+        np.array([1.3, 0.7, 2.1]),
+        (Spring(a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])),),
+        np.array([0.2, 1.0, 1.9]), np.array([0.4, -0.3, 0.5]), step=0.05, steps=20,
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "velocity-verlet", "rk4", "implicit-euler"])
@@ -55,7 +61,17 @@ SCENES: dict[str, Scene] = {
 def test_three_limits_fail_and_a_tenth_of_one_passes(where: str, name: str) -> None:
     tried, wrong = detection.wrong(SCENES[where], schemes.SCHEMES[name])
     assert wrong == []
-    assert tried >= 2
+    assert tried >= (3 if where == "free chain" else 2)
+
+
+@pytest.mark.parametrize("experiment", detection.EXPERIMENTS, ids=lambda experiment: experiment.name)
+def test_the_limits_of_experiments_hold_likewise(experiment: checks.Experiment) -> None:
+    cases = [("h w = 0.3", "semi-implicit-euler")]
+    if experiment.family == "map":
+        cases += [("h w = 1.9", "implicit-midpoint"), ("free chain", "forest-ruth")]
+    for where, name in cases:
+        found = detection.wrong_experiment(experiment, SCENES[where], schemes.SCHEMES[name])
+        assert found == (1, [])
 
 
 def test_limits_are_as_small_as_rounding_allows() -> None:
@@ -90,6 +106,9 @@ def test_of_the_pieces_of_a_run_the_one_that_sees_most_counts() -> None:
     assert Limits.least([]) == NOT_KNOWN
     assert str(found.sees) == "would see a stiffness off by 1.0e-14, a step off by 2.0e-09"
     assert str(NOT_KNOWN) == ""
+    assert "an area in phase space off by 3.0e-15 a step" in verdict(area=3e-15).reason
+    exact = replace(verdict(), bound=0.0)
+    assert exact.reason == "would see any other value"
 
 
 def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -105,7 +124,17 @@ def test_limits_are_stored_and_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     shown = json.loads(capsys.readouterr().out)
     sees = {v["check"]: v["sees"] for v in shown["verdicts"]}
     assert sees["step-defect"]["stiffness"] < 1e-13
-    assert sees["start"] == {"stiffness": None, "step": None, "friction": None}
+    assert set(sees["start"].values()) == {None}
+
+
+def test_a_store_of_before_has_fewer_limits() -> None:
+    table = tables.of_verdicts([verdict(stiffness=3e-13, area=2e-15)])
+    columns = {
+        name: np.array(x, object if isinstance(x, list) else None) for name, x in table.columns.items()
+    }
+    assert tables.to_verdicts(replace(table, columns=columns))[0].sees.area == 2e-15
+    del columns["sees_area"]
+    assert tables.to_verdicts(replace(table, columns=columns))[0].sees == Limits(stiffness=3e-13)
 
 
 def test_the_matrix_says_it_of_its_single_steps() -> None:

@@ -1,12 +1,13 @@
-"""What the judge would see by h w: the smallest relative error of stiffness, step and friction that fails.
+"""What the judge would see by h w: the smallest relative errors of stiffness, step and the like that fail.
 
     python validation/detection.py [STEPS SCENES]
 
 One particle on a spring, every step recorded, an engine in extended precision whose states are rounded once
 a step.  Each limit is the least of those that the verdicts of the right run say (`Verdict.sees`), and each is
 put to the test: an engine that is off by three limits must fail, one that is off by a tenth must pass; so
-are the limits of as many random scenes of every term, scheme and distance of frames as are asked for.  It
-prints a table of the limits; exit status 1 where one of them is wrong.
+are the limits of as many random scenes of every term, scheme and distance of frames as are asked for, and
+those of the experiments: areas in phase space that grow at each step, and orders.  It prints a table of the
+limits; exit status 1 where one of them is wrong.
 
 Measured with 400 steps and 250 random scenes: 815 and 945 limits, none wrong.
 """
@@ -14,21 +15,23 @@ Measured with 400 steps and 250 random scenes: 815 and 945 limits, none wrong.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from arguments import arguments
 from judge_campaign import FIXED, random_scene
 from springcheck import checks, schemes
+from springcheck.checks import experiments, laws
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Limits, Trajectory
+from springcheck.trajectory import Limits, Trajectory, Verdict
 
 TURNS = (0.001, 0.01, 0.1, 0.5, 1.0, 1.5, 1.9)
 METHODS = (
@@ -40,14 +43,22 @@ FACTORS = ((3.0, False), (0.1, True))
 
 
 def planted(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
-    """A run in extended precision, rounded once a step, whose stiffness, step or friction is off by x."""
+    """A run in extended precision, rounded once a step, in which one quantity of `Limits` is off by x."""
     system, off = scene.system, np.longdouble(x)
     h = np.longdouble(scene.step) * (1 + off * (name == "step"))
     more = {True: 1 + off * (name == "stiffness"), False: 1 + off * (name == "friction")}
 
+    on_each = np.ones(scene.n, dtype=np.longdouble)
+    if name == "reaction":
+        right = planted(scene, scheme)
+        # what momentum may be off by grows with the steps and the states: that of which most shows
+        _, of_p = checks.Case(trajectory=right, scene=scene).allowance_at(right.q, right.p)
+        most = np.maximum.accumulate(np.sum(of_p, axis=1)) * np.arange(len(right.t))
+        on_each[np.argmax(np.max(np.abs(right.p - scene.p)[1:] / most[1:, None], axis=0))] += off
+
     def force_of(terms: Iterable[Term]) -> Any:
         parts = [(system.force_of([term]), more[term.is_potential]) for term in terms]
-        return lambda q, p: sum((force(q, p) * factor for force, factor in parts), np.zeros_like(q))
+        return lambda q, p: sum((force(q, p) * factor for force, factor in parts), np.zeros_like(q)) * on_each
 
     def stiffness(q: Any) -> tuple[Any, bool]:
         # it only steers the iteration
@@ -61,28 +72,88 @@ def planted(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0
             force=force_of(scene.terms), stiffness=stiffness if scheme.implicit else None, rate=rate,
             parts=(force_of(system.slow), force_of(system.fast)),
         )  # fmt: skip
-        return np.asarray(a, np.float64), np.asarray(b, np.float64)
+        return np.asarray(a, np.float64), np.asarray(b * (1 + off * (name == "area")), np.float64)
 
     return steppers.record(scene, scheme, step)
+
+
+def growing(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
+    """The textbook engine in doubles, in which a kick of a whole step also multiplies momenta by 1 + x."""
+    system, rate = scene.system, x / scene.step
+    step = steppers.textbook(scene, scheme, force=lambda q, p: system.force(q, p) + rate * p)
+    return steppers.record(scene, scheme, step)
+
+
+def of_order(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
+    """A step that ends off the exact solution by a thousandth of its place, times (h / h of the first)**r,
+    the order r off by x."""
+    where = "spring" if scene.system.is_linear else "quartic potential"
+    q, p = (np.asarray(y, np.float64) for y in laws.exact_end(where))
+    share = 1e-3 * (scene.step * laws.COARSEST / laws.DURATION) ** (scheme.order + x)
+    return steppers.trajectory(
+        scene, scheme, np.stack([scene.q, q * (1 + share)]), np.stack([scene.p, p * (1 + share)])
+    )
+
+
+Planted: TypeAlias = Callable[[Scene, schemes.Scheme, str, float], Trajectory]
+EXPERIMENTS: dict[checks.Experiment, Planted] = {
+    experiments.determinant: planted,
+    experiments.symplecticity: planted,
+    experiments.reversibility: planted,
+    laws.rounding_bias: growing,
+    laws.rounding_growth: growing,
+    laws.order: of_order,
+    laws.order_anharmonic: of_order,
+}
+"""Experiments that state a limit, and how engines are off by it."""
 
 
 def wrong(
     scene: Scene, scheme: schemes.Scheme, only: Iterable[str] = Limits.__slots__
 ) -> tuple[int, list[str]]:
     """How many limits the verdicts of the right run state, and those of them that do not hold."""
+
+    def verdict(check: checks.Check, name: str = "", x: float = 0.0) -> Verdict:
+        return checks.judge(scene, planted(scene, scheme, name, x), [check])[0]
+
+    tried, out = 0, list[str]()
+    for found in checks.judge(scene, planted(scene, scheme)):
+        (check,) = (one for one in checks.CHECKS if one.name == found.check)
+        count, more = _held(found, partial(verdict, check), only)
+        tried, out = tried + count, out + [f"{scheme.name}: {line}" for line in more]
+    return tried, out
+
+
+def wrong_experiment(
+    experiment: checks.Experiment, scene: Scene, scheme: schemes.Scheme
+) -> tuple[int, list[str]]:
+    """The same of one experiment."""
+
+    def verdict(name: str = "", x: float = 0.0) -> Verdict:
+        def run(made: Scene, label: str) -> Trajectory:
+            return EXPERIMENTS[experiment](made, scheme, name, x)
+
+        return experiment(checks.Bench(scene=scene, label="", run=run))
+
+    tried, out = _held(verdict(), verdict, Limits.__slots__)
+    return tried, [f"{scheme.name}: {line}" for line in out]
+
+
+def _held(
+    right: Verdict, verdict: Callable[[str, float], Verdict], only: Iterable[str]
+) -> tuple[int, list[str]]:
+    """How many limits a passed verdict states, and those at which an engine is judged otherwise."""
     tried, out = 0, []
-    for verdict in checks.judge(scene, planted(scene, scheme)):
-        (check,) = (one for one in checks.CHECKS if one.name == verdict.check)
-        for name in only:
-            limit = getattr(verdict.sees, name)
-            if limit is None or not verdict.passed:
-                continue
-            tried += 1
-            for factor, passes in FACTORS:
-                (found,) = checks.judge(scene, planted(scene, scheme, name, factor * limit), [check])
-                if found.passed is not passes:
-                    seen = f"{found.value:.3g} of {found.bound:.3g}"
-                    out.append(f"{scheme.name}: {check.name}: {name} off by {factor:g} x {limit:.2g}: {seen}")
+    for name in only:
+        limit = getattr(right.sees, name)
+        if limit is None or not right.passed:
+            continue
+        tried += 1
+        for factor, passes in FACTORS:
+            found = verdict(name, factor * limit)
+            if found.passed is not passes:
+                seen = f"{found.value:.3g} of {found.bound:.3g}"
+                out.append(f"{right.check}: {name} off by {factor:g} x {limit:.2g}: {seen}")
     return tried, out
 
 
@@ -123,6 +194,14 @@ if __name__ == "__main__":
                 count, found = wrong(scene, schemes.SCHEMES[method])
                 tried, failed = tried + count, failed + found
     print(f"{tried} limits tried, at 3 and at 0.1 of each: {len(failed)} wrong", flush=True)
+    tried = 0
+    for method in METHODS[1:]:
+        for experiment in EXPERIMENTS:
+            of_scene = experiment.family == "map"
+            for hw in TURNS[1:] if of_scene else (0.1,):
+                count, found = wrong_experiment(experiment, spring(hw, 60), schemes.SCHEMES[method])
+                tried, failed = tried + count, failed + found
+    print(f"{tried} limits of experiments likewise: {len(failed)} wrong in all", flush=True)
     tried = 0
     for seed in range(asked.scenes):
         rng = np.random.default_rng([13, seed])

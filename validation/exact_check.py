@@ -16,9 +16,11 @@ followed for at most 25 times its shortest time, so that rounding leaves it 100 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from collections.abc import Callable
 from operator import mul
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -434,25 +436,39 @@ def ratio(scene: Scene) -> float | None:
     return worst
 
 
+def compared(seed: int, j: int, kind: str | None) -> dict[str, Any]:
+    """Scene j: its kind, its error in units of the stated one, and that one relative to the start."""
+    rng = np.random.default_rng([seed, j])
+    weights = np.array(list(SHARES.values())) / sum(SHARES.values())
+    kind = kind or str(rng.choice(list(SHARES), p=weights))
+    scene = KINDS[kind](rng)
+    off = ratio(scene)
+    said = None if off is None else exact.uncertainty(scene, scene.step * scene.steps)
+    return {"kind": kind, "off": off, "said": said}
+
+
 def main() -> int:
     """Run the comparison; the exit status is 1 where an error exceeds the stated one."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--scenes", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=sorted(KINDS))
+    parser.add_argument("--file", type=Path, help="scenes that are in it are not tried again")
     options = parser.parse_args()
-    weights = np.array(list(SHARES.values())) / sum(SHARES.values())
+    lines = options.file.read_text().splitlines() if options.file and options.file.is_file() else []
+    tried = {line["scene"]: line for line in map(json.loads, lines)}
     found: dict[str, list[tuple[float, float]]] = {}
     unknown = bad = 0
     for j in range(options.scenes):
-        rng = np.random.default_rng([options.seed, j])
-        kind = options.kind or str(rng.choice(list(SHARES), p=weights))
-        scene = KINDS[kind](rng)
-        off = ratio(scene)
+        if j not in tried:
+            tried[j] = {"scene": j} | compared(options.seed, j, options.kind)
+            if options.file:
+                with options.file.open("a") as out:
+                    out.write(json.dumps(tried[j]) + "\n")
+        kind, off, said = (tried[j][name] for name in ("kind", "off", "said"))
         if off is None:
             unknown += 1
             continue
-        said = exact.uncertainty(scene, scene.step * scene.steps)
         found.setdefault(kind, []).append((off, said))
         if not off <= 1:
             bad += 1

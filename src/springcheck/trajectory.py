@@ -132,26 +132,40 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """The relative change of each parameter from which on a check fails; None where it says nothing of it."""
+    """The relative change of each quantity from which on a check fails; None where it says nothing of it."""
 
     stiffness: float | None = None
     """Of every force of the potential."""
     step: float | None = None
     friction: float | None = None
+    area: float | None = None
+    """Of every particle's area in phase space at each step: its momentum is multiplied by 1 + x."""
+    reaction: float | None = None
+    """Of the force on one particle beside its reactions on the others."""
+    order: float | None = None
+    """Of an order or an exponent, absolute."""
 
     def __str__(self) -> str:
         """The same in words, or nothing."""
-        known = [(name, getattr(self, name)) for name in self.__slots__]
-        said = [f"{name} off by {x:.1e}" for name, x in known if x is not None]
-        return f"would see a {', a '.join(said)}" if said else ""
+        said = [words.format(x) for name, words in _SEEN.items() if (x := getattr(self, name)) is not None]
+        return f"would see {', '.join(said)}" if said else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
         """Of several checks, or of one on several pieces of a run, that of the one that sees most."""
-        every = [(x.stiffness, x.step, x.friction) for x in several]
-        found = ([x for x in column if x is not None] for column in zip(*every, strict=True))
-        return cls(**{name: min(x, default=None) for name, x in zip(cls.__slots__, found, strict=False)})
+        every = list(several)
+        known = {name: [x for one in every if (x := getattr(one, name)) is not None] for name in _SEEN}
+        return cls(**{name: min(x, default=None) for name, x in known.items()})
 
+
+_SEEN = {
+    "stiffness": "a stiffness off by {:.1e}",
+    "step": "a step off by {:.1e}",
+    "friction": "a friction off by {:.1e}",
+    "area": "an area in phase space off by {:.1e} a step",
+    "reaction": "a force off its reaction by {:.1e}",
+    "order": "an order or exponent off by {:.1e}",
+}
 
 NOT_KNOWN = Limits()
 
@@ -177,7 +191,8 @@ class Verdict:
     @property
     def reason(self) -> str:
         """Why, and what the check would have seen."""
-        return f"{self.why}; {self.sees}" if str(self.sees) else self.why
+        exact = "would see any other value" if self.passed and self.bound == 0 else ""
+        return "; ".join(filter(None, (self.why, str(self.sees) or exact)))
 
     def __repr__(self) -> str:
         if self.passed is None:

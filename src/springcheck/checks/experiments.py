@@ -14,7 +14,7 @@ from springcheck.checks.check import check
 from springcheck.checks.steps import fastest
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Verdict
+from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
 
 
 def _no_matrix(bench: Bench) -> str | None:
@@ -118,6 +118,7 @@ def determinant(bench: Bench) -> Verdict:
         "relative",
         f"roundings of every entry, each of the sign that hurts; the scheme's own is "
         f"{float(np.linalg.det(ideal)):.6g}",
+        Limits(area=limit / bench.scene.n),
     )
 
 
@@ -147,6 +148,7 @@ def symplecticity(bench: Bench) -> Verdict:
         float(limit[worst]),
         "of an action",
         "roundings of every entry, each of the sign that hurts",
+        Limits(area=float(np.min(limit[form != 0]))),
     )
 
 
@@ -162,7 +164,7 @@ def symmetric(scheme: schemes.Scheme) -> bool:
 
 
 def _shifted(
-    scene: Scene, scheme: schemes.Scheme, state: tuple[Floats, Floats], sign: int
+    scene: Scene, scheme: schemes.Scheme, state: tuple[Reals, Reals], sign: int
 ) -> tuple[Floats, Floats]:
     """The state a first stage of a two-stage scheme on, or back: there its adjoint is synchronised."""
     q, p = (x.astype(np.longdouble) for x in state)
@@ -223,7 +225,24 @@ def reversibility(bench: Bench) -> Verdict:
         bound,
         "roundings",
         f"{steps} steps out and {steps} back, each rounded, all of one sign",
+        _sees(case, steps, bound * size),
     )
+
+
+def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
+    """By how much momenta may be off after each step so that what comes back is off by what is allowed."""
+    change = np.longdouble(sight.change_of(2 * steps))
+    q, p = (x.astype(np.longdouble) for x in (case.scene.q, case.scene.p))
+    two_stage = len(case.scheme.stages) == 2
+    for sign in (-1, 1):
+        for _ in range(steps):
+            q, p = case.step(q, p)
+            p = p * (1 + change)
+        p = sign * p
+        if two_stage:
+            q, p = (x.astype(np.longdouble) for x in _shifted(case.judged, case.scheme, (q, p), sign))
+    off = case.norm.size(q - case.scene.q, p + case.scene.p) / change
+    return Limits(area=float(allowed / off)) if np.isfinite(off) and off > allowed else NOT_KNOWN
 
 
 def _enlarged(case: Case, steps: int) -> float | None:

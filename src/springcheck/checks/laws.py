@@ -25,7 +25,7 @@ from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.stats import line, student
-from springcheck.trajectory import Trajectory, Verdict
+from springcheck.trajectory import Limits, Trajectory, Verdict
 
 HALVINGS = 6
 CHANCE = 1e-3
@@ -66,7 +66,7 @@ def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
     scheme = bench.scheme
     if not scheme.one_step:
         return bench.not_applicable(check, "an adaptive solver chooses its order as it goes")
-    truth = _truth(where, DURATION)
+    truth = exact_end(where)
     norm = scene.system.norm
     h, error, floor = [], [], []
     for j in range(HALVINGS):
@@ -80,13 +80,15 @@ def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
         error.append(float(norm(run.q[-1] - truth[0], run.p[-1] - truth[1])))
         floor.append(float(norm(*(x[0] for x in case.allowance))) * steps)
     slope, se, rounding = fitted(h, error, floor, second=2 if symmetric(scheme) else 1)
+    bound = min(student(HALVINGS - 3, CHANCE) * se + rounding, UNRESOLVED)
     return bench.verdict(
         check,
         abs(slope - scheme.order),
-        min(student(HALVINGS - 3, CHANCE) * se + rounding, UNRESOLVED),
+        bound,
         "orders",
         f"slope {slope:.5f} +- {se:.1g} on the {where}, h from {h[0]:.3g} to {h[-1]:.3g}; "
         f"{scheme.title} has order {scheme.order}",
+        Limits(order=bound),
     )
 
 
@@ -101,11 +103,12 @@ def fitted(
 
 
 @cache
-def _truth(where: str, duration: float) -> tuple[Extended, Extended]:
+def exact_end(where: str) -> tuple[Extended, Extended]:
+    """Where the motion on the spring or in the quartic potential comes to, (n,) and (n,)."""
     if where == "spring":
-        q, p = exact.true_motion(replace(SPRING, step=duration), np.array([1]), duration)
+        q, p = exact.true_motion(replace(SPRING, step=DURATION), np.array([1]), DURATION)
         return q[0], p[0]
-    return extrapolated(WELL, duration)
+    return extrapolated(WELL, DURATION)
 
 
 def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extended, Extended]:
@@ -200,6 +203,8 @@ def rounding_bias(bench: Bench) -> Verdict:
         float(limit[worst]),
         "a step",
         f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}",
+        # momenta times 1 + x at each step raise the energy by x of it: half of it is kinetic, and squared
+        Limits(area=float(np.min(limit))),
     )
 
 
@@ -228,20 +233,7 @@ def rounding_growth(bench: Bench) -> Verdict:
         return bench.verdict("rounding-growth", float("inf"), 0.0, "exponent", SHORT)
     steps, change = drifts(scene, run)
     change = change - predicted_drift(run) * steps[:, None]
-    late = np.array([1, 2, 4, 8, 16, 32, 64]) - 1
-
-    def exponent(members: Floats) -> float:
-        size = np.sqrt(np.mean(members[late] ** 2, axis=1))
-        if not np.all(np.isfinite(size)):
-            return float("nan")
-        if np.any(size == 0):
-            return 0.0
-        return line(np.log(steps[late]), np.log(size)).slope
-
-    blocks = np.array_split(np.arange(MEMBERS), 16)
-    left = np.array([exponent(np.delete(change, block, axis=1)) for block in blocks])
-    se = float(np.sqrt((len(left) - 1) * np.mean((left - np.mean(left)) ** 2)))
-    slope = exponent(change)
+    slope, se = _growth(steps, change)
     if slope <= 0.5 + SIGMAS * se and 0.5 + SIGMAS * se >= 1:
         return bench.not_applicable(
             "rounding-growth", f"an exponent of {slope:.3f} +- {se:.3f} does not tell a walk from a bias"
@@ -253,7 +245,37 @@ def rounding_growth(bench: Bench) -> Verdict:
         "exponent",
         f"a walk has 1/2, a bias 1; {slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, "
         f"{LONG} steps of {ODD:g}",
+        Limits(area=_seen_bias(steps, change)),
     )
+
+
+def _growth(steps: Floats, change: Floats) -> tuple[float, float]:
+    """Exponent with which changes (f, members) grow with the steps (f,), and its standard error by the
+    jackknife."""
+    late = np.array([1, 2, 4, 8, 16, 32, 64]) - 1
+
+    def exponent(squares: Floats) -> float:
+        size = np.sqrt(np.mean(squares, axis=1))
+        if not np.all(np.isfinite(size)):
+            return float("nan")
+        if np.any(size == 0):
+            return 0.0
+        return line(np.log(steps[late]), np.log(size)).slope
+
+    squares = change[late] ** 2
+    blocks = np.array_split(np.arange(MEMBERS), 16)
+    left = np.array([exponent(np.delete(squares, block, axis=1)) for block in blocks])
+    return exponent(squares), float(np.sqrt((len(left) - 1) * np.mean((left - np.mean(left)) ** 2)))
+
+
+def _seen_bias(steps: Floats, change: Floats) -> float | None:
+    """The least bias a step, of tenths of a decade, that would raise the exponent of a walk beyond its bound,
+    of either sign."""
+    for bias in 10.0 ** np.arange(-20, -10, 0.1):
+        found = (_growth(steps, change + sign * bias * steps[:, None]) for sign in (1, -1))
+        if all(slope > 0.5 + SIGMAS * se for slope, se in found):
+            return float(bias)
+    return None
 
 
 @check("tolerance", family="law", needs="an adaptive method")
@@ -288,4 +310,5 @@ def convergence(bench: Bench) -> Verdict:
         "exponent",
         f"exponent {slope:.3f} +- {se:.2g} over {len(error)} decades of tolerance; {bench.scheme.title} "
         f"has {power}: what a step of its highest order leaves, times the number of steps",
+        Limits(order=bound),
     )

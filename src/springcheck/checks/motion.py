@@ -11,7 +11,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import STILL, closed_or_not
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
-from springcheck.trajectory import Verdict
+from springcheck.trajectory import Limits, Verdict
 
 
 def growth_bound(case: Case) -> tuple[Floats, Floats]:
@@ -231,7 +231,7 @@ def momentum(case: Case) -> Verdict:
     if len(run.t) < 2:
         return case.not_applicable("momentum", "there is no second frame")
     total = np.sum(run.p.astype(np.longdouble), axis=1)
-    steps, first = case.steps, np.sum(case.scene.p.astype(np.longdouble))
+    steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
     with np.errstate(over="ignore", invalid="ignore"):
         _, of_p = case.allowance_at(run.q, run.p)
@@ -240,8 +240,8 @@ def momentum(case: Case) -> Verdict:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
     elif steps[0] != 0:
         # nothing bounds the motion before this piece: it is judged from its own first frame on
-        steps, first = steps - steps[0], total[0]
-    off = np.abs(total - first)[1:]
+        steps, first = steps - steps[0], run.p[0].astype(np.longdouble)
+    off = np.abs(total - np.sum(first))[1:]
     limit = case.roundings * steps[1:].astype(np.float64)
     # a step from a state near the end of all numbers may leave even the range of its own bound
     finite = np.all(np.isfinite(run.q) & np.isfinite(run.p), axis=1)
@@ -251,10 +251,15 @@ def momentum(case: Case) -> Verdict:
     size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
     if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(~beyond & (size > limit * unit)):
         return case.not_applicable("momentum", "rounding may be as large as all momenta together")
+    # a force too large by x gains x times what its particle has gained
+    gained = np.max(np.abs(run.p[1:] - first), axis=1)
+    known = gained > limit * unit
+    off_by = np.min((limit * unit)[known] / gained[known], initial=np.inf)
     return case.verdict(
         "momentum",
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
         f"forces cancel in pairs; {steps[worst + 1]} steps, each rounded, all of one sign",
+        Limits(reaction=float(off_by) if np.isfinite(off_by) else None),
     )

@@ -10,7 +10,7 @@ of one passes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -42,7 +42,8 @@ NUMBERS = 1 << 16
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
-NAMES = tuple(field.name for field in fields(Limits))
+NAMES = ("stiffness", "step", "friction")
+"""Limits that are relative changes of a scene's own numbers."""
 
 
 def limits(right: States, motion: Callable[[str], States | None], change: float, part: Part) -> Limits:

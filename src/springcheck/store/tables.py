@@ -15,7 +15,7 @@ from springcheck.errors import StoreError
 from springcheck.store import access, digests
 from springcheck.store.access import Scalar
 from springcheck.store.layout import RESERVED, write_attributes
-from springcheck.trajectory import NOT_KNOWN, Comparison, Limits, Verdict
+from springcheck.trajectory import Comparison, Limits, Verdict
 
 _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""
@@ -164,12 +164,11 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     if len({len(column) for column in (*texts, value, bound, passed)}) > 1 or set(passed) - {-1, 0, 1}:
         raise StoreError("the table of verdicts is none of ours: its columns do not fit together")
     back = {number: passed for passed, number in _PASSED.items()}
-    # stores of before have no limits
-    known = [_column(table, f"sees_{name}", "f") for name in _LIMITS if f"sees_{name}" in table.columns]
-    sees = [Limits(**dict(zip(_LIMITS, map(_or_none, row), strict=True))) for row in zip(*known, strict=True)]
-    if known and (len(known) < len(_LIMITS) or len(sees) != len(value)):
+    # stores of before have fewer limits, or none
+    known = {name: _column(table, f"sees_{name}", "f") for name in _LIMITS if f"sees_{name}" in table.columns}
+    if any(len(column) != len(value) for column in known.values()):
         raise StoreError("the table of verdicts is none of ours: its limits do not fit together")
-    sees = sees or [NOT_KNOWN] * len(value)
+    sees = [Limits(**{name: _or_none(known[name][j]) for name in known}) for j in range(len(value))]
     return tuple(
         Verdict(
             value=float(x),
