@@ -15,7 +15,7 @@ from springcheck import store
 from springcheck.cli import main
 from springcheck.engines.own import compiled
 from springcheck.physics.scenefile import folder
-from springcheck.store import files, reading
+from springcheck.store import files, parts
 from test_store import LABELS, scene, trajectory, written
 
 OWN = ["--method", "own:euler", "--quiet"]
@@ -225,8 +225,8 @@ def test_a_part_of_another_run_is_not_taken_up() -> None:
     for name in ("s.h5", "t.h5"):
         with store.open_new(name, "run") as journal:
             journal.save(trajectory(s, LABELS[name == "t.h5"]), s)
-    part = next(reading.parts_folder(Path("t.h5")).glob("run-*"))
-    shutil.copy(part, reading.parts_folder(Path("s.h5")) / part.name)
+    part = next(parts.parts_folder(Path("t.h5")).glob("run-*"))
+    shutil.copy(part, parts.parts_folder(Path("s.h5")) / part.name)
     with pytest.warns(UserWarning, match="another run"), store.open_new("s.h5", "run") as journal:
         assert journal.finished() == (LABELS[0],)
 

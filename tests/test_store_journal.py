@@ -17,7 +17,8 @@ import pytest
 import power
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.store import adopt, files, merge, reading, seal
+from springcheck.store import adopt, files, merge, seal
+from springcheck.store.parts import claim, parts_folder
 from test_store import LABELS, assert_same, scene, trajectory, written
 
 
@@ -26,7 +27,7 @@ class Killed(BaseException):
 
 
 def parts(path: Path) -> list[str]:
-    return sorted(entry.name for entry in reading.parts_folder(path).iterdir())
+    return sorted(entry.name for entry in parts_folder(path).iterdir())
 
 
 def digests(path: Path) -> dict[str, object]:
@@ -137,7 +138,7 @@ def test_a_writer_that_dies_anywhere_in_a_commit_loses_nothing(
     for owner, name in places:
         for call in range(1, 40):
             path = tmp_path / f"{name}-{call}.h5"
-            shutil.copytree(reading.parts_folder(tmp_path / "s.h5"), reading.parts_folder(path))
+            shutil.copytree(parts_folder(tmp_path / "s.h5"), parts_folder(path))
             with monkeypatch.context() as patch:
                 # what a killed process never does: tidy up
                 patch.setattr("springcheck.store.journal._give_up", lambda temporary, run: None)
@@ -149,7 +150,7 @@ def test_a_writer_that_dies_anywhere_in_a_commit_loses_nothing(
                     break
                 except Killed:
                     deaths += 1
-            if reading.claim(reading.parts_folder(path)) is not None or not path.exists():
+            if claim(parts_folder(path)) is not None or not path.exists():
                 with store.open_new(path, "run") as journal:
                     if journal.finished():
                         assert tuple(journal.finished()) == tuple(LABELS)
@@ -179,7 +180,7 @@ def test_a_commit_that_fails_puts_an_adopted_part_back(
     monkeypatch.setattr(adopt, "LARGE", 0)
     with store.open_new(path, "run") as journal:
         journal.save(trajectory(s, LABELS[0]), s)
-        (part,) = reading.parts_folder(path).glob("run-*")
+        (part,) = parts_folder(path).glob("run-*")
         before = part.read_bytes()
         with monkeypatch.context() as patch:
             patch.setattr(merge, "_plots", _dies(print, 1))
@@ -290,7 +291,7 @@ def test_a_damaged_part_is_named_and_never_merged(tmp_path: Path) -> None:
     with store.open_new(path, "run") as journal:
         journal.save(trajectory(s, LABELS[0]), s)
         journal.save(trajectory(s, LABELS[1]), s)
-        part = sorted(reading.parts_folder(path).glob("run-*"))[0]
+        part = sorted(parts_folder(path).glob("run-*"))[0]
         content = bytearray(part.read_bytes())
         found = seal.find(part)
         assert found is not None
@@ -306,7 +307,7 @@ def test_the_claim_of_a_journal_that_cannot_be_read_is_told(tmp_path: Path) -> N
     path, s = tmp_path / "s.h5", scene()
     with store.open_new(path, "run") as journal:
         journal.save(trajectory(s, LABELS[0]), s)
-    claim = reading.parts_folder(path) / "command"
+    claim = parts_folder(path) / "command"
     assert json.loads(claim.read_bytes())["command"] == "run"
     claim.write_bytes(b"{")
     with pytest.raises(StoreError, match="stands where its journal goes"):

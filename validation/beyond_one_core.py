@@ -52,7 +52,10 @@ def numbers(count: int) -> dict[str, np.ndarray]:
 def pieces(count: int, folder: Path, workers: int) -> float:
     """Seconds of processor time of a study of so many empty pieces, and of its commit."""
     path = folder / f"pieces-{count}-{workers}.h5"
-    plan = [Piece(key=f"{i:06d}", what="", measure=partial(numbers, 128), form=CELLS) for i in range(count)]
+    plan = [
+        Piece(key=f"own:none/{i:06d}", what="", measure=partial(numbers, 128), form=CELLS)
+        for i in range(count)
+    ]
 
     def study() -> None:
         with keeper.kept(path, f"pieces {count}", team=Processes(workers)) as kept:

@@ -39,7 +39,7 @@ from arguments import arguments
 from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
-from springcheck.store import adopt, reading
+from springcheck.store import adopt, parts, reading
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.points import POINTS
 
@@ -120,7 +120,7 @@ def lost(path: Path, seed: int, stored: dict[str, str], listed: set[str]) -> lis
         named = set(store.read_tables(path))
     missing += [label for label, expected in stored.items() if digests.get(label) != expected]
     missing += sorted(listed - named)
-    if path.is_file() or reading.parts_folder(path).is_dir():
+    if path.is_file() or parts.parts_folder(path).is_dir():
         missing += [f"{finding.place}: {finding.what}" for finding in found_by_check(path)]
     return missing
 
@@ -136,7 +136,7 @@ def found_by_check(path: Path) -> list[store.Finding]:
 def digest(path: Path, label: str) -> str:
     """The digest that a trajectory carries, its numbers read and checked against theirs."""
     store.read_one(path, label)
-    with reading.opened(path) as file:
+    with parts.opened(path) as file:
         return reading.known_of(file, label)[0].sha256
 
 
@@ -211,10 +211,10 @@ def random_kills(folder: Path, kills: int) -> int:
         if gone:
             losses += len(gone)
             print("  lost:", gone)
-        if done or (path.is_file() and not reading.parts_folder(path).is_dir()):
+        if done or (path.is_file() and not parts.parts_folder(path).is_dir()):
             reported += len(ledger.stored) + len(ledger.listed)
             path.unlink(missing_ok=True)
-            shutil.rmtree(reading.parts_folder(path), ignore_errors=True)
+            shutil.rmtree(parts.parts_folder(path), ignore_errors=True)
             ledger, seed = Ledger(), seed + 1
     spread = ", ".join(f"{number} in a {phase}" for phase, number in counts.items())
     print(f"random kills: {sum(counts.values())} ({spread}), {reported} reports, lost {losses}")
@@ -271,7 +271,7 @@ def command(words: list[str], say: Callable[[str], None]) -> None:
 
 def finished(path: Path) -> dict[str, object]:
     """What a store and its journal hold: digests of trajectories, points of precision, columns of tables."""
-    if not path.is_file() and not reading.parts_folder(path).is_dir():
+    if not path.is_file() and not parts.parts_folder(path).is_dir():
         return {}
     try:
         found: dict[str, object] = {label: digest(file, label) for label, file in store.sources(path).items()}
@@ -341,7 +341,7 @@ def every_call(folder: Path, stride: int) -> int:
                 losses += len(gone)
                 print(f"  before call {call}, lost:", gone)
             path.unlink(missing_ok=True)
-            shutil.rmtree(reading.parts_folder(path), ignore_errors=True)
+            shutil.rmtree(parts.parts_folder(path), ignore_errors=True)
             call += stride
     print(f"kills before each system call: {kills}, lost {losses}")
     return losses
@@ -406,7 +406,7 @@ def reader_and_writers(folder: Path) -> int:
     path = folder / "shared.h5"
     write(path, lambda line: None, 1)
     losses = 0
-    with reading.opened(path) as file:
+    with parts.opened(path) as file:
         held = file[f"observables/{LABELS[0]}/q/value"]
         before = held[()]
         with store.open_new(path, "command 2", force=True) as journal:

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import store
-from springcheck.studies import STUDIES
-from springcheck.studies.keeper import plain as plainly
+from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Result, Study
 from springcheck.text.lines import Lines, Table, plain, table
 from springcheck.text.wording import ordinal
@@ -64,7 +63,7 @@ def lines(found: Found, options: Namespace) -> Lines:
         ]
     out += [plain(f"table {name}") for name in summary.tables]
     for study, result in found.studies:
-        said = study.lines(result, options)
+        said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
     if found.frames is not None:
         out += [plain(), *_frames(found.frames, found.stride)]
@@ -113,7 +112,7 @@ def document(found: Found) -> dict[str, Any]:
     shown = frames and {
         "label": frames.label, "stride": found.stride, "t": frames.t, "q": frames.q, "p": frames.p,
     }  # fmt: skip
-    out: dict[str, Any] = plainly(
+    out: dict[str, Any] = keeper.plain(
         {
             "store": summary.path,
             "bytes": summary.size,
@@ -130,6 +129,7 @@ def document(found: Found) -> dict[str, Any]:
                 for run in summary.runs
             ],
             "tables": summary.tables,
+            "measured_on": keeper.who(summary.path),
             "studies": documents,
             **kept,
             "trajectory": shown,

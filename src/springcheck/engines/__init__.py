@@ -45,8 +45,8 @@ from springcheck.physics.scene import Scene
 __all__ = [
     "ANY_POTENTIAL", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method",
     "Need", "Simulation", "Stopped", "absence", "bring", "engine", "from_file", "guarded",
-    "installed_version", "internal_steps", "load", "match", "method", "module_name", "module_of",
-    "named", "names", "origin", "parse", "refusal", "start", "unusable",
+    "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
+    "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable",
 ]  # fmt: skip
 
 T = TypeVar("T")

@@ -20,6 +20,7 @@ from springcheck.store.reading import (
     digest,
     document,
     end,
+    measured_by,
     read,
     read_one,
     read_tables,
@@ -27,6 +28,7 @@ from springcheck.store.reading import (
     sources,
     strided,
     summary,
+    tables_of,
     verdicts,
     windows,
 )
@@ -36,6 +38,7 @@ from springcheck.store.tables import Table
 __all__ = [
     "Draft", "Finding", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "is_foreign", "is_h5md", "open_new", "read", "read_arrays", "read_foreign", "read_one", "read_tables",
-    "room", "scene_text", "size", "sources", "strided", "summary", "verdicts", "windows",
+    "is_foreign", "is_h5md", "measured_by", "open_new", "read", "read_arrays", "read_foreign", "read_one",
+    "read_tables", "room", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
+    "windows",
 ]  # fmt: skip

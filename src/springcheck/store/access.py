@@ -156,13 +156,18 @@ def text(file: Any, path: str) -> str:
     return str(texts(node)[()])
 
 
-def column(dataset: Any) -> np.ndarray:
-    """Numbers, truth values or texts of a table's column."""
-    if h5py.check_string_dtype(dataset.dtype) is not None:
+def is_text(dataset: Any) -> bool:
+    """Whether a column holds texts."""
+    return h5py.check_string_dtype(dataset.dtype) is not None
+
+
+def column(dataset: Any, rows: Any = ()) -> np.ndarray:
+    """Numbers, truth values or texts of a table's column; of numbers some rows, if told."""
+    if is_text(dataset):
         return texts(dataset)
     if dataset.dtype.kind not in "fiub" or dataset.shape is None:
         raise refuse(dataset, f"is of type {dataset.dtype}, no column of ours")
-    return np.asarray(dataset[()])
+    return np.asarray(dataset[rows])
 
 
 def attributes(node: Any) -> dict[str, Any]:

@@ -12,8 +12,9 @@ import h5py
 import msgspec
 
 from springcheck.errors import StoreError
-from springcheck.store import access, digests, files, layout, reading, records, seal, tables, trust
+from springcheck.store import access, digests, files, layout, records, seal, tables, trust
 from springcheck.store.layout import Column
+from springcheck.store.parts import Parts
 
 NO_STORE = "no store of springcheck"
 MOST_FINDINGS = 1000
@@ -37,8 +38,7 @@ def check(path: str | Path, *, most: int | None = None) -> list[Finding]:
     there is nothing to check: no such file, or one that cannot be opened at all.
     """
     path = Path(path)
-    parts = reading.Parts.of(path, None)
-    everything = ([path] if path.is_file() else []) + parts.parts
+    everything = Parts.of(path, None).everything
     if not everything:
         with files.told(path, "read"), path.open("rb"):
             pass

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from springcheck.errors import StoreError
-from springcheck.store import access, checking, files, layout, reading
+from springcheck.store import access, checking, files, layout, parts, reading
 from springcheck.store.checking import Finding
 
 
@@ -32,7 +32,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
         place = finding.place.partition(": ")[2] or finding.place
         if place.split("/")[1:3] in (["observables", label], ["parameters", label]):
             raise StoreError(f"{path} is not what was written: {place} {finding.what}; nothing is exported")
-    with reading.opened(source) as file:
+    with parts.opened(source) as file:
         known, attributes = reading.known_of(file, label)
         if known.kind != "particles" or not {"q", "p"} & set(known.kept):
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")

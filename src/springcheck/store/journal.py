@@ -15,19 +15,20 @@ import re
 import uuid
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 import h5py
 
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning
 from springcheck.physics.scene import Scene
-from springcheck.store import adopt, files, layout, merge, reading, records, seal, tables
+from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.reading import Parts, parts_folder
+from springcheck.store.parts import Parts, claim, name_of, opened, parts_folder
 from springcheck.store.tables import Table
 from springcheck.trajectory import Comparison, Trajectory, Verdict
 
@@ -79,7 +80,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     return Journal(path, run, lock)
 
 
-_NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table)-.*\.h5|{files.TEMPORARY.pattern}")
+_NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table|rows)-.*\.h5|{files.TEMPORARY.pattern}")
 """What files of a journal are called: nothing else in its folder is ever touched."""
 
 
@@ -92,7 +93,7 @@ def _is_free(parts: Path) -> bool:
     known = {entry.name for entry in parts.iterdir()}
     if "command" in known:
         with contextlib.suppress(StoreError):
-            return reading.claim(parts) is not None
+            return claim(parts) is not None
         return False
     # left by a kill or a loss of power at the very beginning or end; the lock is looked at as it is taken
     return all(
@@ -113,7 +114,7 @@ def _is_ours(path: Path) -> bool:
 
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal that is taken up or started."""
-    known = reading.claim(parts)
+    known = claim(parts)
     if known is not None and (not force or known["forced"]):
         if known["command"] == command:
             adopt.recover(parts, parts / COLLECTION, known["run"])
@@ -138,7 +139,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
 def _look_at_parts(parts: Path, run: str) -> None:
     """Remove the damaged parts of a run, and say so: they alone are measured again."""
     for part in sorted(parts.glob("*-*.h5")):
-        name = unquote(part.stem.partition("-")[2])
+        name = name_of(part)
         known = seal.find(part)
         if known is not None and known.run != run:
             said = f"{part} is a part of another run and is left out: {name} is measured again"
@@ -207,17 +208,29 @@ class Journal:
             draft.append(trajectory.t, trajectory.q, trajectory.p, trajectory.energy)
             return draft.finish(records.attributes(trajectory))
 
-    def add(self, table: Table) -> None:
-        """Store one table; once this returns it outlives crashes."""
+    def add(self, table: Table, *, by: Sequence[pieces.Record] = (), rows: bool = False) -> None:
+        """Store one table; once this returns it outlives crashes.
+
+        `by` says who measured it.  With `rows` it is a piece ``<table>/<piece>`` of a table: the final
+        collection holds the rows of all of them as one, in the order of their names.
+        """
         if table.name.split("/")[0] in layout.RESERVED:
             raise ValueError(f"a table cannot be called {table.name!r}")
-        image = merge.image({"part": table.name, "run": self.run}, [table])
+        image = merge.image({"part": table.name, "run": self.run, **pieces.by_text(by)}, [table])
         with files.told(self.folder, "write"):
-            files.put_bytes(image, self._part("table", table.name))
+            files.put_bytes(image, self._part("rows" if rows else "table", table.name))
 
-    def tables(self) -> dict[str, Table]:
-        """The finished tables by name."""
-        return reading.read_tables(self.path, self.run)
+    def tables(self) -> Mapping[str, Table]:
+        """The finished tables, and pieces of tables, by name; each is read when it is asked for."""
+        return reading.tables_of(self.path, self.run, rows=True)
+
+    def measured_by(self, name: str) -> list[dict[str, str]]:
+        """Who measured a finished table that is not yet in the collection."""
+        for kind in ("table", "rows"):
+            if (part := self._part(kind, name)).is_file():
+                with opened(part) as file:
+                    return pieces.by_of(file)
+        return []
 
     def commit(
         self,
@@ -231,7 +244,8 @@ class Journal:
     ) -> None:
         """Replace the collection by one that holds everything finished; `final` ends the journal.
 
-        Without `final` it is a checkpoint of a long study: fewer files in the journal, which goes on.
+        Without `final` it is a checkpoint of a long study: fewer files in the journal, which goes on.  Pieces
+        of tables stay there until all of them are there.
         """
         extra: list[Table] = []
         if comparison is not None:
@@ -242,6 +256,8 @@ class Journal:
         if scene is not None:
             root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)
+        if not final:
+            found = replace(found, rows=[])
         temporary = self.folder / COLLECTION
         with files.told(self.path, "write"):
             try:
@@ -254,7 +270,7 @@ class Journal:
             with interrupts.held():
                 files.put(temporary, self.path)
                 adopt.settled(self.folder)
-                for part in found.parts:
+                for part in (*found.parts, *found.rows):
                     part.unlink(missing_ok=True)
                 if final:
                     self._end()

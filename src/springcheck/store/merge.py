@@ -11,9 +11,9 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import adopt, digests, files, layout, seal, tables
+from springcheck.store import adopt, digests, files, layout, pieces, seal, tables
 from springcheck.store.access import Scalar
-from springcheck.store.reading import Parts
+from springcheck.store.parts import Parts, name_of
 from springcheck.store.tables import Table
 
 _TREES = ("particles", "observables", "parameters")
@@ -33,7 +33,7 @@ def collection(
     """
     base = adopt.choice(found.parts)
     sources = [*(part for part in found.parts if part != base), *found.collections]
-    total = sum(source.stat().st_size for source in sources)
+    total = sum(source.stat().st_size for source in (*sources, *found.rows))
     text = sum(len(document.encode()) for document in documents.values())
     margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
     if base is None:
@@ -48,10 +48,14 @@ def collection(
             layout.begin(file)
         file.attrs.pop("part", None)
         layout.write_attributes(file, root)
+        provenance = pieces.Provenance()
         for source in sources:
             with h5py.File(source, "r", locking="best-effort") as part:
                 _take(file, part)
-        for table in extra:
+                provenance.note(name_of(source), pieces.by_of(part))
+        provenance.take(file)
+        pieces.join(file, found.rows, provenance)
+        for table in (*extra, *provenance.tables()):
             tables.write(file, table)
         for name, document in documents.items():
             file.require_group("documents").create_dataset(

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
-import h5py
 import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError, nearest
 from springcheck.physics.arrays import Floats
-from springcheck.store import access, digests, files, layout, records, seal, tables, trust
+from springcheck.store import access, digests, files, layout, parts, pieces, records, tables
 from springcheck.store.access import Scalar
+from springcheck.store.parts import Parts, claim, opened, parts_folder
 from springcheck.store.records import Record
 from springcheck.store.tables import Table
 from springcheck.trajectory import Comparison, Outcome, Trajectory, Verdict
@@ -29,91 +26,10 @@ PIECE = 1 << 20
 """Rows of a window unless told."""
 
 
-def parts_folder(path: Path) -> Path:
-    """The journal of a store."""
-    return path.with_name(path.name + files.JOURNAL)
-
-
-def claim(parts: Path) -> dict[str, str] | None:
-    """Run id and command of a journal of ours, and whether --force began it; None where there is none.
-
-    StoreError where what stands there cannot be read as ours.
-    """
-    try:
-        with files.own(parts / "command") as file:
-            found = json.loads(file.read(1 << 26))
-        if found["format"] != files.JOURNAL_FORMAT:
-            raise ValueError("another format")
-        forced = "forced" if found["forced"] else ""
-        return {"run": str(found["run"]), "command": str(found["command"]), "forced": forced}
-    except FileNotFoundError:
-        return None
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        raise StoreError(
-            f"cannot read {parts / 'command'}, which stands where the journal goes; move it away"
-        ) from error
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
-    """The files that make up a store: the collection, if it belongs to the run, and the run's parts."""
-
-    collection: Path | None
-    parts: list[Path]
-
-    @property
-    def collections(self) -> list[Path]:
-        """The collection as a list of one or none."""
-        return [] if self.collection is None else [self.collection]
-
-    @classmethod
-    def of(cls, path: Path, run: str | None) -> Parts:
-        """`run` is the writer's; None for a reader, who takes the collection as it is."""
-        folder = parts_folder(path)
-        known = run
-        if known is None:
-            with contextlib.suppress(StoreError):
-                known = (claim(folder) or {}).get("run")
-        own = path.is_file() and (known is None or _run_of(path) == known)
-        if run is None and path.is_file() and not own:
-            return cls(collection=path, parts=[])
-        parts = sorted(folder.glob("*-*.h5")) if known is not None else []
-        return cls(
-            collection=path if own else None,
-            parts=[part for part in parts if (found := seal.find(part)) is None or found.run == known],
-        )
-
-
-def _run_of(path: Path) -> str:
-    found = seal.find(path)
-    if found is not None:
-        return found.run
-    with contextlib.suppress(StoreError), opened(path) as file:
-        return str(access.attribute(file, "run"))
-    return ""
-
-
-@contextlib.contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
-    trust.trust(path, trust.OURS)
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
-        marked = access.attribute(file, "format")
-        if marked == layout.EXPORTED:
-            raise StoreError(
-                f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
-            )
-        if marked == layout.OLDER:
-            raise StoreError(f"{path} was written by an older springcheck: run its scene again")
-        if marked != layout.FORMAT:
-            raise StoreError(f"cannot read {path}: it is HDF5, but no store of springcheck")
-        yield file
-
-
 def sources(path: Path, run: str | None = None) -> dict[str, Path]:
     """Label of each trajectory -> the file that holds it, in the order in which they were started."""
     found = Parts.of(path, run)
-    if found.collection is None and not found.parts and run is None:
+    if not found.everything and run is None:
         with files.told(path, "read"), path.open("rb"):
             pass
     listed: list[tuple[int, str, Path]] = []
@@ -125,10 +41,10 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
             ]
     known = {label for _, label, _ in listed}
     for part in found.parts:
-        kind, label = part.stem.split("-", 1)
-        if kind == "run" and unquote(label) not in known:
+        label = parts.name_of(part)
+        if part.name.startswith("run-") and label not in known:
             with opened(part) as file:
-                listed.append((_sequence(file, unquote(label)), unquote(label), part))
+                listed.append((_sequence(file, label), label, part))
     return {label: source for _, label, source in sorted(listed)}
 
 
@@ -297,15 +213,15 @@ def summary(path: str | Path) -> Summary:
         with opened(path) as file:
             root = access.attributes(file)
             documents = tuple(access.children(file, "documents"))
-    everything = [path] if path.is_file() else []
-    everything += [part for part in Parts.of(path, None).parts if part.is_file()]
+    found = Parts.of(path, None)
+    names = [*_tables(path), *map(parts.table_of, found.rows)]
     return Summary(
         path=path,
-        size=sum(part.stat().st_size for part in everything),
+        size=sum(part.stat().st_size for part in found.everything),
         complete=path.is_file() and root.get("complete") is True and not _is_claimed(path),
         root=root,
         runs=tuple(runs),
-        tables=tuple(_tables(path)),
+        tables=tuple(dict.fromkeys(names)),
         documents=documents,
     )
 
@@ -319,16 +235,14 @@ def _is_claimed(path: Path) -> bool:
 
 
 def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
+    """The tables of a collection, and the parts that hold one."""
     found = Parts.of(path, run)
     listed: dict[str, Path] = {}
     if found.collection is not None:
         with opened(found.collection) as file:
             listed = dict.fromkeys(tables.names(file), found.collection)
-    for part in found.parts:
-        kind, name = part.stem.split("-", 1)
-        if kind == "table":
-            listed[unquote(name)] = part
-    return listed
+    named = {parts.name_of(part): part for part in found.parts if part.name.startswith("table-")}
+    return listed | named
 
 
 def _table(path: Path, name: str) -> Table:
@@ -339,9 +253,41 @@ def _table(path: Path, name: str) -> Table:
         return tables.read(group, name)
 
 
+class _Tables(Mapping[str, Table]):
+    def __init__(self, sources: Mapping[str, Path]) -> None:
+        self._sources = sources
+
+    def __getitem__(self, name: str) -> Table:
+        return _table(self._sources[name], name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sources)
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+
+def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -> Mapping[str, Table]:
+    """The tables of a store by name, but for comparison and verdicts; each is read when it is asked for.
+
+    With `rows` also the pieces of tables that an unfinished store holds.
+    """
+    found = _tables(Path(path), run)
+    if rows:
+        found |= {parts.name_of(part): part for part in Parts.of(Path(path), run).rows}
+    return _Tables(found)
+
+
+def measured_by(path: str | Path) -> list[tuple[str, dict[str, str]]]:
+    """Each piece of a study in a store, and who measured it; nothing where the store does not say."""
+    found = tables_of(path)
+    given = {name: found[name] for name in (pieces.WORKERS, pieces.PIECES) if name in found}
+    return list(pieces.measured(given))
+
+
 def read_tables(path: str | Path, run: str | None = None) -> dict[str, Table]:
     """The tables of a store by name, but for comparison and verdicts."""
-    return {name: _table(source, name) for name, source in _tables(Path(path), run).items()}
+    return dict(tables_of(path, run))
 
 
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.store import access, digests
 from springcheck.store.access import Scalar
-from springcheck.store.layout import RESERVED, write_attributes
+from springcheck.store.layout import RESERVED, write_attributes, write_unit
 from springcheck.trajectory import Comparison, Limits, Verdict
 
 _STYLE = "SILX_style"
@@ -45,6 +45,14 @@ class Table:
 
 def write(file: Any, table: Table) -> None:
     """Write a table into an open file."""
+    group = begin(file, table)
+    for name, values in table.columns.items():
+        column(group, table, name, np.shape(values))[...] = _written(values)
+    end(group)
+
+
+def begin(file: Any, table: Table) -> Any:
+    """The group of a table with its attributes, still without columns."""
     parts = table.name.split("/")
     if not all(parts) or {".", ".."} & set(parts):
         raise ValueError(f"{table.name!r} cannot name a table")
@@ -66,16 +74,26 @@ def write(file: Any, table: Table) -> None:
                 "signal_scale_type": scale[table.signal],
             }
             write_attributes(group, {_STYLE: json.dumps(style)})
-    for name, column in table.columns.items():
-        values = np.asarray(column)
-        if values.dtype.kind in "UO":
-            group.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype("utf-8"))
-        else:
-            group.create_dataset(name, data=values)
-        if name in table.units:
-            unit = table.units[name]
-            write_attributes(group[name], {"unit": unit, "units": unit})
+    return group
+
+
+def column(group: Any, table: Table, name: str, shape: tuple[int, ...]) -> Any:
+    """A dataset of this shape for a column of a table, with its unit."""
+    kind = _written(table.columns[name]).dtype
+    dataset = group.create_dataset(name, shape, h5py.string_dtype("utf-8") if kind.kind == "O" else kind)
+    if name in table.units:
+        write_unit(dataset, table.units[name])
+    return dataset
+
+
+def end(group: Any) -> None:
+    """Put the digest of a table whose columns are complete beside them."""
     write_attributes(group, {"sha256": digests.of_table(group)})
+
+
+def _written(values: Any) -> np.ndarray:
+    found = np.asarray(values)
+    return found.astype(object) if found.dtype.kind in "UO" else found
 
 
 def read(group: Any, name: str) -> Table:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
+from springcheck.studies import provenance
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
 from springcheck.studies.team import ALONE, Team
@@ -76,6 +78,7 @@ class Keeper:
         self._journal, self.team = journal, team
         self._finished = journal.tables() if journal else {}
         self.progress = progress
+        self._by: dict[str, list[dict[str, str]]] = {}
         self.names: list[str] = []
         """Names of the tables of the pieces, in the order in which they were asked for."""
         self.taken_up = 0
@@ -90,9 +93,26 @@ class Keeper:
         """An attribute of such a table."""
         return self._finished[form.beginning + key].attributes[name]
 
-    def keep(self, form: Form[Any], key: str, found: Any, **attributes: Any) -> None:
-        """Keep a result, in the place of an earlier one of its key: from here on it outlives crashes."""
-        self.add(form.table(key, found, **attributes))
+    def keep(
+        self, form: Form[Any], key: str, found: Any, by: Mapping[str, str] | None = None, **attributes: Any
+    ) -> None:
+        """Keep a result, in the place of an earlier one of its key: from here on it outlives crashes.
+
+        `by` is the worker that measured it, this process where it is left out; with those of what it replaces
+        it is kept beside it.
+        """
+        if self._journal is None:
+            return
+        table = form.table(key, found, **attributes)
+        by = record() if by is None else by
+        before = self._by.get(table.name)
+        if before is None:
+            before = self._journal.measured_by(table.name) if table.name in self._finished else []
+        if dict(by) not in before:
+            before = [*before, dict(by)]
+        if not form.joined:
+            self._by[table.name] = before
+        self._journal.add(table, by=before, rows=form.joined)
 
     def add(self, table: Table) -> None:
         """Keep a table that is no result."""
@@ -119,13 +139,22 @@ class Keeper:
             left.sort(key=lambda piece: -piece.cost)
         done = len(pieces) - len(left)
         self._tell(done, pieces, left[:1])
-        with closing(self.team.carried_out([piece.measure for piece in left])) as measured:
-            for j, result in measured:
-                self.keep(left[j].form, left[j].key, result)
+        with closing(self.carried_out([piece.measure for piece in left])) as measured:
+            for j, result, by in measured:
+                self.keep(left[j].form, left[j].key, result, by)
                 done += 1
                 # the last so many of those that were left are still to come
-                self._tell(done, pieces, left[len(left) - (len(pieces) - done) :][:1])
+                following = len(left) - (len(pieces) - done)
+                self._tell(done, pieces, left[following : following + 1])
                 yield left[j], result
+
+    def carried_out(
+        self, parts: Sequence[Callable[[], T]]
+    ) -> Generator[tuple[int, T, Mapping[str, str]], None, None]:
+        """Numbers and results of the parts, as the team finishes them, and who measured each."""
+        with closing(self.team.carried_out([partial(_measured, part) for part in parts])) as found:
+            for j, (result, by) in found:
+                yield j, result, by
 
     def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[Piece]) -> None:
         if self.progress:
@@ -216,15 +245,31 @@ class Kept:
 def restored(path: str | Path, name: str, build: Callable[[Kept], T]) -> T:
     """A study of a store.  StoreError where the file holds none, or a part of it is missing."""
     try:
-        kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.read_tables(path))
+        kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.tables_of(path))
         return build(kept)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
 
 
-def tables(path: Path) -> dict[str, Table]:
-    """The tables of a store by name."""
-    return store.read_tables(path)
+def tables(path: Path) -> Mapping[str, Table]:
+    """The tables of a store by name; each is read when it is asked for."""
+    return store.tables_of(path)
+
+
+@cache
+def record() -> Mapping[str, str]:
+    """Who measures here: the machine, the versions, and digests of its arithmetic."""
+    machine = {name: str(value) for name, value in store.machine().items()}
+    return {**machine, **provenance.versions(), **provenance.bits()}
+
+
+def _measured(work: Callable[[], T]) -> tuple[T, dict[str, str]]:
+    return work(), dict(record())
+
+
+def who(path: Path) -> list[str]:
+    """What is to be said of those who measured the pieces of a store; nothing where they were of one kind."""
+    return provenance.sentences(store.measured_by(path))
 
 
 def stored_scene(path: Path) -> Scene:

@@ -61,10 +61,19 @@ class Study:
         found: Result = self._part("measure").perform(options, progress)
         return found
 
-    def lines(self, found: Result, options: Namespace | None = None) -> Lines:
-        """The report as text; without options the one that `inspect` shows."""
+    def lines(self, found: Result, options: Namespace | None = None, path: Path | None = None) -> Lines:
+        """The report as text; without options the one that `inspect` shows.
+
+        `path` is its store, where the result does not say.
+        """
         lines: Lines = self._part("text").lines(found, options)
-        return lines
+        path = path or getattr(found, "path", None)
+        if path is None or self.trajectories:
+            return lines
+        from springcheck.studies import keeper
+        from springcheck.text.lines import plain
+
+        return [*lines, *map(plain, keeper.who(path))]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""

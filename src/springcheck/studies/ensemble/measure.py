@@ -119,10 +119,7 @@ def _restored(kept: keeper.Kept) -> Ensemble:
 
 def columns(path: Path, method: str) -> Columns:
     """All cells of a method of a stored ensemble, in their order."""
-    beginning = f"{CELLS.beginning}{method}/"
-    found = sorted((name, table) for name, table in keeper.tables(path).items() if name.startswith(beginning))
-    chunks = [CELLS.found(table) for _, table in found]
-    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+    return CELLS.found(keeper.tables(path)[CELLS.beginning + method])
 
 
 def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:

@@ -39,8 +39,9 @@ CELLS = Chunk(
     named="",
     about="a row a cell: the fields that were varied; outcome 0: complete, 1: diverged, 2: stopped; "
     "q0, p0: the state at the end of the first particle",
+    joined=True,
 )
-"""A table for each method and chunk of cells, ``ensemble/<label>/<chunk>``."""
+"""The table ``ensemble/<label>`` of each method, whose rows are measured and kept chunk by chunk."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

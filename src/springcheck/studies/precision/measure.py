@@ -138,14 +138,13 @@ def _errors_first(
     share = budget / 2 * kept.team.workers / max(1, len(left))
     spent = 0.0
     parts = [partial(errors_ahead, scene, sweep.label, sweep.points, share) for sweep in left]
-    with closing(kept.team.carried_out(parts)) as measured:
-        for j, points in measured:
+    with closing(kept.carried_out(parts)) as measured:
+        for j, points, by in measured:
             sweep = left[j]
             ahead.update({(x.method, x.steps, x.tolerance): x for x in points})
             spent += sum(point.spent for point in points) / kept.team.workers
-            kept.keep(
-                points_of(scene), str(sweep.label), [*sweep.points, *points], study_seconds=before + spent
-            )
+            both, took = [*sweep.points, *points], before + spent
+            kept.keep(points_of(scene), str(sweep.label), both, by, study_seconds=took)
             if kept.progress:
                 kept.progress(min(before + spent, budget), budget, f"{sweep.label}, errors")
     return spent

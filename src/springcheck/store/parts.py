@@ -1,0 +1,121 @@
+"""The files of a store: a collection, and beside it the parts of a journal that are not yet in it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import h5py
+
+from springcheck.errors import StoreError
+from springcheck.store import access, files, layout, seal, trust
+
+ROWS = "rows-"
+"""Beginning of the names of parts that hold rows of a table; of the others it is run- or table-."""
+
+
+def name_of(part: Path) -> str:
+    """The label, the table, or the piece of a table, that a part holds."""
+    return unquote(part.stem.partition("-")[2])
+
+
+def table_of(part: Path) -> str:
+    """The table of the collection that rows go into: its pieces are named <table>/<piece>."""
+    return name_of(part).rpartition("/")[0]
+
+
+def parts_folder(path: Path) -> Path:
+    """The journal of a store."""
+    return path.with_name(path.name + files.JOURNAL)
+
+
+def claim(parts: Path) -> dict[str, str] | None:
+    """Run id and command of a journal of ours, and whether --force began it; None where there is none.
+
+    StoreError where what stands there cannot be read as ours.
+    """
+    try:
+        with files.own(parts / "command") as file:
+            found = json.loads(file.read(1 << 26))
+        if found["format"] != files.JOURNAL_FORMAT:
+            raise ValueError("another format")
+        forced = "forced" if found["forced"] else ""
+        return {"run": str(found["run"]), "command": str(found["command"]), "forced": forced}
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise StoreError(
+            f"cannot read {parts / 'command'}, which stands where the journal goes; move it away"
+        ) from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """The files that make up a store: the collection, if it belongs to the run, and the run's parts.
+
+    `rows` are the parts that hold rows of a table.
+    """
+
+    collection: Path | None
+    parts: list[Path]
+    rows: list[Path]
+
+    @property
+    def everything(self) -> list[Path]:
+        """All files that there are."""
+        return [path for path in (*self.collections, *self.parts, *self.rows) if path.is_file()]
+
+    @property
+    def collections(self) -> list[Path]:
+        """The collection as a list of one or none."""
+        return [] if self.collection is None else [self.collection]
+
+    @classmethod
+    def of(cls, path: Path, run: str | None) -> Parts:
+        """`run` is the writer's; None for a reader, who takes the collection as it is."""
+        folder = parts_folder(path)
+        known = run
+        if known is None:
+            with contextlib.suppress(StoreError):
+                known = (claim(folder) or {}).get("run")
+        own = path.is_file() and (known is None or _run_of(path) == known)
+        if run is None and path.is_file() and not own:
+            return cls(collection=path, parts=[], rows=[])
+        parts = sorted(folder.glob("*-*.h5")) if known is not None else []
+        parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
+        return cls(
+            collection=path if own else None,
+            parts=[part for part in parts if not part.name.startswith(ROWS)],
+            rows=[part for part in parts if part.name.startswith(ROWS)],
+        )
+
+
+def _run_of(path: Path) -> str:
+    found = seal.find(path)
+    if found is not None:
+        return found.run
+    with contextlib.suppress(StoreError), opened(path) as file:
+        return str(access.attribute(file, "run"))
+    return ""
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
+    trust.trust(path, trust.OURS)
+    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        marked = access.attribute(file, "format")
+        if marked == layout.EXPORTED:
+            raise StoreError(
+                f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
+            )
+        if marked == layout.OLDER:
+            raise StoreError(f"{path} was written by an older springcheck: run its scene again")
+        if marked != layout.FORMAT:
+            raise StoreError(f"cannot read {path}: it is HDF5, but no store of springcheck")
+        yield file

@@ -1,0 +1,88 @@
+"""Who measured a piece of a study: host, processor, versions, and the last bits of its arithmetic.
+
+Libraries choose their loops by the processor, and two of these may round differently.  Every process that
+measures does the same few computations once; where their results differ in a bit, so may those of a study,
+and its report says so.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from springcheck import engines
+
+PACKAGES = ("springcheck", "numpy", "numba", "scipy")
+"""Packages on which numbers depend, beside those of the engines."""
+
+BITS = ("elementary functions", "sums", "linear algebra")
+"""What is computed for comparison: the results differ where the processors' libraries round differently."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of what numbers depend on, engines and plug-ins among it; what is not here is left out."""
+    # a call's own files have versions, too; they are part of the command
+    known = [name for name in engines.names() if not engines.is_brought(name)]
+    engines_ = [engines.engine(name).distribution for name in known]
+    plugins = [engines.origin(name).package for name in known]
+    found = {}
+    for name in dict.fromkeys([*PACKAGES, *engines_, *plugins]):
+        try:
+            found[name] = version(name)
+        except (PackageNotFoundError, ValueError):
+            continue
+    return found
+
+
+def bits() -> dict[str, str]:
+    """Digests of computations that round as the processor's libraries do."""
+    # whole numbers over a power of 2: the arguments are the same everywhere
+    x = np.arange(1.0, 4001.0) / 512
+    a = np.sqrt(np.arange(1.0, 1601.0)).reshape(40, 40) / 8 + 9 * np.eye(40)
+    found = {
+        "elementary functions": [np.exp(x), np.log(x), np.sin(x), np.cos(x), np.tanh(x), x**1.3],
+        "sums": [
+            np.array([np.sum(np.sqrt(x[:n])), np.dot(x[:n], np.sqrt(x[:n]))]) for n in range(1, 4000, 97)
+        ],
+        "linear algebra": [a @ a, np.linalg.solve(a, x[:40]), np.linalg.eigvalsh(a + a.T)],
+    }
+    return {
+        f"bits of {name}": sha256(b"".join(map(np.ndarray.tobytes, found[name]))).hexdigest()[:16]
+        for name in BITS
+    }
+
+
+def sentences(pieces: Iterable[tuple[str, Mapping[str, str]]]) -> list[str]:
+    """What is said of who measured these pieces; nothing where it was one kind of processor."""
+    counts: Counter[tuple[str, ...]] = Counter()
+    hosts: dict[tuple[str, ...], dict[str, None]] = {}
+    for _, by in pieces:
+        kind = (by.get("processor", ""), *(by.get(f"bits of {name}", "") for name in BITS))
+        counts[kind] += 1
+        hosts.setdefault(kind, {})[by.get("host", "")] = None
+    if len(counts) < 2:
+        return []
+    kinds = [kind for kind, _ in counts.most_common()]
+    parts = [f"{counts[kind]} on {kind[0]} ({_listed(hosts[kind])})" for kind in kinds]
+    said = [f"Pieces were measured on {len(kinds)} kinds of processors: {'; '.join(parts)}."]
+    most = _listed(hosts[kinds[0]])
+    for kind in kinds[1:]:
+        differ = [name for name, one, other in zip(BITS, kinds[0][1:], kind[1:], strict=True) if one != other]
+        if differ:
+            here = _listed(hosts[kind])
+            said.append(
+                f"The processors differ in a bit: {', '.join(differ)} round otherwise on {here} than on "
+                f"{most}; so may the last digits of what was measured there."
+            )
+    if len(said) == 1:
+        said.append(f"They agree bit for bit in {', '.join(BITS)}, as far as it was tried.")
+    return said
+
+
+def _listed(names: Iterable[str], most: int = 4) -> str:
+    found = list(names)
+    return ", ".join(found[:most]) + (f" and {len(found) - most} more" if len(found) > most else "")
