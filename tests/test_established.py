@@ -21,7 +21,7 @@ from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 
-NAMES = ("mujoco", "pymunk", "rebound", "dart", "lammps")
+NAMES = ("mujoco", "pymunk", "rebound", "dart", "box2d", "rapier", "drake", "lammps")
 LABELS = [f"{name}:{method}" for name in NAMES for method in engines.engine(name).methods]
 
 
@@ -71,6 +71,8 @@ def test_bit_for_bit_the_loops_of_the_blog(label: str, own: str, scene: str, nee
 AMPLITUDES = [
     ("mujoco:joint-spring", 1.020), ("pymunk:force", 2.705), ("pymunk:damped-spring", 0.984),
     ("dart:force", 1.020), ("dart:joint-spring", 0.370),
+    ("box2d:force", 1.020), ("box2d:distance-joint", 0.370),
+    ("rapier:force", 1.472), ("rapier:spring-joint", 0.779), ("drake:prismatic-spring", 1.020),
 ]  # fmt: skip
 
 
@@ -168,6 +170,25 @@ def test_openmms_other_integrators_are_what_they_are_declared_as(name: str) -> N
     for check in conformance.checks_of(engines.engine("openmm")):
         if check.label.method == name:
             check()
+
+
+@pytest.mark.parametrize("name", ["box2d", "rapier", "drake"])
+def test_engines_of_games_and_robots_refuse_what_they_would_move_wrongly(name: str, need: Need) -> None:
+    """Negative steps among it, and for Drake negative stiffness, which would end the process."""
+    need(next(label for label in LABELS if label.startswith(name)))
+    for check in conformance.checks_of(engines.engine(name)):
+        check()
+
+
+@pytest.mark.parametrize(("label", "fast"), [("box2d:force", 21.0), ("rapier:force", 401.0)])
+def test_a_body_that_the_engine_would_slow_down_ends_the_run(label: str, fast: float, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    made = run(replace(scene, p=scene.m * fast), label)
+    assert made.outcome.status == "stopped"
+    assert "moves no body" in made.outcome.message
+    slower = replace(scene, p=scene.m * 0.9 * fast)
+    assert failed(slower, run(slower, label)) == []
 
 
 def test_openmms_langevin_integrator_is_the_middle_one_bit_for_bit() -> None:

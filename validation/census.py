@@ -32,6 +32,11 @@ MEASURED = {
     "rebound:leapfrog": ("position-verlet", None),
     "dart:force": ("semi-implicit-euler", 1.020),
     "dart:joint-spring": ("implicit-euler", 0.370),
+    "box2d:force": ("semi-implicit-euler", 1.020),
+    "box2d:distance-joint": ("implicit-euler", 0.370),
+    "rapier:force": ("force-held-4", 1.472),
+    "rapier:spring-joint": ("implicit-euler-4", 0.779),
+    "drake:prismatic-spring": ("semi-implicit-euler", 1.020),
     "lammps:spring-self": ("velocity-verlet", None),
 }
 """Scheme and amplitude of the blog's spring after 200 steps, by loops written by hand for each engine."""

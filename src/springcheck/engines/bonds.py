@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from springcheck.errors import MethodError
@@ -49,3 +51,30 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
 def lengths(term: Spring, origins: Floats) -> Floats:
     """Rest lengths of bonds between coordinates that are counted from these origins [L]."""
     return np.asarray(np.abs(term.rest - (origins[term.b] - origins[term.a])))
+
+
+def far(scene: Scene) -> float:
+    """A length beyond all of the motion, for a spring that knows its length alone, which has no sign [L].
+
+    A power of 2, so that adding it rounds and nothing else; every rounding of a force is k eps times this.
+    """
+    q, _ = scene.system.amplitudes
+    reach = float(np.max(np.abs(scene.q)) + np.max(q))
+    return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
+
+
+def walls(scene: Scene, label: str) -> Iterator[tuple[int, float, float]]:
+    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
+
+    Raises MethodError where a particle has two, or a stiffness is negative.
+    """
+    taken: set[int] = set()
+    for term in scene.terms:
+        if isinstance(term, WallSpring):
+            for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                if i in taken or k < 0:
+                    raise MethodError(
+                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
+                    )
+                taken.add(i)
+                yield i, k, at

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from springcheck.engines.bonds import walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
-from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, WallSpring
+from springcheck.physics.terms import Damping
 
 
 def version() -> dict[str, str]:
@@ -53,18 +53,11 @@ class _World:
 
     @staticmethod
     def _add_springs(joints: list, scene: Scene) -> None:  # type: ignore[type-arg]
-        taken: set[int] = set()
+        for i, k, at in walls(scene, "dart:joint-spring"):
+            joints[i].setSpringStiffness(0, k)
+            joints[i].setRestPosition(0, at)
         for term in scene.terms:
-            if isinstance(term, WallSpring):
-                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
-                    if i in taken or k < 0:
-                        raise MethodError(
-                            f"dart:joint-spring: a joint has one spring, of stiffness 0 or more; particle {i}"
-                        )
-                    taken.add(i)
-                    joints[i].setSpringStiffness(0, k)
-                    joints[i].setRestPosition(0, at)
-            elif isinstance(term, Damping):
+            if isinstance(term, Damping):
                 for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
                     joints[i].setDampingCoefficient(0, joints[i].getDampingCoefficient(0) + c)
 

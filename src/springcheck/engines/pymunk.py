@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from springcheck.engines.bonds import far
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
@@ -24,16 +25,6 @@ def version() -> dict[str, str]:
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
     """A space with the scene's bodies at its start."""
     return _Space(scene, step, springs=method.name == "damped-spring")
-
-
-def far(scene: Scene) -> float:
-    """A length beyond all of the motion: a `DampedSpring` knows its length alone, which has no sign [L].
-
-    A power of 2, so that adding it rounds and nothing else; every rounding of a force is k eps times this.
-    """
-    q, _ = scene.system.amplitudes
-    reach = float(np.max(np.abs(scene.q)) + np.max(q))
-    return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
 
 
 def arithmetic(label: Label) -> Arithmetic:

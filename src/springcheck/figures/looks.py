@@ -58,6 +58,7 @@ LOOKS = {
     "semi-implicit-euler-drift-kick": Look(_BLUE, DOTTED),
     "semi-implicit-euler-implicit-friction": Look(_BLUE, DASH_DOT),
     "implicit-euler": Look(_PINK, DASH_DOT),
+    "implicit-euler-4": Look(_PINK, DOTTED),
     "velocity-verlet": Look(_GREEN, LONG),
     "position-verlet": Look(_GREEN, DOTTED),
     "respa8": Look(_GREEN, DASH_DOT),
@@ -100,9 +101,12 @@ MARKS = {
     "pymunk": (">", "\u25b7"),
     "rebound": ("*", "\u2606"),
     "dart": ("p", "\u2b20"),
+    "box2d": ("h", "\u2b21"),
+    "rapier": ("X", "\u2716"),
+    "drake": ("P", "\u271a"),
 }
 """Of each engine: the mark on a line, and the character that stands for it in a legend."""
-_OTHER_MARKS = (("h", "\u2b21"), ("X", "\u2716"), ("P", "\u271a"), ("d", "\u2b26"))
+_OTHER_MARKS = (("H", "\u2b22"), ("d", "\u2b26"))
 
 
 def look(scheme: str) -> Look:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from springcheck.schemes.attached import ATTACHED
 from springcheck.schemes.catalogue import (
     FRICTION,
     SCHEMES,
@@ -22,6 +23,7 @@ from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "title", "number", "step", "magnitude_step",
-    "roundings", "amplification", "condition", "invariant", "matrix", "propagate", "propagator", "rotation",
+    "ATTACHED", "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "title", "number", "step",
+    "magnitude_step", "roundings", "amplification", "condition", "invariant", "matrix", "propagate",
+    "propagator", "rotation",
 ]  # fmt: skip

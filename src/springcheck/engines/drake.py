@@ -1,0 +1,107 @@
+"""Drake: bodies on prismatic joints along x in a plant that moves by discrete steps.
+
+Drake evaluates springs at the beginning of a step and takes the damping of joints implicitly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.engines.contract import Engine, Label, Method, Need, Simulation, named
+from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, WallSpring
+
+
+def version() -> dict[str, str]:
+    """Version of Drake."""
+    from importlib.metadata import version
+
+    return {"drake": version("drake")}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A plant with the scene's bodies at its start.  MethodError for a negative step or stiffness."""
+    if step < 0:
+        raise MethodError(f"{label}: Drake takes no negative step")
+    return _Plant(scene, label, step)
+
+
+class _Plant:
+    """A discrete `MultibodyPlant` in motion."""
+
+    def __init__(self, scene: Scene, label: Label, step: float) -> None:
+        from pydrake.multibody import plant as plants
+        from pydrake.multibody import tree
+        from pydrake.systems import analysis
+
+        self.force_calls = 0
+        self._h, self._m, self._done = step, scene.m, 0
+        damping = np.zeros(scene.n)
+        for term in scene.terms:
+            if isinstance(term, Damping):
+                if np.any(term.c < 0):
+                    raise MethodError(f"{label}: a joint of Drake has a damping of 0 or more")
+                np.add.at(damping, term.i, term.c)
+        self._plant = plant = plants.MultibodyPlant(time_step=step)
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+        joints = []
+        for i, (m, c) in enumerate(zip(scene.m.tolist(), damping.tolist(), strict=True)):
+            inertia = tree.SpatialInertia(m, [0.0, 0.0, 0.0], tree.UnitInertia(1.0, 1.0, 1.0))
+            body = plant.AddRigidBody(f"body{i}", inertia)
+            axis = [1.0, 0.0, 0.0]
+            joint = tree.PrismaticJoint(f"joint{i}", plant.world_frame(), body.body_frame(), axis, damping=c)
+            joints.append(plant.AddJoint(joint))
+        for term in scene.terms:
+            if isinstance(term, WallSpring):
+                if np.any(term.k < 0):
+                    raise MethodError(f"{label}: a spring of Drake has a stiffness of 0 or more")
+                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                    plant.AddForceElement(tree.PrismaticSpring(joints[i], at, k))
+        plant.Finalize()
+        self._simulator = analysis.Simulator(plant)
+        self._context = self._simulator.get_mutable_context()
+        plant.SetPositions(self._context, scene.q)
+        plant.SetVelocities(self._context, scene.p / scene.m)
+        self._simulator.Initialize()
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        plant, context = self._plant, self._context
+        for row in range(len(q)):
+            self._done += every
+            # the update of time t, which gives the state of t + h, is made on the way from t
+            self._simulator.AdvanceTo(self._done * self._h)
+            q[row] = plant.GetPositions(context)
+            p[row] = plant.GetVelocities(context)
+        p *= self._m
+        self.force_calls += every * len(q)
+
+
+ENGINE = Engine(
+    name="drake",
+    title="Drake",
+    distribution="drake",
+    module="pydrake",
+    extra="drake",
+    methods=named(
+        Method(
+            name="prismatic-spring",
+            scheme="semi-implicit-euler",
+            about="PrismaticSpring in a discrete plant",
+            terms=frozenset({"wall-spring"}),
+            default=False,
+        ),
+        Method(
+            name="joint-damping",
+            scheme="semi-implicit-euler-implicit-friction",
+            about="PrismaticSpring and damping of the joint in a discrete plant",
+            terms=frozenset({"wall-spring", "damping"}),
+            requires=frozenset({Need.DAMPING}),
+            default=False,
+        ),
+    ),
+    start=start,
+    version=version,
+    step_seconds=3e-5,
+)

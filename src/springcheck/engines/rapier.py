@@ -1,0 +1,124 @@
+"""Rapier (rapier3d): bodies that do not turn, pulled along x by a force or by a spring joint.
+
+Rapier computes in single precision.  It divides a step into as many substeps as its solver has iterations, 4
+unless it is told otherwise: a force that is set before the step is held over them, and a spring joint is
+solved for implicitly in each of them, whatever its damping.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from springcheck.engines.bonds import far, walls
+from springcheck.engines.contract import (
+    EVERY_FORCE,
+    Engine,
+    Label,
+    Method,
+    Simulation,
+    Stopped,
+    named,
+)
+from springcheck.errors import MethodError
+from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.scene import Scene
+
+
+def version() -> dict[str, str]:
+    """Version of rapier3d."""
+    import rapier3d
+
+    return {"rapier3d": rapier3d.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """A world with the scene's bodies at its start.  MethodError for a negative step."""
+    if step < 0:
+        raise MethodError(f"{label}: Rapier takes no negative step")
+    return _World(scene, step, joints=method.name == "spring-joint")
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
+    force = 16 * 2.0**-24 if label.method == "spring-joint" else 2.0**-24
+    return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
+
+
+class _World:
+    """Rapier's world in motion."""
+
+    def __init__(self, scene: Scene, step: float, *, joints: bool) -> None:
+        import rapier3d
+
+        self.force_calls = 0
+        self.off_axis = 0.0
+        self._m = scene.m
+        self._world = world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
+        world.integration_parameters.dt = step
+        self._fastest = world.integration_parameters.normalized_max_linear_velocity
+        self._bodies = []
+        for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
+            body = rapier3d.RigidBody.dynamic(
+                translation=(q, 0, 0), linvel=(p / m, 0, 0), additional_mass=m, can_sleep=False
+            )
+            self._bodies.append(world.add_body(body))
+        self._force = None if joints else scene.system.force
+        if joints:
+            self._add_joints(rapier3d, scene)
+
+    def _add_joints(self, library: Any, scene: Scene) -> None:
+        length, ground = far(scene), self._world.add_body(library.RigidBody.fixed())
+        for i, k, at in walls(scene, "rapier:spring-joint"):
+            joint = library.SpringJointBuilder(length, k, 0.0).local_anchor1((at - length, 0, 0)).build()
+            self._world.impulse_joints.insert(ground, self._bodies[i], joint, True)
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        world, force = self._world, self._force
+        bodies = [world.rigid_bodies[handle] for handle in self._bodies]
+        here, there = np.empty(len(bodies)), np.empty(len(bodies))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row in range(len(q)):
+                for _ in range(every):
+                    if force is not None:
+                        for i, body in enumerate(bodies):
+                            here[i], there[i] = body.translation.x, body.linvel.x
+                        for body, f in zip(bodies, force(here, there * self._m).tolist(), strict=True):
+                            body.reset_forces(True)
+                            body.add_force((f, 0, 0), True)
+                    world.step()
+                    if any(abs(body.linvel.x) > 0.999 * self._fastest for body in bodies):
+                        raise Stopped(row, f"Rapier moves no body faster than {self._fastest:g}")
+                for i, body in enumerate(bodies):
+                    q[row, i], p[row, i] = body.translation.x, body.linvel.x * self._m[i]
+            self.off_axis = max(self.off_axis, *(abs(body.translation.y) for body in bodies))
+        self.force_calls += every * len(q)
+
+
+ENGINE = Engine(
+    name="rapier",
+    title="Rapier",
+    distribution="rapier3d",
+    extra="rapier",
+    methods=named(
+        Method(
+            name="force",
+            scheme="force-held-4",
+            about="RigidBody.add_force before each step of 4 substeps",
+            terms=EVERY_FORCE,
+            default=False,
+        ),
+        Method(
+            name="spring-joint",
+            scheme="implicit-euler-4",
+            about="SpringJoint without damping, its length far from 0, in 4 substeps",
+            terms=frozenset({"wall-spring"}),
+            default=False,
+        ),
+    ),
+    start=start,
+    version=version,
+    arithmetic=arithmetic,
+    step_seconds=2e-5,
+)
