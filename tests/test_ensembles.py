@@ -4,7 +4,10 @@ numbers of a cell are those of `run` on that file."""
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ import pytest
 from springcheck import cli, simulate, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies.ensemble import measure, vary
+from springcheck.studies.ensemble import measure, page, shown, vary
 from springcheck.studies.run import measure as main_job
 from springcheck.studies.team import Processes
 
@@ -157,5 +160,95 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     assert {one.name for one in Path("f").iterdir()} == {
         f"ensemble-{name}.{end}" for name in ("max_error", "energy_drift") for end in ("png", "svg")
     } | {"springcheck-figures.json"}
+    assert cli.main(["plot", path, "-o", "g", "--quantity", "outcome", "--over", "time.step"]) == 0
+    assert Path("g/ensemble-outcome-over-time-step.png").exists()
+    capsys.readouterr()
+    for given, words in (
+        (["--quantity", "max_eror"], "did you mean max_error?"),
+        (["--over", "spring.0.mass"], "one or two of spring.0.stiffness, time.step are needed"),
+        (["--particle", "0"], "--particle goes with a store of run, and it holds ensemble"),
+        (["--particle", "0", "--quantity", "q0"], "--particle and --quantity do not go together"),
+    ):
+        assert cli.main(["plot", path, *given]) == 2
+        said = capsys.readouterr().err
+        assert words in said
+        assert said.count("\n") == 1
     assert cli.main(["run", "spring-uneven", "--workers", "2"]) == 2
     assert "go with --vary" in capsys.readouterr().err
+
+
+def grid_of(counts: tuple[int, ...], value: Callable[..., Any]) -> tuple[Any, dict[str, np.ndarray]]:
+    """A made-up ensemble over a (logarithmic), b, ... and its cells."""
+    axes = [np.geomspace(1, 100, counts[0]), *(np.linspace(0, 1, n) for n in counts[1:])]
+    cells = [x.ravel() for x in np.meshgrid(*axes, indexing="ij")]
+    names = tuple("abc"[: len(counts)])
+    found = SimpleNamespace(fields=names, grid=True, path=None, tallies=())
+    return found, {**dict(zip(names, cells, strict=True)), "max_error": value(*cells)}
+
+
+def test_every_cell_of_a_grid_stands_in_its_map_and_the_tiles_touch() -> None:
+    found, cells = grid_of((5, 4), lambda a, b: a + 1000 * b)
+    (choice,) = shown.choices(found, "max_error")
+    part = shown.reduced(cells, found, choice)
+    assert isinstance(part, shown.Map)
+    np.testing.assert_allclose(part.values, part.x + 1000 * part.y[:, None], rtol=1e-14)
+    u, v = shown.edges(part.x), shown.edges(part.y)
+    # on a logarithmic axis a tile reaches as many times over its cell as below it
+    np.testing.assert_allclose(u[1:] * u[:-1], part.x**2, rtol=1e-13)
+    np.testing.assert_allclose((v[1:] + v[:-1]) / 2, part.y, atol=1e-15)
+
+
+def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
+    found, cells = grid_of((200, 130), lambda a, b: np.log(a))
+    part = shown.reduced(cells, found, shown.choices(found, "max_error")[0])
+    assert isinstance(part, shown.Map)
+    assert part.values.shape == (44, 50)
+    np.testing.assert_allclose(part.values, np.broadcast_to(np.log(part.x), (44, 50)), atol=1e-12)
+    found, cells = grid_of((2001,), lambda a: a * (1 + 0.5 * (np.arange(len(a)) % 2)))
+    line = shown.reduced(cells, found, shown.choices(found, "max_error")[0])
+    assert isinstance(line, shown.Line)
+    assert len(line.x) == shown.MOST_POINTS
+    assert np.all((line.low <= line.x * 1.01) & (line.high >= 1.48 * line.x))
+
+
+def test_fields_that_are_not_shown_have_the_value_in_their_middle() -> None:
+    found, cells = grid_of((5, 4, 3), lambda a, b, c: a + 1000 * b + 1e6 * c)
+    part = shown.reduced(cells, found, shown.choices(found, "max_error", "c,a")[0])
+    assert isinstance(part, shown.Map)
+    assert part.fixed == {"b": pytest.approx(2 / 3)}
+    expected = part.y[:, None] + 2000 / 3 + 1e6 * part.x
+    np.testing.assert_allclose(part.values, expected, rtol=1e-14)
+
+
+def test_random_samples_are_put_together_in_tiles_and_nothing_is_lost() -> None:
+    rng = np.random.default_rng(1)
+    a, b = 10 ** rng.uniform(-3, 3, 5000), rng.uniform(-1, 1, 5000)
+    cells = {"a": a, "b": b, "max_error": np.where(b > 0, 2.0, a)}
+    cells["max_error"][7] = np.nan
+    found: Any = SimpleNamespace(fields=("a", "b"), grid=False)
+    part = shown.reduced(cells, found, shown.Choice(quantity="max_error", over=("a", "b")))
+    assert isinstance(part, shown.Map)
+    assert np.all(part.values[part.y > 0.1] == 2)
+    low = part.values[part.y < -0.1]
+    assert np.all(np.abs(np.log(low / part.x)) < np.log(part.x[1] / part.x[0]))
+    # without a line: the other field differs, too
+    line = shown.reduced(cells, found, shown.Choice(quantity="max_error", over=("a",)))
+    assert isinstance(line, shown.Line)
+    assert np.min(line.low) == np.nanmin(cells["max_error"])
+
+
+def test_the_report_page_shows_an_ensemble_of_two_fields_as_maps_of_powers_of_ten(tmp_path: Path) -> None:
+    given = ["spring.0.stiffness=0.5:50:5:log", "time.step=0.01:0.4:4"]
+    found = measure.record(
+        scenefile.load_scene("spring-uneven"), vary.plan(given), tmp_path / "e.h5", ["own:euler"]
+    )
+    error, _ = page.banks(found)
+    (chart,) = error.charts
+    columns = measure.columns(tmp_path / "e.h5", "own:euler")
+    values = columns["max_error"].reshape(5, 4).T
+    assert chart.tiles
+    for row, numbers in zip(chart.tiles.rows, values, strict=True):
+        for kind, number in zip(row, numbers, strict=True):
+            words = chart.tiles.kinds[kind][0].replace("below", "0 to").replace("and above", "to inf")
+            low, high = map(float, words.split(" to "))
+            assert low <= number <= high

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -217,13 +218,15 @@ def test_one_particle_is_drawn_beside_the_others_figures(
 def test_a_cell_of_an_ensemble_that_explodes_does_not_set_its_scale(fields: tuple[str, ...]) -> None:
     from types import SimpleNamespace
 
-    from springcheck.studies.ensemble import figure
+    from springcheck.studies.ensemble import figure, shown
 
     x = np.arange(1.0, 7.0)
     for error in ([1e-3, 1e-2, 0.1, 1.0, 1e107, 1e300], [-1.0, 0.0, 1e-9, 1.0, 1e107, 1e300]):
         cells = {"own:euler": {"a": x, "b": x[::-1], "max_error": np.array(error)}}
-        found = SimpleNamespace(fields=fields, grid=False)
-        picture = figure.picture(found, cells, "max_error")  # type: ignore[arg-type]
+        found: Any = SimpleNamespace(fields=fields, grid=True)
+        choice = shown.Choice(quantity="max_error", over=fields)
+        parts = {method: shown.reduced(x, found, choice) for method, x in cells.items()}
+        picture = figure.picture(parts, choice)
         picture.draw_without_rendering()
         limits = [axes.get_ylim()[1] for axes in picture.axes]
         assert len(fields) == 2 or error[0] < 0 or max(limits) <= 1e3

@@ -63,11 +63,14 @@ def _plot(options: Namespace) -> int:
     into = Path(options.output or folder.folder_of(path))
     doubts: list[dict[str, str]] = []
     if path.is_file() and (options.columns or not formats.is_hdf5(path) or store.is_foreign(path)):
+        if options.quantity or options.over:
+            raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
         which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
         written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     else:
         doubts = output.doubts(options.file)
-        written, notes = drawing.draw(path, into, particle=options.particle)
+        chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
+        written, notes = drawing.draw(path, into, **chosen)
     output.warn(options.file, doubts)
     if not options.quiet:
         for line in (*notes, *written):
@@ -219,6 +222,10 @@ COMMANDS = (
         _FILE,
         _argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         _argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
+        _argument("--quantity", metavar="NAME",
+                  help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome"),
+        _argument("--over", metavar="FIELD[,FIELD]",
+                  help="of an ensemble: over which of the fields that were varied"),
         _NAMES,
         _STEPS,
         _GROUP,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,17 +13,20 @@ from springcheck import store
 from springcheck.cli import inspect
 from springcheck.errors import SpringcheckError, plain
 from springcheck.figures import folder
+from springcheck.studies import STUDIES
 
 MOST_COORDINATES = 8
 """Coordinates of a file of other programs that are drawn."""
 
 
-def draw(path: Path, into: Path, *, particle: int | None = None) -> tuple[list[Path], list[str]]:
+def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     """Draw the studies of a store into a folder -> the files, and notes on what they leave out.
 
-    `particle`: the motion of this one alone.  Figures of this store are replaced, and nothing else.
-    SpringcheckError where there is nothing to draw.
+    `chosen`: options of a study's figures, as `particle=0`, and only studies that have them are drawn; None
+    chooses nothing.  Figures of this store are replaced, and nothing else.  SpringcheckError where there is
+    nothing to draw.
     """
+    chosen = {name: value for name, value in chosen.items() if value is not None}
     if into.exists() and not into.is_dir():
         raise SpringcheckError(f"{into} is a file: figures need a folder, name another one with -o")
     summary = store.summary(path)
@@ -30,15 +34,17 @@ def draw(path: Path, into: Path, *, particle: int | None = None) -> tuple[list[P
     if not studies:
         rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
         raise SpringcheckError(f"{path}: holds no trajectory and no study to draw{rest}")
-    if particle is not None:
-        studies = [(study, found) for study, found in studies if study.trajectories]
-        if not studies:
-            raise SpringcheckError(f"{path}: --particle goes with trajectories, and it holds none")
-    chosen = {} if particle is None else {"particle": particle}
+    drawn = [(study, found) for study, found in studies if chosen.keys() <= set(study.chooses)]
+    if not drawn:
+        wanted = [study.name for study in STUDIES if chosen.keys() <= set(study.chooses)]
+        what = " and ".join(f"--{name}" for name in chosen)
+        whose = f"goes with a store of {' or '.join(wanted)}" if wanted else "do not go together"
+        held = " and ".join(study.name for study, _ in studies)
+        raise SpringcheckError(f"{path}: {what} {whose}, and it holds {held}")
     notes: list[str] = []
     with tempfile.TemporaryDirectory() as name:
         written: list[Path] = []
-        for study, found in studies:
+        for study, found in drawn:
             written += study.draw(found, Path(name), **chosen)
             notes += getattr(found, "notes", ())
         if not written:

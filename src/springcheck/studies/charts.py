@@ -51,7 +51,7 @@ class Tiles:
     """A map of kinds over two axes of values: a row of numbers of kinds for each y; -1 is none."""
 
     kinds: Sequence[tuple[str, str]]
-    """Name and shade of each: good, wild, limit, refused, wrong."""
+    """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""
     rows: Sequence[Sequence[int]]
     notes: Sequence[Sequence[str]] = ()
     """What is said of each tile beside its kind; left out: nothing."""

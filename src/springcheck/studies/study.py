@@ -51,6 +51,8 @@ class Study:
     """Adds the options of its command."""
     trajectories: bool = False
     """Kept in a store as trajectories, not as a document."""
+    chooses: tuple[str, ...] = ()
+    """Options of `plot` that its figures take."""
     keeps: Callable[[Namespace], bool] = lambda options: True
     """Whether what is finished outlives an interrupt, so that the same command goes on."""
     package: str = ""

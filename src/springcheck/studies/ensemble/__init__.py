@@ -25,4 +25,9 @@ def _options(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the samples (default 0)")
 
 
-STUDY = Study(name="ensemble", about="one scene over many parameters: error, energy, end", options=_options)
+STUDY = Study(
+    name="ensemble",
+    about="one scene over many parameters: error, energy, end",
+    options=_options,
+    chooses=("quantity", "over"),
+)

@@ -2,107 +2,167 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, SymLogNorm
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from springcheck.figures import looks, overlay
 from springcheck.figures.style import save, style
-from springcheck.studies.ensemble.measure import columns
-from springcheck.studies.ensemble.result import Columns, Ensemble
-
-DRAWN = ("max_error", "energy_drift")
-
-MOST = 1e3
-"""Errors and energies, relative to those of the start, beyond which nothing is read off a picture."""
+from springcheck.physics.arrays import Floats
+from springcheck.studies.ensemble.measure import OUTCOMES
+from springcheck.studies.ensemble.result import Ensemble
+from springcheck.studies.ensemble.shown import (
+    MOST,
+    SIZES,
+    TITLES,
+    Choice,
+    Line,
+    Map,
+    choices,
+    edges,
+    even_in_logarithm,
+    parts,
+)  # fmt: skip
 
 FAR = 1e6
 """Where a line that leaves it is drawn to."""
 
+UNKNOWN = "#bbbbbb"
+OUTCOME_COLORS = ("#9ecae1", "#d94801", "#444444")
 
-def draw(found: Ensemble, folder: Path) -> list[Path]:
-    """Draw error and energy over the first one or two fields into a folder; returns the files."""
-    if found.path is None:
-        return []
-    cells = {x.method: columns(found.path, x.method) for x in found.tallies if x.complete}
+
+def draw(
+    found: Ensemble, folder: Path, *, quantity: str | None = None, over: str | None = None
+) -> list[Path]:
+    """Draw error and energy, or one `quantity`, over one or two fields into a folder; returns the files.
+
+    SpringcheckError where there is no such quantity or field.
+    """
     written = []
     with style():
-        for quantity in DRAWN:
-            if any(np.isfinite(x[quantity]).any() for x in cells.values()):
-                written += save(picture(found, cells, quantity), folder, f"ensemble-{quantity}")
+        for choice in choices(found, quantity, over):
+            shown = dict(parts(found, choice)) if found.path else {}
+            if shown:
+                fields = "" if over is None else "-over-" + "-".join(choice.over)
+                written += save(picture(shown, choice), folder, f"ensemble-{choice.quantity}{fields}")
     return written
 
 
-def picture(
-    found: Ensemble, cells: dict[str, Columns], quantity: str, fields: tuple[str, ...] | None = None
-) -> Figure:
-    """A quantity of each method over one field, or over two as a map; the other fields of a grid in their
-    middle."""
-    over = (fields or found.fields)[:2]
-    shown = {method: _slice(x, found, over) for method, x in cells.items()}
-    if len(over) == 1:
-        figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-        axes = figure.add_subplot()
-        for scheme, methods in looks.by_scheme(shown).items():
-            look = looks.look(scheme)
-            for j, method in enumerate(methods):
-                x, sign = shown[method], looks.mark(looks.engine(method))[0]
-                order = np.argsort(x[over[0]])
-                axes.plot(
-                    x[over[0]][order], np.clip(x[quantity][order], -FAR, FAR), label=method, color=look.color,
-                    linestyle=look.linestyle if j == 0 else "none", marker=sign,
-                    markevery=max(1, len(order) // 12), markerfacecolor="white", markersize=4,
-                )  # fmt: skip
-        _scaled(axes, np.concatenate([x[quantity] for x in shown.values()]))
-        axes.set_xlabel(over[0])
-        axes.set_ylabel(quantity.replace("_", " "))
-        overlay.scheme_legend(figure, looks.by_scheme(shown))
-        return figure
-    count = min(3, len(shown))
-    rows = -(-len(shown) // count)
-    figure = Figure(figsize=(3.9 * count, 3.2 * rows + 0.5), layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, count, sharex=True, sharey=True)).ravel()
-    every = np.concatenate([x[quantity] for x in shown.values()])
-    every = every[np.isfinite(every)]
-    # what explodes has the last colour
-    low, high = (float(np.clip(x, -MOST, MOST)) for x in (np.min(every), np.max(every)))
-    norm = LogNorm(low, max(high, 2 * low)) if low > 0 else SymLogNorm(1e-16, vmin=low, vmax=max(high, 1e-15))
-    mark = None
-    for axes, (method, x) in zip(grid, shown.items(), strict=False):
-        mark = axes.scatter(x[over[0]], x[over[1]], c=x[quantity], norm=norm, s=9, marker="s", linewidths=0)
-        for name, scale in zip(over, (axes.set_xscale, axes.set_yscale), strict=True):
-            if np.min(x[name]) > 0 and np.max(x[name]) > 100 * np.min(x[name]):
-                scale("log")
-        axes.set_title(method)
-    for axes in grid[len(shown) :]:
-        axes.set_axis_off()
-    figure.supxlabel(over[0], fontsize=9)
-    figure.supylabel(over[1], fontsize=9)
-    if mark is not None:
-        beyond = "max" if np.max(every) > MOST else "neither"
-        figure.colorbar(mark, ax=list(grid), label=quantity.replace("_", " "), extend=beyond)
+def picture(shown: Mapping[str, Line | Map], choice: Choice) -> Figure:
+    """A quantity of each method over one field, or over two as a map."""
+    lines = {method: one for method, one in shown.items() if isinstance(one, Line)}
+    maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
+    return _lines(lines, choice) if lines else _maps(maps, choice)
+
+
+def _lines(shown: Mapping[str, Line], choice: Choice) -> Figure:
+    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    for scheme, methods in looks.by_scheme(shown).items():
+        look = looks.look(scheme)
+        for j, method in enumerate(methods):
+            one, sign = shown[method], looks.mark(looks.engine(method))[0]
+            low, y, high = (np.clip(values, -FAR, FAR) for values in (one.low, one.y, one.high))
+            if j == 0 and not np.array_equal(low, high, equal_nan=True):
+                axes.fill_between(one.x, low, high, color=look.color, alpha=0.2, linewidth=0)
+            axes.plot(
+                one.x, y, label=method, color=look.color,
+                linestyle=look.linestyle if j == 0 and one.joined else "none", marker=sign,
+                markevery=max(1, len(y) // 12) if one.joined else None, markerfacecolor="white",
+                markersize=4, markeredgewidth=0.9,
+            )  # fmt: skip
+    if all(even_in_logarithm(one.x) for one in shown.values()):
+        axes.set_xscale("log")
+    if choice.quantity == "outcome":
+        axes.set_yticks(range(len(OUTCOMES)), OUTCOMES)
+    else:
+        if choice.quantity == "steps":
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        _scaled(axes, np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)]))
+        axes.set_ylabel(TITLES[choice.quantity])
+    axes.set_xlabel(choice.over[0])
+    said = _fixed(shown)
+    if any(np.any(one.low < one.high) for one in shown.values()):
+        said.append("bands: all cells; lines: their median")
+    axes.set_title("; ".join(said), loc="right", fontsize=8, color="#555555")
+    overlay.scheme_legend(figure, looks.by_scheme(shown))
     return figure
 
 
-def _slice(x: Columns, found: Ensemble, over: tuple[str, ...]) -> Columns:
-    keep = np.ones(len(x[over[0]]), dtype=bool)
-    for name in found.fields:
-        if found.grid and name not in over:
-            values = np.unique(x[name])
-            keep &= x[name] == values[len(values) // 2]
-    return {name: column[keep] for name, column in x.items()}
+def _maps(shown: Mapping[str, Map], choice: Choice) -> Figure:
+    count = min(3, len(shown))
+    rows = -(-len(shown) // count)
+    figure = Figure(figsize=(3.4 * count + 1.2, 2.9 * rows + 0.5), layout="constrained")
+    grid = np.atleast_1d(figure.subplots(rows, count, sharex=True, sharey=True)).ravel()
+    colors, bar = _colors(choice.quantity, [x.values for x in shown.values()])
+    for axes, (method, one) in zip(grid, shown.items(), strict=False):
+        # what is exact has the first colour of a logarithmic scale
+        values = np.maximum(one.values, colors["norm"].vmin or 0) if choice.quantity in SIZES else one.values
+        drawn = axes.pcolormesh(edges(one.x), edges(one.y), values, rasterized=True, **colors)
+        for centres, scale in ((one.x, axes.set_xscale), (one.y, axes.set_yscale)):
+            if even_in_logarithm(centres):
+                scale("log")
+        axes.set_facecolor(UNKNOWN)
+        axes.grid(visible=False)
+        axes.set_title(method)
+    for axes in grid[len(shown) :]:
+        axes.set_axis_off()
+    for axes in grid[max(0, len(shown) - count) : len(shown)]:
+        axes.tick_params(labelbottom=True)
+    said = _fixed(shown)
+    if not all(np.isfinite(one.values).all() for one in shown.values()):
+        said.append("grey: no cell or not known")
+    if said:
+        figure.suptitle("; ".join(said), x=0.02, ha="left", fontsize=8, color="#555555")
+    figure.supxlabel(choice.over[0], fontsize=9)
+    figure.supylabel(choice.over[1], fontsize=9)
+    made = figure.colorbar(drawn, ax=list(grid), **bar)
+    if choice.quantity == "outcome":
+        made.set_ticks(range(len(OUTCOMES)), labels=OUTCOMES)
+    return figure
 
 
-def _scaled(axes: Axes, values: np.ndarray) -> None:
+def _colors(quantity: str, values: Sequence[Floats]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """How the numbers of methods are coloured, for `pcolormesh`, and their scale, for `colorbar`."""
+    every = np.concatenate([x[np.isfinite(x)] for x in values])
+    low, high = float(np.min(every)), float(np.max(every))
+    bar = {"label": TITLES[quantity]}
+    if quantity == "outcome":
+        norm = BoundaryNorm(np.arange(len(OUTCOMES) + 1) - 0.5, len(OUTCOMES))
+        return {"cmap": ListedColormap(OUTCOME_COLORS), "norm": norm}, {}
+    if quantity in SIZES and high > 0:
+        # what explodes has the last colour
+        top, least = min(high, MOST), float(np.min(every[every > 0]))
+        scale = LogNorm if top > 30 * least else Normalize
+        bar["extend"] = "max" if high > top else "neither"
+        return {"cmap": "viridis", "norm": scale(min(least, top / 2), top)}, bar
+    if low < 0:
+        # of methods that explode as much as twice what the middle one shows
+        sizes = sorted(float(np.max(np.abs(x[np.isfinite(x)]))) for x in values)
+        most = min(max(-low, high), 2 * sizes[(len(sizes) - 1) // 2]) or max(-low, high)
+        bar["extend"] = "both" if max(-low, high) > most else "neither"
+        return {"cmap": "RdBu_r", "norm": Normalize(-most, most)}, bar
+    return {"cmap": "viridis", "norm": Normalize(low, high if high > low else low + 1)}, bar
+
+
+def _fixed(shown: Mapping[str, Line | Map]) -> list[str]:
+    """What a picture says of the fields that it does not show."""
+    fixed = next(iter(shown.values())).fixed
+    return ["at " + ", ".join(f"{name} = {value:.4g}" for name, value in fixed.items())] if fixed else []
+
+
+def _scaled(axes: Axes, values: Floats) -> None:
     good = values[np.isfinite(values)]
-    if not len(good):
-        return
+    least = good[good > 0]
     low, high = float(np.min(good)), float(np.max(good))
-    if low > 0 and high > 100 * low:
+    if low >= 0 and len(least) and high > 100 * (first := float(np.min(least))):
         axes.set_yscale("log")
-        axes.set_ylim(low / 2, min(2 * high, max(MOST, 4 * low)))
+        axes.set_ylim(first / 2, min(2 * high, max(MOST, 4 * first)))
     elif max(-low, high) > MOST:
         axes.set_ylim(max(low, -MOST), min(high, MOST))

@@ -40,10 +40,22 @@ class Axis:
 
     field: str
     values: tuple[float, ...] = ()
-    """Of a grid."""
+    """Of a grid that lists them; else they are spaced evenly."""
     low: float = math.nan
     high: float = math.nan
+    count: int = 0
     log: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many values a grid has."""
+        return len(self.values) or self.count
+
+    def at(self, index: np.ndarray) -> Floats:
+        """These values of a grid."""
+        spaced = np.geomspace if self.log else np.linspace
+        found: Floats = np.array(self.values or spaced(self.low, self.high, self.count), np.float64)[index]
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +71,7 @@ class Plan:
     @property
     def cells(self) -> int:
         """How many there are."""
-        return self.samples if self.samples is not None else math.prod(len(x.values) for x in self.axes)
+        return self.samples if self.samples is not None else math.prod(x.size for x in self.axes)
 
     @property
     def chunks(self) -> range:
@@ -70,8 +82,8 @@ class Plan:
         """The values of each field in the cells of a chunk (c,)."""
         cells = np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
         if self.samples is None:
-            index = np.unravel_index(cells, [len(axis.values) for axis in self.axes])
-            return {x.field: np.array(x.values)[j] for x, j in zip(self.axes, index, strict=True)}
+            index = np.unravel_index(cells, [x.size for x in self.axes])
+            return {x.field: x.at(j) for x, j in zip(self.axes, index, strict=True)}
         found = {}
         for j, axis in enumerate(self.axes):
             part = np.random.default_rng([self.seed, j, chunk]).random(CHUNK)[: len(cells)]
@@ -111,17 +123,17 @@ def _axis(text: str, *, random: bool) -> Axis:
             return Axis(field=field, low=low, high=high, log=log)
         if len(parts) == 1:
             values = tuple(float(x) for x in rest.split(","))
-        else:
-            first, last, count = parts[: len(parts) - log]
-            spaced = np.geomspace if log else np.linspace
-            with np.errstate(all="raise"):
-                values = tuple(spaced(float(first), float(last), int(count)).tolist())
-        _finite(*values)
-        if not values:
+            _finite(*values)
+            return Axis(field=field, values=values)
+        first, last, number = parts[: len(parts) - log]
+        found = Axis(field=field, low=float(first), high=float(last), count=int(number), log=log)
+        with np.errstate(all="raise"):
+            _finite(*replace(found, count=min(found.count, 3)).at(np.arange(min(found.count, 3))).tolist())
+        if found.count < 1:
             raise ValueError
     except (ValueError, FloatingPointError):
         raise SpringcheckError(f"--vary {text}: {FORM} is needed") from None
-    return Axis(field=field, values=values)
+    return found
 
 
 def _finite(*values: float) -> None:

@@ -51,5 +51,6 @@ STUDY = Study(
     about="run a scene by every method, compare, store, judge",
     options=_options,
     trajectories=True,
+    chooses=("particle",),
     keeps=lambda options: options.source is None,
 )
