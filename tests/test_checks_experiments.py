@@ -15,6 +15,7 @@ from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.stats import student
 from springcheck.studies.faults import clean, steppers
@@ -135,3 +136,13 @@ def test_a_free_chain_and_an_inverted_spring_pass_the_experiments() -> None:
         quick = [e for e in checks.THOROUGH if e.family in ("map", "repeat")]
         verdicts = checks.judge_thoroughly(scene, "plain", plain("velocity-verlet"), quick)
         assert [v for v in verdicts if v.passed is False] == [], seed
+
+
+def test_a_way_out_that_ends_where_it_began_says_nothing_of_the_way_back() -> None:
+    """h w = 1: six steps of semi-implicit Euler are the identity, in binary numbers to the last bit."""
+    scene = spring(m=1.0, k=1.0, q=1.0, p=0.5, step=1.0, steps=6, title="")
+    bench = checks.Bench(scene=scene, label="", run=plain("semi-implicit-euler"))
+    assert bench.forwards.q[-1] == scene.q
+    verdict = experiments.reversibility(bench)
+    assert verdict.passed is None
+    assert "standing still" in verdict.why

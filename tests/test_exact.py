@@ -251,6 +251,16 @@ def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
     assert known >= 4
 
 
+def test_what_is_stated_of_a_free_chain_does_not_grow_as_if_something_held_it() -> None:
+    """Nine particles, t = 1e5: a translation has no frequency that could be off once it said 0.09."""
+    rng = np.random.default_rng(9)
+    n, a = 9, np.arange(8)
+    link = Spring(a=a, b=a + 1, k=rng.uniform(0.8, 1.4, n - 1), rest=rng.normal(size=n - 1))
+    scene = made(rng.uniform(0.8, 1.2, n), (link,), rng.normal(size=n), rng.normal(size=n), 1e5)
+    assert exact.uncertainty(scene, 1e5) < 1e-4
+    assert exact_check.ratio(scene) < 0.2
+
+
 def test_a_bond_that_has_broken_is_followed_however_far() -> None:
     """Its stretch grows as the logarithm of what overflows; here steepness times length is 11,900."""
     ends = np.array([0]), np.array([1])

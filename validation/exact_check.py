@@ -2,10 +2,24 @@
 
 Claim: the exact solution of every scene lies within the error that springcheck states for it.
 
-Command: python validation/exact_check.py --scenes 10000      (--seed S, --kind NAME; 20 minutes)
+Command: python validation/exact_check.py --scenes 10020      (--seed S, --kind NAME; 15 minutes of a core)
+--file FILE keeps every scene, and goes on where FILE ends.
 
-Expected: one line a kind: scenes, the largest error in units of the stated one (below 1), the median and the
-largest of the stated ones relative to the start.
+It prints one line a kind: scenes, the largest error in units of the stated one (below 1), the median and the
+largest of the stated ones relative to the start:
+
+    bond        1218                0.0181                       8.5e-16  6.0e-08
+    chain       2030                 0.288                       1.4e-14      inf
+    crowd        413                0.0528                       6.1e-16  1.9e-09
+    large         29                0.0515                       4.0e-11  4.3e-04
+    pendulum    1784                0.0517                       2.9e-16  1.3e+02
+    quartic     1930                0.0463                       1.8e-16  9.2e-07
+    spring      2536                0.0619                       2.7e-16  9.4e-06
+    uniform       65              0.000297                       4.2e-13  1.0e-12
+    10005 scenes, 0 beyond the stated error, 15 without a closed form
+
+More than all of the start is stated of chains with springs that push, which leave the range of numbers, and
+of pendulums at rest where they hang, whose start is one rounding of their place.
 
 The route: integers with 288 bits after the point.  Linear scenes by the exponential of their equations
 (Taylor series, then squaring), all others by Taylor series in time, of 48 terms, in steps in which they fall

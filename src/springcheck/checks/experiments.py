@@ -216,8 +216,8 @@ def reversibility(bench: Bench) -> Verdict:
     size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
     off = case.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
     # a motion that stood still after its turning point would end there, with the momenta flipped
-    moved = case.norm.size(out.q[-1] - bench.scene.q, bench.scene.p - out.p[-1])
-    if off <= bound * size and 0 < moved <= bound * size:
+    moved = case.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
+    if off <= bound * size and moved[-1] <= bound * size and np.any(moved > 0):
         return bench.not_applicable("reversibility", "standing still on the way back would pass")
     return bench.verdict(
         "reversibility",

@@ -142,7 +142,9 @@ def normal_modes(system: System) -> Modes:
     w2 = np.where(is_zero, 0, w2)
     pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
     found = _Basis(w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors)
-    return found.modes(system, doubt=none + 4 * system.n * EPS * largest)
+    # translations of free groups have w2 = 0 exactly, where no other mode is taken for one
+    known = is_zero & (np.count_nonzero(is_zero) == len(system.free_groups))
+    return found.modes(system, doubt=np.where(known, none, 4 * system.n * EPS * largest))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
