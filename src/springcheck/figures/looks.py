@@ -82,6 +82,7 @@ LOOKS = {
     "scipy-bdf": Look(_BLACK, TWO_DOTS),
     "scipy-lsoda": Look(_BLACK, SPARSE),
     "rebound-ias15": Look(_GREY, LONG),
+    "heyoka-taylor": Look(_GREY, DASHED),
     "adaptive": Look(_GREY, SOLID),
     "force-held-2": Look(_OLIVE, SOLID),
     "force-held-4": Look(_OLIVE, LONG),

@@ -1,0 +1,130 @@
+"""heyoka: the equations of motion as symbols, integrated by Taylor series of its own order and step.
+
+The right-hand side is compiled from formulas of the terms, so that no force of ours is called.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from springcheck.engines.contract import Engine, Label, Method, Simulation, Stopped, named
+from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
+from springcheck.schemes import Scheme
+
+SMALLEST_TOLERANCE = float(np.finfo(np.float64).eps)
+"""heyoka takes no tolerance below the spacing of double precision at 1."""
+
+
+def version() -> dict[str, str]:
+    """Version of heyoka."""
+    import heyoka
+
+    return {"heyoka": heyoka.__version__}
+
+
+def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
+    """The compiled equations at the scene's start.  MethodError where the scene's size is beyond them."""
+    if scene.n > MOST_PARTICLES:
+        raise MethodError(f"{label}: equations of {scene.n} particles, at most {MOST_PARTICLES} are compiled")
+    return _Series(scene, step)
+
+
+MOST_PARTICLES = 200
+"""Compiling takes a time that grows faster than the number of equations."""
+
+
+def _forces(scene: Scene, library: Any, q: list[Any], v: list[Any]) -> list[Any]:
+    """The force on each particle, as expressions in positions and velocities."""
+    force: list[Any] = [library.expression(0.0) for _ in q]
+    for term in scene.terms:
+        if isinstance(term, WallSpring | Quartic | Cosine):
+            for row, (i, at) in enumerate(zip(term.i.tolist(), term.at.tolist(), strict=True)):
+                u = q[i] - at
+                if isinstance(term, WallSpring):
+                    force[i] -= float(term.k[row]) * u
+                elif isinstance(term, Quartic):
+                    force[i] -= float(term.b[row]) * u * u * u
+                else:
+                    wave = float(term.wave[row])
+                    force[i] -= float(term.depth[row]) * wave * library.sin(wave * u)
+        elif isinstance(term, Spring):
+            ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
+            for a, b, k, rest in ends:
+                pull = k * (q[b] - q[a] - rest)
+                force[a] += pull
+                force[b] -= pull
+        elif isinstance(term, Damping):
+            for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+                force[i] -= c * v[i]
+    return force
+
+
+class _Series:
+    """heyoka's adaptive Taylor integrator in motion."""
+
+    def __init__(self, scene: Scene, step: float) -> None:
+        import heyoka
+
+        self.force_calls = 0
+        self._n, self._m, self._h, self._done = scene.n, scene.m, step, 0
+        q = heyoka.make_vars(*(f"q{i}" for i in range(scene.n)))
+        v = heyoka.make_vars(*(f"v{i}" for i in range(scene.n)))
+        q, v = (x if isinstance(x, list) else [x] for x in (q, v))
+        force = _forces(scene, heyoka, q, v)
+        moved = [(x, y) for x, y in zip(q, v, strict=True)]
+        pushed = [(y, f / float(m)) for y, f, m in zip(v, force, scene.m, strict=True)]
+        self._integrator = heyoka.taylor_adaptive(
+            moved + pushed,
+            state=np.concatenate([scene.q, scene.p / scene.m]).tolist(),
+            tol=max(scene.tolerance, SMALLEST_TOLERANCE),
+        )
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        n = self._n
+        for row in range(len(q)):
+            self._done += every
+            outcome, *_, steps, _, _ = self._integrator.propagate_until(self._done * self._h)
+            if "time_limit" not in str(outcome):
+                raise Stopped(row, f"heyoka says {str(outcome).rpartition('.')[2]}")
+            state = self._integrator.state
+            q[row], p[row] = state[:n], state[n:] * self._m
+            # one evaluation of the series stands for one of the force
+            self.force_calls += steps
+
+
+SCHEMES = (
+    Scheme(
+        name="heyoka-taylor",
+        title="Taylor series, adaptive order and step",
+        order=0,
+        limit=np.inf,
+        symplectic=False,
+        source="Biscani & Izzo, MNRAS 504 (2021) 2614; Jorba & Zou, Exp. Math. 14 (2005) 99",
+    ),
+)
+
+ENGINE = Engine(
+    name="heyoka",
+    title="heyoka",
+    distribution="heyoka",
+    extra="heyoka",
+    methods=named(
+        Method(
+            name="taylor",
+            scheme="heyoka-taylor",
+            about="taylor_adaptive of the scene's equations, propagate_until each frame",
+            adaptive=True,
+            default=False,
+            terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "damping"}),
+        ),
+    ),
+    schemes=SCHEMES,
+    start=start,
+    version=version,
+    step_seconds=1e-5,
+)
