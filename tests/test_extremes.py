@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from springcheck import engines, store
+from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import figure as figures
 from springcheck.studies.extremes import grid, judging, refusals, running
@@ -148,3 +149,29 @@ def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
         wanted = keeping.OUTCOMES.index("not measured")
         assert np.any(np.ma.filled(image.get_array(), -1) == wanted) == bool(count)
         assert [text.get_text() for text in drawn.legends[0].get_texts()].count("not measured") == count
+
+
+def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # few decades, no long runs
+    few = {"LENGTHS": (1,), "FAST_SECONDS": 0.0, "SIZES": (0,), "DECADES": (-20, 0, 20)}
+    for name, value in {**few, "EVERY_DECADE": range(-20, 21)}.items():
+        monkeypatch.setattr(grid, name, value)
+    base = extremes.measure(["own:implicit-euler"])
+    method, path = ["own:implicit-euler"], tmp_path / "fine.h5"
+    fine = extremes.record(path, method, cells=800)
+    assert 800 <= len(fine.cells) < 800 + 41
+    assert set(map(repr, base.cells)) <= set(map(repr, fine.cells))
+    (plane,) = planes(fine.cells)
+    assert plane.decades == tuple(range(-20, 21))
+    assert len(plane.turns) > len(grid.TURNS)
+    assert all(None not in row for row in plane.cells)
+    assert not fine.wrong
+    assert extremes.stored(path).counts() == fine.counts()
+    # few more cells complete the rows that there are
+    some = extremes.measure(method, cells=len(base.cells) + 1)
+    (plane,) = planes(some.cells)
+    assert (plane.decades, len(plane.turns)) == (tuple(range(-20, 21)), len(grid.TURNS))
+    with pytest.raises(SpringcheckError, match="not both"):
+        extremes.record(tmp_path / "no.h5", method, quick=True, cells=10)

@@ -17,6 +17,8 @@ from springcheck.studies.extremes.result import OUTCOMES, Atlas
 
 SHADES = ("#9ecae1", "#fee391", "#d94801", "#bdbdbd", "#000000", "#8c6bb1")
 """Of the outcomes, in their order."""
+MOST_ROWS = 12
+"""Of h w that are written."""
 RARE = "not measured"
 """It stands in the legend only where there is one."""
 
@@ -49,10 +51,13 @@ def picture(atlas: Atlas) -> Figure:
             plane, origin="lower", aspect="auto", cmap=ListedColormap(list(SHADES)), vmin=-0.5,
             vmax=len(SHADES) - 0.5, interpolation="nearest",
         )  # fmt: skip
-        shown = [i for i, force in enumerate(forces) if force in (-200, -50, -20, -10, 0, 10, 20, 50, 200)]
+        # every decade, or decades that lie closer about 0
+        ticks = range(-200, 201, 100) if len(forces) > 100 else (-200, -50, -20, -10, 0, 10, 20, 50, 200)
+        shown = [i for i, force in enumerate(forces) if force in ticks]
         axes.set_xticks(shown, [str(forces[i]) for i in shown], fontsize=7)
+        rows_shown = range(0, len(turns), -(-len(turns) // MOST_ROWS))
         axes.set_yticks(
-            range(len(turns)), [f"{turn:.3g}" for turn in turns], fontsize=6 if len(turns) > 8 else 7
+            rows_shown, [f"{turns[i]:.3g}" for i in rows_shown], fontsize=6 if len(rows_shown) > 8 else 7
         )
         axes.set_title(one.method, fontsize=8.5)
         if j % columns == 0:

@@ -45,11 +45,13 @@ def measure(
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
+    cells: int = 0,
     kept: Keeper | None = None,
 ) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 
-    What an earlier call has finished (`kept`) is taken up.
+    With `cells` the plane of forces is made finer until there are about so many in all.  What an earlier call
+    has finished (`kept`) is taken up.
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
@@ -79,14 +81,37 @@ def measure(
     ]
     if not methods:
         work.append(Piece(key="refusals", what="refusals", measure=refusals.cells, form=CELLS))
+    work += _finer(usable, cells)
     kept = kept or Keeper()
-    cells = [cell for found in kept.results(work) for cell in found]
+    found = [cell for piece in kept.results(work) for cell in piece]
     return Atlas(
-        cells=tuple(cells),
-        windows=tuple(windows(cells)),
+        cells=tuple(found),
+        windows=tuple(windows(found)),
         left_out=tuple(left_out),
         taken_up=kept.taken_up,
     )
+
+
+def _finer(labels: Sequence[Label], cells: int) -> list[Piece]:
+    """Pieces of more cells, as many for each method of fixed step, until there are so many in all."""
+    fixed = [label for label in labels if not engines.method(label).adaptive]
+    here = sum(
+        len(grid.lengths(label)) + sum(map(len, _groups(label)))
+        if label in fixed
+        else len(grid.solver_specs())
+        for label in labels
+    )
+    more = -(-(cells - here) // len(fixed)) if fixed else 0
+    return [
+        Piece(
+            key=f"{label} {j:04d}",
+            what=f"{label}, part {j} of a finer plane",
+            measure=partial(running.cells, label, specs),
+            form=CELLS,
+        )
+        for j, specs in enumerate(grid.finer(more), 1)
+        for label in fixed
+    ]
 
 
 def _cost(label: Label) -> float:
@@ -109,6 +134,7 @@ def record(
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
+    cells: int = 0,
     force: bool = False,
     progress: Progress | None = None,
     team: Team = ALONE,
@@ -119,10 +145,12 @@ def record(
     when the file exists or cannot be written.
     """
     labels = engines.match(tuple(methods) or everything())
-    size = "quick" if quick else "whole"
+    if cells and quick:
+        raise SpringcheckError("--quick and --cells: fewer cells or more, not both")
+    size = "quick" if quick else f"{cells} cells" if cells else "whole"
     command = keeper.command("extremes", labels, size)
     with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
-        atlas = measure(methods, quick=quick, kept=kept)
+        atlas = measure(methods, quick=quick, cells=cells, kept=kept)
         known = {"tables": kept.names, **atlas.document(cells=False)}
         kept.commit("extremes", known)
     return atlas
@@ -135,6 +163,7 @@ def perform(options: Namespace, progress: Progress | None) -> Atlas:
         path,
         options.method,
         quick=options.quick,
+        cells=options.cells,
         force=options.force,
         progress=progress,
         team=teams.of(options),
@@ -161,17 +190,21 @@ def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
     if engines.method(label).adaptive:
         return [solving.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
 
+    found = [cell for specs in _groups(label, quick=quick) for cell in running.cells(label, specs)]
+    return found + solving.last(label, grid.lengths(label, quick=quick))
+
+
+def _groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
+    """Cells of one method of fixed step that can run side by side."""
+
     def together(spec: grid.Spec) -> tuple[str, float]:
         return spec.block, spec.h
 
-    found: list[Cell] = []
     groups = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
     if label.platform not in ("", "Reference"):
         # a context costs such a platform a quarter of a second: the groups with the most cells
         groups = sorted(groups, key=len)[-3 if quick else -24 :]
-    for specs in groups:
-        found += running.cells(label, specs)
-    return found + solving.last(label, grid.lengths(label, quick=quick))
+    return groups
 
 
 def windows(cells: Sequence[Cell]) -> list[Window]:
