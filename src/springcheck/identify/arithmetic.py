@@ -47,25 +47,30 @@ def _misses(matches: list[Match], found: Map) -> Extended:
     b = np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
     if found.slips is not None:
-        d = 1e-7
-        change = np.stack([(_slipped(x, found, d) - _slipped(x, found, -d)) / (2 * d) for x in matches])
+        d = np.longdouble(1e-7)
+        change = (_slipped(matches, found, d) - _slipped(matches, found, -d)) / (2 * d)
         out = out - found.slips[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
     return np.asarray(out)
 
 
-def _slipped(match: Match, found: Map, slip: float) -> Extended:
-    """The map (2, 2) between frames that a match predicts for steps longer by the share `slip`."""
-    one = np.ones(1, dtype=np.longdouble)
-    family = FAMILIES[match.family]
-    out = table((family,)).frame(
-        np.zeros(1, dtype=np.int64),
-        match.a * one * (1 + slip) ** 2,
-        match.g * one * (1 if family.held else 1 + slip),
-        match.log_mass * one - np.log1p(slip),
-        np.array([float(match.stride)]),
-        found.size[1:] / found.size[0],
+def _slipped(matches: list[Match], found: Map, slip: np.longdouble) -> Extended:
+    """The maps (c, 2, 2) between frames that matches predict for steps longer by the share `slip`."""
+    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
+    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
+    held = np.array([family.held for family in families])[which]
+    a, g, log_mass = (
+        np.array([getattr(match, name) for match in matches], np.longdouble)
+        for name in ("a", "g", "log_mass")
     )
-    return np.asarray(out.reshape(2, 2))
+    out = table(families).frame(
+        which,
+        a * (1 + slip) ** 2,
+        np.where(held, g, g * (1 + slip)),
+        log_mass - np.log1p(slip),
+        np.array([float(match.stride) for match in matches]),
+        found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
+    )
+    return np.asarray(out.reshape(-1, 2, 2))
 
 
 TOGETHER = 128

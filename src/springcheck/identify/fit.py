@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,8 @@ class Map:
     """Whether the constant part is no equilibrium: the position gets a constant in every step."""
     slips: Extended | None = None
     """Relative excess (f - 1,) of each step over the mean, where the steps show it."""
+    found: dict[Any, Any] = field(default_factory=dict, init=False)
+    """What was already looked for with this map: searches ask for the same several times."""
     once: bool | None = None
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show."""

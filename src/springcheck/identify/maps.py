@@ -81,10 +81,11 @@ class Table:
     kinds: tuple[tuple[str, Any], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
-
-    @property
-    def damped(self) -> bool:
-        return any(family.damped for family in self.families)
+    damped: bool
+    names: tuple[str, ...]
+    """The families without friction that stand behind those of the table, each once."""
+    bases: tuple[int, ...]
+    """The number of each family's among `names`; -1 for what has no step, or no such family."""
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
@@ -152,6 +153,11 @@ def table(families: tuple[Family, ...]) -> Table:
         for i in (0, 1)
     ]
     inside = np.array([0 if family.stages else 1 for family in families], np.longdouble)
+    own = [
+        "" if family.flow or family.held else family.scheme if family.damped else family.name
+        for family in families
+    ]
+    names = tuple(dict.fromkeys(name for name in own if name))
     kinds = {
         "held": [family.held for family in families],
         "flow": [family.flow for family in families],
@@ -164,6 +170,9 @@ def table(families: tuple[Family, ...]) -> Table:
         rational=(parts[0], parts[1][:2], inside),
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
+        damped=any(family.damped for family in families),
+        names=names,
+        bases=tuple(names.index(name) if name else -1 for name in own),
     )
 
 

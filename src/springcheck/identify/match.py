@@ -32,6 +32,10 @@ HOPELESS = 1e4
 ROUNDS = 20
 """Newton's steps at most; they double the digits of a guess."""
 
+SETTLED = 1e-4, 1e-12
+"""Share of 1 + chi-squared by which another step must promise to bring it down, in double and in extended
+precision."""
+
 OPERATIONS = 8
 """Roundings of double precision that a predicted entry may be off by, in units of `Targets.coherent`."""
 
@@ -142,12 +146,25 @@ def match(
     """
     every = table(families)
     with np.errstate(all="ignore"):
+        target = Targets(maps, terms)
+        errors = np.sqrt(target.variance[:, -1])
+        errors += (
+            terms[0].rounding * (float(np.max(every.path)) + WHOLE) * (strides.stop - 1) * target.largest
+        )
         parts = []
         for of, (found, what) in enumerate(zip(maps, terms, strict=True)):
             turning = bool(rotation(found.entries[None]).angle[0] > 0)
             if not turning and not rotation(found.entries[None]).determinant[0] > 0 and every.damped:
                 continue
-            parts.append((starts if turning else real_starts)(every, found, of, what, strides))
+            error = float(errors[of])
+            asked = "starts", of, families, strides, error, what.mass_unknown, what.growing, far
+            if asked not in found.found:
+                found.found[asked] = (
+                    starts(every, found, of, what, strides, error, far=far)
+                    if turning
+                    else real_starts(every, found, of, what, strides)
+                )
+            parts.append(found.found[asked])
         out: list[dict[tuple[str, int], Match]] = [{} for _ in maps]
         if not parts:
             return out
@@ -157,8 +174,8 @@ def match(
             for name, stride in keys:
                 wanted[[f.name for f in families].index(name), stride] = True
             guesses = guesses[np.flatnonzero(wanted[guesses.which, guesses.s.astype(int)])]
-        target = Targets(maps, terms)
-        _matched(every, target, guesses, out, far=far)
+        if len(guesses.s):
+            _matched(every, target, guesses, out, far=far)
     return out
 
 
@@ -209,7 +226,7 @@ def _refined(
     kept, entries = values.copy(), np.zeros((n, 4), dtype=values.dtype)
     chi2, stalled, errors = np.full(n, np.inf), np.zeros(n, dtype=int), np.zeros((n, 3))
     alive = np.arange(n)
-    tolerance = np.finfo(values.dtype).eps / 8
+    least = SETTLED[values.dtype.itemsize > 8]
     hopeless = 4 if len(free) == 1 else 8
     for turn in range(ROUNDS):
         if not len(alive):
@@ -247,8 +264,12 @@ def _refined(
         limit = 0.5 * np.abs(now[:, 0].astype(np.float64))
         change[:, 0] = np.clip(change[:, 0], -limit, limit)
         values[alive[:, None], free] += change
-        going = (stalled[alive] < 2) & ((turn < hopeless) | (chi2[alive] < HOPELESS))
-        going &= np.any(np.abs(change) > tolerance * np.maximum(np.abs(now[:, free]), 1e-300), axis=1)
+        gain = np.sum(np.matmul(slopes, change[:, :, None])[:, :, 0] ** 2, axis=1)
+        going = (
+            (gain > least * (1 + size))
+            & (stalled[alive] < 2)
+            & ((turn < hopeless) | (chi2[alive] < HOPELESS))
+        )
         alive = alive[going]
     return chi2, kept, entries, errors
 

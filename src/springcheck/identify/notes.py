@@ -8,9 +8,10 @@ import numpy as np
 
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
+from springcheck.identify.maps import table, unit
 from springcheck.identify.record import Record
 from springcheck.identify.search import Joint, coincident, numbers, search, separation
-from springcheck.identify.starts import Terms
+from springcheck.identify.starts import Terms, solved
 from springcheck.text.wording import either
 
 APART = 10.0
@@ -19,6 +20,9 @@ may take five away."""
 
 MOST_DIGITS = 9
 """More digits than single precision has short of double: what needs more, digits do not tell."""
+
+SAME = 1e-12
+"""Distance of the entries of two steps that are the same, in double precision."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -63,7 +67,7 @@ def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_st
         least, nearest = min(((separation(maps, plainest, x), x) for x in others), key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
         pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
-        if digits > MOST_DIGITS:
+        if digits > MOST_DIGITS or _identical(plainest, nearest, free_scale=record.momenta):
             other = "mass" if record.momenta else "stiffness"
             friction = " and friction" if plainest.damped or nearest.damped else ""
             why, told = f"{pair} are the same, on springs of different {other}{friction}", []
@@ -76,6 +80,22 @@ def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_st
     elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
         told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
     return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
+
+
+def _identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
+    """Whether two families have the same step, at the unknowns of each: an identity, which no digits undo."""
+    if one.stride != other.stride:
+        return False
+    both = FAMILIES[one.family], FAMILIES[other.family]
+    for a, b in zip(one.parts, other.parts, strict=True):
+        wanted = np.asarray(unit(both[0], np.array([a.a]), np.array([a.g])), np.float64)
+        start = np.array([b.a]), np.array([b.g])
+        _, _, off = solved(
+            table(both[1:]), np.zeros(1, np.int64), *start, wanted, free_scale=free_scale, turns=6
+        )
+        if not off[0] < SAME:
+            return False
+    return True
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:

@@ -25,6 +25,10 @@ FLOOR = 1 / 8
 this share of the other component's quantum, so that no single number decides a fit."""
 
 
+SETTLED = 1e-12
+"""Share of what is left over that another step of the fit must promise to take away."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Orbit:
     """The orbit closest to all states; `entries` (2, 2) of its map and their `covariance` (4, 4)."""
@@ -56,6 +60,19 @@ def powers(entries: Extended, frames: int) -> Extended:
     return np.asarray(out[:frames])
 
 
+def _slopes(entries: Floats, frames: int) -> Floats:
+    """Change of the powers of entries with each of the four, (4, frames, 2, 2): the upper right block of the
+    powers of [[entries, E], [0, entries]]."""
+    both = np.zeros((4, 4, 4))
+    both[:, :2, :2] = both[:, 2:, 2:] = entries
+    both[np.arange(4), [0, 0, 1, 1], [2, 3, 2, 3]] = 1
+    out = np.broadcast_to(np.eye(4), (1, 4, 4, 4))
+    while len(out) < frames:
+        out = np.concatenate([out, out @ both])
+        both = both @ both
+    return np.asarray(np.moveaxis(out[:frames, :, :2, 2:], 0, 1))
+
+
 def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Orbit | None:
     """Fit states z (f, 2) of size 1, written to within `quanta` (f, 2), from the map of their pairs.
 
@@ -67,16 +84,11 @@ def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Or
     moving = np.any(z != 0, axis=1, keepdims=True)
     weights = np.where(moving & (unit > 0), 1 / np.where(unit > 0, unit, 1), 0.0)
     entries, start, centre = pairs.copy(), z[0].copy(), np.zeros(2, dtype=np.longdouble)
-    delta = np.longdouble(1e-7 / frames)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(8):
             maps = powers(entries, frames)
             columns = [maps[:, :, 0], maps[:, :, 1]]
-            for i in range(4):
-                shift = np.zeros((2, 2), dtype=np.longdouble)
-                shift[i // 2, i % 2] = delta
-                rise = powers(entries + shift, frames) - powers(entries - shift, frames)
-                columns.append(rise @ start / (2 * delta))
+            columns += list(_slopes(entries.astype(np.float64), frames) @ start)
             if constant:
                 columns += [np.broadcast_to(np.eye(2, dtype=np.longdouble)[i], (frames, 2)) for i in (0, 1)]
             missing = z - centre - maps @ start
@@ -95,6 +107,8 @@ def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Or
             entries = entries + change[2:6].reshape(2, 2)
             if constant:
                 centre = centre + change[6:]
+            if np.sum((across.T @ right) ** 2) <= SETTLED * max(float(np.sum(right**2)), 1.0):
+                break
     u = (right - slopes @ change).reshape(frames, 2)
     converged = float(np.sum((across.T @ right) ** 2)) <= 1e-6 * max(float(np.sum(u**2)), 1.0)
     if not converged:

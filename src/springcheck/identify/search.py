@@ -152,6 +152,15 @@ def search(
 
     Those that are accepted, or with `far` all."""
     families = families or distinct(damped=False)
+    asked = "search", families, tuple(terms), strides, far
+    if len(maps) > 1 or asked not in maps[0].found:
+        maps[0].found[asked] = _searched(maps, terms, strides, families, far=far)
+    return list(maps[0].found[asked])
+
+
+def _searched(
+    maps: list[Map], terms: list[Terms], strides: range, families: tuple[Family, ...], *, far: bool
+) -> list[Joint]:
     first = match(families, maps[:1], terms[:1], strides, far=far)[0]
     passing = {key: m for key, m in first.items() if m.accepted} or (first if far else {})
     rest: list[dict[tuple[str, int], Match]] = []

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from itertools import pairwise
 
 import numpy as np
 
-from springcheck.identify.families import FAMILIES, Family
+from springcheck.identify.curves import SIDE, Roots, curves, roots
+from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.maps import Table, table, unit
-from springcheck.physics.arrays import Floats, Integers
+from springcheck.identify.maps import Table, table
+from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.schemes import rotation
 
 NEAR = 3e-4
@@ -20,9 +19,18 @@ NEAR = 3e-4
 GUESSED = 0.05
 """The same for a first guess without friction, which is good to 1e-3 where the family is right."""
 
-LOST = 30.0, 2.0, 0.5, 0.3
-"""The same before each step with friction.  Measured on 2,900 maps of h w up to 1 and up to a third of the
-critical damping: 19, 0.18, 0.006 and 1e-6 at most."""
+LOST = 30.0, 2.0, 0.5, 0.02, 1e-4
+"""The same before each step with friction.  Measured on 2,900 maps of up to 0.9 of the critical damping, all
+but one in a thousand: 26, 1.3, 0.28, 0.0076 and 9e-6 at most."""
+
+DAMPED_LOST = 200.0
+"""The same in units of (g/x)**(2**n) of the guess, n steps later: 100, 60, 70, 100 at most."""
+
+SURE = 1e-6, 1e4
+"""Distance, and how many errors of an entry, beyond which a converged guess cannot be accepted."""
+
+FOUND = 1e-14
+"""Distance of the entries at which a guess is not improved any further."""
 
 CHUNK = 4096
 """Candidates that are solved at once, so that their arrays stay in the processor's cache."""
@@ -74,109 +82,72 @@ def joined(parts: list[Guesses]) -> Guesses:
     return Guesses(*(np.concatenate([getattr(x, name) for x in parts]) for name in Guesses.__slots__))
 
 
-@cache
-def _phases(name: str) -> tuple[tuple[Floats, Floats], ...]:
-    """(phase of one step ascending, h w) over each range of h w in which the phase grows or falls."""
-    family = FAMILIES[name]
-    top = min(family.limit, 60.0) if family.limit > 0 else 4.0
-    # the phase bends like a square root at a limit of stability, so points crowd there
-    x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
-    x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
-    matrices = unit(family, np.square(x), np.zeros(len(x)))
-    found = rotation(matrices)
-    side = np.where(matrices[:, 0, 1] < 0, -1, 1)
-    phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
-    rising = np.diff(phase) > 0
-    ends = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(x) - 1]
-    parts = [(phase[a : b + 1], x[a : b + 1]) for a, b in pairwise(ends)]
-    return tuple((y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Roots:
-    """One-step maps (c, 2, 2) on (q, v h) that a frame's map may be a power of, with their phases."""
-
-    s: Floats
-    turns: Floats
-    phase: Floats
-    entries: Floats
-
-
-def roots(found: Map, strides: range) -> Roots:
-    """The s-th roots of a map that turns, every whole number of unseen turns included."""
-    b = found.unscaled
-    turn = rotation(b[None])
-    angle, d = float(turn.angle[0]), float(turn.determinant[0])
-    side = -1.0 if b[0, 1] < 0 else 1.0
-    s = np.repeat(np.array(strides, dtype=np.float64), [r // 2 + 1 for r in strides])
-    turns = np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
-    phase = (side * angle + 2 * np.pi * turns) / s
-    keep = (phase > 0) & (phase <= np.pi)
-    s, turns, phase = s[keep], turns[keep], phase[keep]
-    generator = side * (b.astype(np.float64) / np.sqrt(d) - np.cos(angle) * np.eye(2)) / np.sin(angle)
-    entries = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * generator
-    entries = entries * (d ** (0.5 / s))[:, None, None]
-    entries[:, 0, 1] *= s
-    entries[:, 1, 0] /= s
-    return Roots(s, turns, phase, entries)
-
-
-def starts(every: Table, found: Map, of: int, terms: Terms, strides: range) -> Guesses:
-    """Guesses for the families of a table on one map, number `of`, that turns."""
+def starts(
+    every: Table, found: Map, of: int, terms: Terms, strides: range, error: float, *, far: bool = False
+) -> Guesses:
+    """Guesses for the families of a table on one map, number `of`, that turns: those that may be near, and
+    with `far` the nearest of each family and stride where none is.  `error` is that of an entry."""
     root = roots(found, strides)
-    det = np.linalg.det(root.entries)
-    bases: dict[str, tuple[Integers, Floats, Floats]] = {}
-
-    def of_phase(base: Family) -> tuple[Integers, Floats, Floats]:
-        """Roots that the undamped family reaches, a there, and -log of what its own area shrinks by."""
-        if base.name not in bases:
-            ranges = _phases(base.name)
-            index, values = [], []
-            for phases, x in ranges:
-                # the first range begins at the first tabulated step; a phase below is as good as proportional
-                low = 0.0 if phases is ranges[0][0] else phases[0]
-                inside = np.flatnonzero((root.phase > low) & (root.phase < phases[-1]))
-                phase = root.phase[inside]
-                index.append(inside)
-                values.append(np.interp(phase, phases, x) * np.minimum(phase / phases[0], 1))
-            at, a = np.concatenate(index), np.square(np.concatenate(values))
-            loss = np.zeros_like(a)
-            if every.damped:
-                loss = np.log(np.abs(np.linalg.det(unit(base, a, np.zeros_like(a))))) - np.log(det[at])
-            bases[base.name] = at, a, loss
-        return bases[base.name]
-
-    parts, flows = [], []
-    for k, family in enumerate(every.families):
-        if family.flow:
-            flows.append(_flow_starts(found, k, of, damped=family.damped, growing=terms.growing))
-            continue
-        if family.held:
-            index = np.arange(len(root.s))
-            a = -root.entries[:, 1, 0]
-            g = (1 - root.entries[:, 0, 0]) / np.where(a == 0, 1, a)
-        elif family.damped:
-            index, a, g = of_phase(FAMILIES[family.scheme])
+    spread = 100 * float(np.sqrt(found.covariance.max()))
+    # roots blow an error up where the motion is near a whole or a half period
+    error /= float(np.sin(rotation(found.entries[None]).angle[0]))
+    most = NEAR + spread if far else min(NEAR + spread, SURE[0] + SURE[1] * error)
+    flows = [
+        _flow_starts(every, found, k, of, terms, GUESSED + spread if far else most)
+        for k, family in enumerate(every.families)
+        if family.flow
+    ]
+    parts = [
+        _held_starts(k, root, LOST[0] if far else SIDE[0] * error + SIDE[1])
+        for k, family in enumerate(every.families)
+        if family.held
+    ]
+    if every.names:
+        curve = curves(every.names)
+        at, index = curve.near(
+            root, error, damped=every.damped, growing=terms.growing, free_scale=terms.mass_unknown, far=far
+        )  # fmt: skip
+        x, loss = curve.at(at, root.phase[index])
+        a, g = np.square(x), np.zeros_like(x)
+        if every.damped:
+            g = loss - root.log_det[index]
             # friction shrinks areas; what grows beyond the scheme's own growth is no friction
             good = (g > 0) | terms.growing
-            index, a, g = index[good], a[good] + np.square(g[good] / 2), g[good]
-        else:
-            index, a, g = of_phase(family)
-        parts.append((np.full(len(index), k), index, a, g))
-    if not parts:
+            at, index, g = at[good], index[good], g[good]
+            a = a[good] + np.square(g / 2)
+        ends = np.searchsorted(curve.base[at], np.arange(len(every.names) + 1))
+        for k, base in enumerate(every.bases):
+            if base >= 0 and ends[base] < ends[base + 1]:
+                own = slice(ends[base], ends[base + 1])
+                parts.append((np.full(ends[base + 1] - ends[base], k), index[own], a[own], g[own]))
+    if not parts and flows:
         return joined(flows)
+    parts = parts or [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
     which, index, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
-    spread = 100 * float(np.sqrt(found.covariance.max()))
-    a, g, off = solved(every, which, a, g, root.entries[index], free_scale=terms.mass_unknown, spread=spread)
+    a, g, off = solved(
+        every, which, a, g, root.entries[index], free_scale=terms.mass_unknown, spread=spread + most
+    )
     s = root.s[index]
-    near = off <= NEAR + spread
-    # of each family and stride without a near root the nearest is kept
-    order = np.lexsort((off, s, which))
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(which[order]) != 0) | (np.diff(s[order]) != 0)
-    kept = np.union1d(np.flatnonzero(near), order[first])
+    near = off <= most
+    kept = np.flatnonzero(near)
+    if far:
+        # of each family and stride without a near root the nearest is kept
+        order = np.lexsort((off, s, which))
+        first = np.ones(len(order), dtype=bool)
+        first[1:] = (np.diff(which[order]) != 0) | (np.diff(s[order]) != 0)
+        kept = np.union1d(kept, order[first])
     turning = Guesses(which, np.full(len(s), of), s, root.turns[index], a, g, near)[kept]
     return joined([turning, *flows])
+
+
+def _held_starts(k: int, root: Roots, room: float) -> tuple[Integers, Integers, Floats, Floats]:
+    """Guesses for a held force, whose step moves the position by the whole velocity."""
+    entries = root.entries
+    off = np.maximum(np.abs(entries[:, 0, 1] - 1), np.abs(entries[:, 1, 1] - 1))
+    index = np.flatnonzero(off <= room)
+    a = -entries[index, 1, 0]
+    g = (1 - entries[index, 0, 0]) / np.where(a == 0, 1, a)
+    return np.full(len(index), k), index, a, g
 
 
 def solved(
@@ -204,17 +175,7 @@ def solved(
     damped = every.damped
     values = np.stack([a, g], axis=1).astype(np.float64)
 
-    def compared(out: Floats) -> Floats:
-        out = out.reshape(-1, 4)
-        if free_scale:
-            product = out[:, 1] * out[:, 2]
-            out = np.stack([out[:, 0], out[:, 3], product], axis=1)
-        return out
-
-    def entries(at: Integers, x: Floats) -> Floats:
-        return compared(np.asarray(every.unit(which[at], x[:, 0], x[:, 1])))
-
-    target = compared(wanted)
+    target = _compared(wanted, free_scale=free_scale)
     size = np.maximum(np.abs(target), 1e-2)
     # every entry counts by its size, the lower left one by that of a
     least = 1e-3 if free_scale else np.array([1e-3, 1e-3, 1e-300, 1e-3])
@@ -223,28 +184,48 @@ def solved(
     alive = np.arange(len(values))
     rounds = turns or (6 if damped else 3)
     with np.errstate(all="ignore"):
+        share = np.abs(g) / np.sqrt(np.abs(a))
         for turn in range(rounds + 1):
-            now, x = entries(alive, values[alive]), values[alive]
-            miss = target[alive] - now
+            x, n = values[alive], len(alive)
+            # the entries, and their change with each unknown
+            shifts = np.zeros((2 + damped if turn < rounds else 1, n, 2))
+            if turn < rounds:
+                shifts[1, :, 0] = 1e-6 * np.abs(x[:, 0])
+            if turn < rounds and damped:
+                shifts[2, :, 1] = 1e-6 * np.maximum(np.abs(x[:, 1]), 1e-3)
+            tried = (x + shifts).reshape(-1, 2)
+            units = every.unit(np.tile(which[alive], len(shifts)), tried[:, 0], tried[:, 1])
+            out = _compared(units, free_scale=free_scale).reshape(len(shifts), n, target.shape[1])
+            miss = target[alive] - out[0]
             off[alive] = np.nan_to_num(np.max(np.abs(miss) / size[alive], axis=1), nan=np.inf)
             if turn == rounds:
                 break
+            good = np.ones(n, dtype=bool)
             if not turns and turn < (len(LOST) if damped else 1):
-                good = off[alive] <= (LOST[turn] if damped else GUESSED) + spread
-                alive, now, x, miss = alive[good], now[good], x[good], miss[good]
+                room = np.minimum(LOST[turn], DAMPED_LOST * share[alive] ** 2**turn) if damped else GUESSED
+                good = off[alive] <= room + spread
+            # what has been found to rounding stays where it is
+            good &= off[alive] > FOUND
+            if not np.all(good):
+                alive, x, miss, out, shifts = alive[good], x[good], miss[good], out[:, good], shifts[:, good]
             if not len(alive):
                 break
-            slopes = []
-            for i in range(1 + damped):
-                delta = 1e-6 * (np.abs(x[:, 0]) if i == 0 else np.maximum(np.abs(x[:, 1]), 1e-3))
-                shifted = x.copy()
-                shifted[:, i] += delta
-                slopes.append((entries(alive, shifted) - now) / delta[:, None] * weight[alive])
+            slopes = [
+                (out[1 + i] - out[0]) / shifts[1 + i, :, [i]].T * weight[alive] for i in range(1 + damped)
+            ]
             change = least_squares(np.stack(slopes, axis=2), miss * weight[alive])[0]
             limit = 0.5 * np.abs(x[:, 0])
             change[:, 0] = np.clip(change[:, 0], -limit, limit)
             values[alive, : 1 + damped] += change
     return values[:, 0], values[:, 1], off
+
+
+def _compared(units: Reals, *, free_scale: bool) -> Floats:
+    """What of one-step maps (c, 2, 2) is compared (c, i): all entries, or what a scale of v leaves alone."""
+    out = np.asarray(units.reshape(-1, 4), np.float64)
+    if free_scale:
+        return np.stack([out[:, 0], out[:, 3], out[:, 1] * out[:, 2]], axis=1)
+    return out
 
 
 def least_squares(slopes: Floats, miss: Floats) -> tuple[Floats, Floats]:
@@ -337,14 +318,19 @@ def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
     return [float(s) for s in strides], [a / s**2 for s in strides]
 
 
-def _flow_starts(found: Map, which: int, of: int, *, damped: bool, growing: bool) -> Guesses:
+def _flow_starts(every: Table, found: Map, which: int, of: int, terms: Terms, most: float) -> Guesses:
     """The exact flow's guesses: it has no step, and turns several times between frames."""
-    turn = rotation(found.entries[None])
-    phase = float(turn.angle[0]) * (-1.0 if found.entries[0, 1] < 0 else 1.0)
+    b = found.unscaled
+    turn = rotation(b[None])
+    phase = float(turn.angle[0]) * (-1.0 if b[0, 1] < 0 else 1.0)
     turns = np.arange(0 if phase > 0 else 1, FLOW_TURNS, dtype=np.float64)
+    damped = every.families[which].damped
     g = -float(np.log(turn.determinant[0])) if damped else 0.0
-    if damped and g <= 0 and not growing:
+    if damped and g <= 0 and not terms.growing:
         turns = turns[:0]
     n = len(turns)
     a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2)
-    return Guesses(np.full(n, which), np.full(n, of), np.ones(n), turns, a, np.full(n, g), np.ones(n, bool))
+    index, gs = np.full(n, which), np.full(n, g)
+    out, target = (_compared(x, free_scale=terms.mass_unknown) for x in (every.unit(index, a, gs), b))
+    near = np.max(np.abs(out - target) / np.maximum(np.abs(target), 1e-2), axis=1, initial=0.0) <= most
+    return Guesses(index, np.full(n, of), np.ones(n), turns, a, gs, near)

@@ -1,0 +1,225 @@
+"""Which families a map may be of, at a glance: their one-step maps over the phase of a step, tabulated.
+
+Without friction a family is a curve over its phase.  A map that turns has one phase for each number of steps
+and of unseen turns, so the entries of its root and those of the curve there can be compared at once, for
+all families and roots.  With friction a map of the same phase differs from the curve by the order of g.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from springcheck.identify.families import FAMILIES
+from springcheck.identify.fit import Map
+from springcheck.identify.maps import unit
+from springcheck.physics.arrays import Floats, Integers
+from springcheck.schemes import rotation
+
+CELLS = 2048
+"""Cells of the phase from 0 to pi, of which the nearest one is looked up."""
+
+APART = 32.0
+"""Distance of the curves on one axis, on which all are interpolated together."""
+
+FAR = 0.005
+"""Distance of the entries of one step from a curve within which a family is looked at, where the nearest one
+is wanted."""
+
+SIDE = 100.0, 3e-6
+"""The same in units of the error of an entry of the roots, and beside it."""
+
+DAMPING = 2.0
+"""The same in units of g, where there is friction, beside it.  Measured on 2,900 maps of up to 0.9 of the
+critical damping: 1.7."""
+
+END = 0.05
+"""Room beside the end of a curve."""
+
+SMALL = 0.05
+"""Size below which an entry is not asked to agree relatively."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roots:
+    """One-step maps (c, 2, 2) on (q, v h) that a frame's map may be a power of, with their phases, sorted
+    by strides; `log_det` (c,) of each."""
+
+    s: Floats
+    turns: Floats
+    phase: Floats
+    entries: Floats
+    log_det: Floats
+
+
+def roots(found: Map, strides: range) -> Roots:
+    """The s-th roots of a map that turns, every whole number of unseen turns included."""
+    b = found.unscaled
+    turn = rotation(b[None])
+    angle, d = float(turn.angle[0]), float(turn.determinant[0])
+    side = -1.0 if b[0, 1] < 0 else 1.0
+    s, turns = _steps(strides)
+    phase = (side * angle + 2 * np.pi * turns) / s
+    keep = (phase > 0) & (phase <= np.pi)
+    s, turns, phase = s[keep], turns[keep], phase[keep]
+    generator = side * (b.astype(np.float64) / np.sqrt(d) - np.cos(angle) * np.eye(2)) / np.sin(angle)
+    entries = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * generator
+    entries = entries * (d ** (0.5 / s))[:, None, None]
+    entries[:, 0, 1] *= s
+    entries[:, 1, 0] /= s
+    return Roots(s, turns, phase, entries, np.log(d) / s)
+
+
+@lru_cache(maxsize=64)
+def _steps(strides: range) -> tuple[Floats, Floats]:
+    """Strides and unseen turns up to half of each."""
+    s = np.repeat(np.array(strides, dtype=np.float64), [r // 2 + 1 for r in strides])
+    return s, np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
+
+
+@cache
+def _ranges(name: str) -> tuple[tuple[Floats, Floats], ...]:
+    """(phase of one step ascending, h w) over each range of h w in which the phase grows or falls."""
+    family = FAMILIES[name]
+    top = min(family.limit, 60.0) if family.limit > 0 else 4.0
+    # the phase bends like a square root at a limit of stability, so points crowd there
+    x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
+    x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
+    matrices = unit(family, np.square(x), np.zeros(len(x)))
+    found = rotation(matrices)
+    side = np.where(matrices[:, 0, 1] < 0, -1, 1)
+    phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
+    rising = np.diff(phase) > 0
+    ends = [0, *(np.flatnonzero(rising[1:] != rising[:-1]) + 1).tolist(), len(x) - 1]
+    parts = [(phase[a : b + 1], x[a : b + 1]) for a, b in pairwise(ends)]
+    ordered = [(y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts]
+    # a phase below that of the first tabulated step is as good as proportional to it
+    first, x = ordered[0]
+    return (np.append(0.0, first), np.append(0.0, x)) if first[0] > 0 else ordered[0], *ordered[1:]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """Curves (b,) of several families: `base` is the number of each one's family."""
+
+    base: Integers
+    low: Floats
+    high: Floats
+    normal: Floats
+    """Entries M11, M12 (2, b, CELLS + 1) of a step, divided by the root of its determinant."""
+    log_det: Floats
+    bend: Floats
+    """How far entries bend within a cell (b, CELLS + 1), which straight lines miss."""
+    axis: Floats
+    """Phases of all curves, `APART` one from the next, with h w and log of the determinant there."""
+    x: Floats
+    loss: Floats
+
+    def near(
+        self, root: Roots, error: float, *, damped: bool, growing: bool, free_scale: bool, far: bool
+    ) -> tuple[Integers, Integers]:
+        """Curves and roots whose entries may agree, known to within `error`; with `far` the nearest root of
+        each stride as well."""
+        at = root.phase * (CELLS / np.pi)
+        cell = np.minimum(at.astype(np.int64), CELLS - 1)
+        part = at - cell
+
+        def between(y: Floats) -> Floats:
+            low = y[..., cell]
+            return np.asarray(low + (y[..., cell + 1] - low) * part)
+
+        size = np.exp(-root.log_det / 2)
+        one, other = root.entries[:, 0, 0] * size, root.entries[:, 0, 1] * size
+        loss = between(self.log_det) - root.log_det
+        room = SIDE[0] * error + SIDE[1] + self.bend[:, cell]
+        if damped:
+            room += DAMPING * np.abs(loss)
+        off = np.abs(between(self.normal[0]) - one)
+        if not free_scale:
+            upper = between(self.normal[1])
+            least = np.minimum(np.abs(upper), np.abs(other)) + SMALL
+            off = np.maximum(off, np.abs(upper - other) / least)
+        if not damped:
+            off = np.maximum(off, np.abs(loss) / 2)
+        good = off <= room
+        if damped and not growing:
+            good &= loss > -room
+        if far and len(root.s):
+            good |= off <= FAR
+            starts = np.flatnonzero(np.diff(root.s, prepend=-1.0))
+            off = np.where(np.isfinite(off), off, np.inf)
+            lowest = np.minimum.reduceat(off, starts, axis=1)
+            good |= off == np.repeat(lowest, np.diff(np.append(starts, len(root.s))), axis=1)
+        which, index = np.nonzero(good & (root.phase > self.low) & (root.phase < self.high))
+        return which, index
+
+    def at(self, which: Integers, phase: Floats) -> tuple[Floats, Floats]:
+        """h w, and log of the determinant of a step, where these curves have these phases."""
+        at = which * APART + phase
+        return np.interp(at, self.axis, self.x), np.interp(at, self.axis, self.loss)
+
+
+@lru_cache(maxsize=64)
+def curves(names: tuple[str, ...]) -> Curves:
+    """The curves of families, by name."""
+    each = [_curve(name) for name in names]
+    base = np.repeat(np.arange(len(names)), [len(x.low) for x in each])
+    shift = np.repeat(APART * np.arange(len(base)), [len(y) for name in names for y, _ in _ranges(name)])
+    return Curves(
+        base,
+        np.concatenate([x.low for x in each]),
+        np.concatenate([x.high for x in each]),
+        np.concatenate([x.normal for x in each], axis=1),
+        np.concatenate([x.log_det for x in each]),
+        np.concatenate([x.bend for x in each]),
+        np.concatenate([x.axis for x in each]) + shift,
+        np.concatenate([x.x for x in each]),
+        np.concatenate([x.loss for x in each]),
+    )
+
+
+@cache
+def _curve(name: str) -> Curves:
+    """The curves of one family, all at the beginning of the axis."""
+    grid = np.linspace(0, np.pi, CELLS + 1)
+    ranges = _ranges(name)
+    ends = np.array([(y[0], y[-1]) for y, _ in ranges])
+    x = np.array([np.interp(grid, *part) for part in ranges])
+    with np.errstate(all="ignore"):
+        for _ in range(3):
+            # straight lines between tabulated steps are not as fine as the comparison
+            better = x + (grid - _phase(name, x)) * np.gradient(x, grid, axis=1)
+            x = np.where(np.isfinite(better) & (np.abs(better - x) < 0.1 * x), better, x)
+        cells = _normal(name, x.ravel())
+    # a root beside the end of a curve lies between two cells of which one is beyond it
+    inside = (grid > ends[:, :1] - np.pi / CELLS) & (grid < ends[:, 1:] + np.pi / CELLS)
+    normal, log_det = (np.where(inside, part.reshape(*part.shape[:-1], *x.shape), np.nan) for part in cells)
+    # at the end of a curve straight lines miss more than can be seen beside it
+    bend = np.full(x.shape, END)
+    rows = np.array([*normal, log_det])
+    bend[:, 1:-1] = np.max(np.abs(rows[..., 2:] - 2 * rows[..., 1:-1] + rows[..., :-2]), axis=0)
+    bend[:, 0] = bend[:, 1]
+    bend = np.where(np.isfinite(bend), bend, END)
+    bend[:, :-1] = np.maximum(bend[:, :-1], bend[:, 1:])
+    axis, every = (np.concatenate([part[i] for part in ranges]) for i in (0, 1))
+    return Curves(
+        np.zeros(len(ranges), dtype=np.int64), ends[:, :1], ends[:, 1:], normal, log_det, bend, axis, every,
+        _normal(name, every)[1],
+    )  # fmt: skip
+
+
+def _phase(name: str, x: Floats) -> Floats:
+    """The phase of a step of h w = x (b, c), between 0 and 2 pi."""
+    out = unit(FAMILIES[name], np.square(x.ravel()), np.zeros(x.size))
+    angle = np.asarray(rotation(out).angle, np.float64)
+    return np.where(out[:, 0, 1] < 0, 2 * np.pi - angle, angle).reshape(x.shape)
+
+
+def _normal(name: str, x: Floats) -> tuple[Floats, Floats]:
+    """M11 and M12 (2, c) over the root of the determinant, and its log (c,)."""
+    out = unit(FAMILIES[name], np.square(x), np.zeros(len(x)))
+    log_det = np.log(np.abs(np.linalg.det(out)))
+    return np.asarray(out[:, 0, :].T * np.exp(-log_det / 2)), log_det
