@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -17,9 +19,10 @@ import pytest
 
 from springcheck import cli, store
 from springcheck.errors import SpringcheckError
-from springcheck.studies import cluster
+from springcheck.studies import cluster, keeper, provenance
 from springcheck.studies.cluster import Cluster
 from springcheck.studies.extremes import measure as extremes
+from springcheck.studies.tables import Rows
 
 if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
     pytest.importorskip("distributed")
@@ -39,17 +42,17 @@ class Farm:
             time.sleep(0.05)
         self.workers = [self.worker() for _ in range(2)]
 
-    def _start(self, what: str, *more: str) -> subprocess.Popen[bytes]:
+    def _start(self, what: str, *more: str, **env: str) -> subprocess.Popen[bytes]:
         arguments = ["--scheduler-file", str(self.file), *more]
         return subprocess.Popen(
             [sys.executable, "-m", "dask", what, *arguments],
             cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])},
+            env=os.environ | env | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])},
         )  # fmt: skip
 
-    def worker(self) -> subprocess.Popen[bytes]:
-        more = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(self.folder))
-        return self._start("worker", *more)
+    def worker(self, threads: int = 1, **env: str) -> subprocess.Popen[bytes]:
+        more = ("--no-nanny", "--no-dashboard", "--local-directory", str(self.folder))
+        return self._start("worker", "--nthreads", str(threads), *more, **env)
 
     def end(self) -> None:
         for process in (*self.workers, self.scheduler):
@@ -67,9 +70,27 @@ def farm(tmp_path: Path) -> Iterator[Farm]:
         made.end()
 
 
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Farm]:
+    """One in which nobody is killed."""
+    made = Farm(tmp_path_factory.mktemp("farm"))
+    try:
+        yield made
+    finally:
+        made.end()
+
+
 def slow(i: int, seconds: float) -> tuple[int, np.ndarray]:
     time.sleep(seconds)
     return os.getpid(), np.sqrt(np.arange(5.0) + i)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pid:
+    pid: int
+
+
+PIDS: Rows[Pid] = Rows(kind=Pid, beginning="pids/", named="", joined=True)
 
 
 def test_killed_and_hanging_workers_lose_nothing(farm: Farm) -> None:
@@ -88,7 +109,8 @@ def test_killed_and_hanging_workers_lose_nothing(farm: Farm) -> None:
     assert len({pid for pid, _ in found.values()}) >= 3
 
 
-def test_a_study_by_a_cluster_is_the_study_by_one_process(farm: Farm, tmp_path: Path) -> None:
+def test_a_study_by_a_cluster_is_the_study_by_one_process(calm: Farm, tmp_path: Path) -> None:
+    farm = calm
     arguments = ["extremes", "--quick", *(x for name in OWN for x in ("--method", name)), "--quiet"]
     assert cli.main([*arguments, "-o", str(tmp_path / "many.h5"), "--cluster", str(farm.file)]) == 0
     extremes.record(tmp_path / "one.h5", OWN, quick=True)
@@ -114,13 +136,52 @@ def test_a_scheduler_that_dies_is_said_and_what_was_finished_is_kept(farm: Farm)
     assert 4 <= len(found) < 40
 
 
+@pytest.mark.parametrize("package", ["openmm", "numpy"])
 def test_a_worker_of_another_version_is_refused_and_named(
-    farm: Farm, monkeypatch: pytest.MonkeyPatch
+    calm: Farm, monkeypatch: pytest.MonkeyPatch, package: str
 ) -> None:
-    right = cluster.version
-    monkeypatch.setattr(cluster, "version", lambda name: "0.0.1" if name == "numpy" else right(name))
-    with pytest.raises(SpringcheckError, match=r"worker tcp://.* has numpy .*here it is 0\.0\.1"):
-        list(Cluster(str(farm.file)).carried_out([partial(slow, 0, 0.0)]))
+    right = provenance.version
+    monkeypatch.setattr(provenance, "version", lambda name: "0.0.1" if name == package else right(name))
+    with pytest.raises(SpringcheckError, match=rf"worker tcp://.* has {package} .*here it is 0\.0\.1"):
+        list(Cluster(str(calm.file)).carried_out([partial(slow, 0, 0.0)]))
+
+
+def test_processors_that_round_otherwise_are_named(calm: Farm, tmp_path: Path) -> None:
+    other = calm.worker(OPENBLAS_CORETYPE="Prescott", NPY_DISABLE_CPU_FEATURES="X86_V4 AVX512_SKX")
+    path = tmp_path / "s.h5"
+    parts = [partial(slow, i, 0.05) for i in range(400)]
+    bits = set()
+    try:
+        with keeper.kept(path, "pids", team=Cluster(str(calm.file))) as kept:
+            with closing(kept.carried_out(parts)) as found:
+                for i, (pid, _), by in found:
+                    kept.keep(PIDS, f"all/{i:03d}", [Pid(pid=pid)], by)
+                    bits.add(by["bits of linear algebra"])
+                    # the third worker is there
+                    if len(bits) > 1:
+                        break
+            kept.commit("pids", {})
+    finally:
+        other.kill()
+        other.wait()
+    said = keeper.who(path)
+    assert "2 kinds of processors" in said[0]
+    assert "differ in a bit" in said[1]
+    assert "linear algebra" in said[1]
+
+
+def test_a_worker_of_many_threads_is_told_how_to_start(calm: Farm) -> None:
+    for worker in calm.workers:
+        worker.send_signal(signal.SIGSTOP)
+    other = calm.worker(threads=3)
+    try:
+        with pytest.raises(SpringcheckError, match=r"worker tcp://.* has 3 threads.*--nthreads 1"):
+            list(Cluster(str(calm.file), patience=2.0).carried_out([partial(slow, i, 0.0) for i in range(9)]))
+    finally:
+        other.kill()
+        other.wait()
+        for worker in calm.workers:
+            worker.send_signal(signal.SIGCONT)
 
 
 def test_no_scheduler_is_one_line(
@@ -130,3 +191,76 @@ def test_no_scheduler_is_one_line(
     for place, words in (("tcp://127.0.0.1:9", "no scheduler answers"), ("nothing.json", "no such file")):
         with pytest.raises(SpringcheckError, match=words):
             list(Cluster(place).carried_out([partial(slow, 0, 0.0)]))
+
+
+SBATCH = """#!/bin/sh
+cp "$1" "$QUEUE/script.$$"
+grep -q refuse "$1" && { echo "sbatch: error: invalid partition specified: refuse" >&2; exit 1; }
+setsid sh "$QUEUE/script.$$" >>"$QUEUE/log" 2>&1 </dev/null &
+echo $! >>"$QUEUE/jobs"
+echo "Submitted batch job $!"
+"""
+SCANCEL = """#!/bin/sh
+for job in "$@"; do kill -TERM -"$job" 2>/dev/null; done
+exit 0
+"""
+SLURM = """
+jobqueue:
+  slurm:
+    cores: 1
+    memory: 1GB
+    queue: {queue}
+    death-timeout: 20
+"""
+
+
+@pytest.fixture
+def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a `sbatch` that starts jobs on this machine, and a `scancel`."""
+    if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
+        pytest.importorskip("dask_jobqueue")
+    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("QUEUE", str(tmp_path))
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+    return tmp_path
+
+
+def described(folder: Path, queue: str = "normal") -> str:
+    file = folder / "slurm.yaml"
+    file.write_text(SLURM.format(queue=queue))
+    return str(file)
+
+
+def test_jobs_of_a_queue_measure_and_none_is_left(queue: Path) -> None:
+    found = dict(Cluster(described(queue)).carried_out([partial(slow, i, 0.0) for i in range(20)]))
+    assert sorted(found) == list(range(20))
+    assert os.getpid() not in {pid for pid, _ in found.values()}
+    jobs = (queue / "jobs").read_text().split()
+    assert jobs
+    end = time.monotonic() + 30
+    while time.monotonic() < end and any(Path(f"/proc/{job}").is_dir() for job in jobs):
+        time.sleep(0.05)
+    assert not any(Path(f"/proc/{job}").is_dir() for job in jobs)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nothing: here", "neither the scheduler file of dask nor a description of one queue"),
+        ("{", "cannot be read"),
+        ("jobqueue: {slrum: {cores: 1, memory: 1GB}}", "no queue 'slrum'.*slurm"),
+        ("jobqueue: {slurm: {cores: 1}}", "must say the memory of a job"),
+        ("jobqueue: {slurm: {cores: 1, memory: 1GB, wall-time: '1:00'}}", "has no 'wall-time'.*walltime"),
+        ("jobqueue: {slurm: {cores: 1, memory: lots}}", "slurm.yaml: "),
+        ("jobqueue: {pbs: {cores: 1, memory: 1GB}}", "there is no qsub here"),
+        (SLURM.format(queue="refuse"), "the jobs were refused: .*invalid partition"),
+    ],
+)
+def test_a_queue_that_is_described_wrongly_is_one_line(queue: Path, text: str, words: str) -> None:
+    (queue / "slurm.yaml").write_text(text)
+    with pytest.raises(SpringcheckError, match=words) as raised:
+        list(Cluster(str(queue / "slurm.yaml")).carried_out([partial(slow, 0, 0.0)]))
+    assert "\n" not in str(raised.value)

@@ -76,7 +76,8 @@ def options(parser: ArgumentParser, default: int = 1) -> None:
     parser.add_argument(
         "--cluster",
         metavar="tcp://HOST:PORT|FILE",
-        help="the workers of a dask scheduler, by its address or its scheduler file",
+        help="the workers of a dask scheduler, by its address or its file; or N workers of a queue such as "
+        "SLURM's, by a file of dask-jobqueue",
     )
 
 
@@ -92,4 +93,4 @@ def of(options: Namespace) -> Team:
         return Processes(options.workers, getattr(options, "brought", None))
     from springcheck.studies.cluster import Cluster
 
-    return Cluster(options.cluster)
+    return Cluster(options.cluster, asked=options.workers)
