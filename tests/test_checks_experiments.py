@@ -17,6 +17,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring
 from springcheck.stats import student
 from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
@@ -146,3 +147,29 @@ def test_a_way_out_that_ends_where_it_began_says_nothing_of_the_way_back() -> No
     verdict = experiments.reversibility(bench)
     assert verdict.passed is None
     assert "standing still" in verdict.why
+
+
+@pytest.mark.parametrize("label", ["openmm:verlet", "lammps:bond"])
+def test_a_livelier_neighbour_does_not_change_from_where_positions_count(label: str, need: Need) -> None:
+    """Engines that know the length of a bond, not its sign, count what may turn over from its rest."""
+    need(label)
+    bond = Spring(a=np.array([0]), b=np.array([1]), k=np.array([2.9]), rest=np.array([1.3]))
+    scene = clean.scene(
+        np.array([1.1, 0.7]), (bond,), np.array([0.3, 1.7]), np.array([1.2, -0.5]), step=0.1, steps=20
+    )
+    bench = checks.Bench(scene=scene, label=label, run=simulate.run)
+    assert experiments.company(bench).passed is True
+
+
+def test_the_drift_of_a_rounded_one_step_matrix_is_named() -> None:
+    """It is legal arithmetic, and its area is off by a rounding at every step: that is found, and said."""
+    scheme = schemes.SCHEMES["semi-implicit-euler"]
+
+    def run(scene: Scene, label: str) -> Trajectory:
+        matrix = schemes.matrix(scheme, h=scene.step, m=scene.m[:1], k=np.array([2.9]))[0]
+        (a, b), (c, d) = matrix.astype(np.float64)
+        return steppers.record(scene, scheme, lambda i, q, p: (a * q + b * p, c * q + d * p))
+
+    verdict = laws.rounding_bias(checks.Bench(scene=laws.SPRING, label="", run=run))
+    assert verdict.passed is False
+    assert "matrix whose elements are rounded" in verdict.why

@@ -197,6 +197,8 @@ def rounding_bias(bench: Bench) -> Verdict:
         f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} a step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)
     )
+    if limit[worst] < off[worst] <= ROUNDED_MATRIX:
+        seen += "; a one-step matrix whose elements are rounded drifts by as much"
     return bench.verdict(
         "rounding-bias",
         float(off[worst]),
@@ -209,6 +211,9 @@ def rounding_bias(bench: Bench) -> Verdict:
 
 
 SHORT = "a run of it ended early"
+
+ROUNDED_MATRIX = 2.0**-52
+"""What elements near 1 of a one-step matrix, each rounded, do to its determinant at most."""
 
 
 def _is_short(bench: Bench, h: float) -> bool:

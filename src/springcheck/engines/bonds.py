@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Floats
+from springcheck.physics import graph
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.schemes import scheme
@@ -18,11 +19,11 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
 
     A bond of a rest length is the scene's spring only while it does not turn over.  Where the energy that the
     scheme can reach rules that out, real positions are used (origins 0).  Elsewhere each particle is counted
-    from its own rest position, so that every bond has rest length 0 and the two laws are one.
+    from its own rest position, so that every bond has rest length 0 and the two laws are one.  Every group of
+    joined particles is looked at by itself: what stands beside it changes no number of it.
 
     Raises MethodError where springs in a ring have no common rest.
     """
-    zero = np.zeros(scene.n)
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
     with np.errstate(over="ignore"):
@@ -30,22 +31,34 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
     bounded = scheme(scheme_name).symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
+    group = graph.lowest_joined(scene.n, scene.terms)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
-    energy = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-
-    def safe(term: Spring) -> bool:
+    energy = _energies(scene, group) * (2 + hw) / (2 - hw) if bounded else np.full(scene.n, np.inf)
+    turning = np.zeros(scene.n, dtype=bool)
+    for term in pairs:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
-        return bool(np.all((term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy))))
-
-    if all(safe(term) for term in pairs):
-        return zero
+        own = group[term.a]
+        safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[own]))
+        turning[own[~safe]] = True
+    if not np.any(turning):
+        return np.zeros(scene.n)
     rest = scene.system.rest_positions
     if rest is None:
         raise MethodError(
             f"{scene.name}: springs in a ring have no common rest, and a bond that may turn over is known by "
             "its length alone"
         )
-    return rest
+    return np.where(turning[group], rest, 0.0)
+
+
+def _energies(scene: Scene, group: Integers) -> Floats:
+    """Energy of every group of joined particles at the start, where its lowest particle stands (n,)."""
+    found = np.asarray(np.bincount(group, scene.p**2 / (2 * scene.m), scene.n), np.float64)
+    for term in scene.terms:
+        if term.is_potential:
+            rows = term.potential(term.elongation(scene.q), *term.parameters)
+            found += np.bincount(group[term.particles[0]], np.broadcast_to(rows, (len(term),)), scene.n)
+    return found
 
 
 def lengths(term: Spring, origins: Floats) -> Floats:

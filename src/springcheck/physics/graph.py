@@ -19,12 +19,12 @@ def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:
             held[term.particles[0][term.rigidity > 0]] = True
     if np.all(held):
         return ()
-    lowest = _lowest_joined(n, terms)
+    lowest = lowest_joined(n, terms)
     loose = np.setdiff1d(lowest, lowest[held])
     return tuple(np.flatnonzero(lowest == r) for r in loose)
 
 
-def _lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
+def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
     """The lowest particle to which each is joined, through however many others (n,)."""
     lowest = np.arange(n)
     # a bond without stiffness joins nothing
