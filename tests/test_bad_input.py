@@ -13,12 +13,9 @@ import springcheck
 from springcheck.cli import main
 from springcheck.physics.scenefile import folder
 
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
+
 SPRING = (folder() / "spring.toml").read_text()
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:

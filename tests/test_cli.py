@@ -21,12 +21,9 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
 from springcheck.text.lines import table
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 OWN = ["--method", "own:*"]
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def document(capsys: pytest.CaptureFixture[str]) -> dict:

@@ -68,6 +68,7 @@ def test_a_function_that_is_not_the_scheme_that_it_claims_fails(
     assert run(capsys, "--stepper", "mine.py:leapfrog", "--scheme", "position-verlet")["status"] == 1
 
 
+@pytest.mark.usefixtures("sketched")
 def test_a_wrong_function_runs_among_the_engines_without_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ from springcheck import engines, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import figure as figures
-from springcheck.studies.extremes import grid, judging, refusals, running
+from springcheck.studies.extremes import grid, judging, refusals, running, solving
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
 from springcheck.studies.extremes.planes import planes
@@ -42,10 +42,9 @@ def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
 
 def test_a_long_run_is_judged_up_to_where_its_forces_leave_fixed_point(need: Need) -> None:
     need("openmm:euler@OpenCL-double")
-    atlas = extremes.measure(["openmm:euler@OpenCL-double"], quick=True)
-    cells = [
-        cell for cell in atlas.cells if cell.block == "length" and "overflows beyond 2**31" in cell.reason
-    ]
+    label = engines.parse("openmm:euler@OpenCL-double")
+    found = solving.last(label, grid.lengths(label, quick=True))
+    cells = [cell for cell in found if "overflows beyond 2**31" in cell.reason]
     assert {cell.parameters["h_w"] for cell in cells} == {1.0, 1.9}
     # growth is (1 + (h w)**2)**(1/2) a step and the first force 2**10: 42 steps, and 28, to 2**31
     assert all("grown out of range after step 0:" in cell.reason for cell in cells)
@@ -58,8 +57,8 @@ def test_the_whole_grid_has_two_thousand_cells_for_three_methods_alone() -> None
 
 def test_fixed_point_forces_have_their_window(need: Need) -> None:
     need("openmm:verlet@OpenCL-double")
-    cells = extremes.of_method(engines.parse("openmm:verlet@OpenCL-double"))
-    (window,) = extremes.windows(cells)
+    forces = [spec for spec in grid.specs() if spec.block == "force"]
+    (window,) = extremes.windows(running.cells(engines.parse("openmm:verlet@OpenCL-double"), forces))
     # 2**-32 of resolution leaves single precision from 2**-8 on; beyond 2**31 the sum overflows
     assert 1e-3 <= window.low <= 1e-2
     assert 1e8 <= window.high <= 1e9

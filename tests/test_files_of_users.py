@@ -18,12 +18,9 @@ from springcheck.physics.scenefile import folder
 from springcheck.store import files, parts
 from test_store import LABELS, scene, trajectory, written
 
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
+
 OWN = ["--method", "own:euler", "--quiet"]
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], *words: str) -> None:

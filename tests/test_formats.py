@@ -20,13 +20,10 @@ from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.trajectory import Trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
+
 SCENE = load_scene("spring-uneven")
 LINE = np.array([0.6, 0.0, 0.8])
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def made(label: str = "own:semi-implicit-euler") -> Trajectory:

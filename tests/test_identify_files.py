@@ -14,6 +14,8 @@ from springcheck.cli import main
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, step
 
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
+
 M, K, H = 3.7, 2.9, 0.31
 FIELDS = {
     *("scheme", "aliases", "step", "stride", "omega", "stiffness", "velocity_offset", "determinant"),
@@ -51,11 +53,6 @@ def written(
             if unit:
                 time.attrs["unit"], value.attrs["unit"] = units[1], unit
     return str(path)
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def document(capsys: pytest.CaptureFixture[str]) -> dict:

@@ -333,7 +333,7 @@ def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points
     need("sundials:bdf")
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = [engines.parse(name) for name in ("own:semi-implicit-euler", "sundials:bdf")]
-    fresh = precision.record(scene, labels, path, budget=1.5)
+    fresh = precision.record(scene, labels, path, budget=0.5)
     kept = precision.stored(path)
     assert kept.points == fresh.points
     assert kept.methods == fresh.methods

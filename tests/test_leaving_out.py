@@ -27,45 +27,46 @@ ENGINES = {"openmm", "ase", "sksundae"}
 HEAVY = {"numba", "matplotlib", "scipy"}
 
 
-def imported(folder: Path, *arguments: str) -> set[str]:
-    """Top-level modules that a command has imported when it ends, in a fresh interpreter."""
+def imported(folder: Path, command: str, *more: str) -> set[str]:
+    """Top-level modules that commands have imported when the last ends, in one fresh interpreter."""
     code = (
-        "import sys; from springcheck.cli import main; status = main(sys.argv[1:]); "
+        "import sys; from springcheck.cli import main; status = max(main(x.split()) for x in sys.argv[1:]); "
         "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr); sys.exit(status)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, command, *more], cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     return set(done.stderr.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize("name", scenes.names())
-def test_own_methods_import_no_engine_and_nothing_heavy(name: str, tmp_path: Path) -> None:
-    scene = scenes.load_scene(name)
-    long = scene.n * scene.steps >= own.WORTH or name in LONG
-    found = imported(tmp_path, "run", name, "--method", "own:*semi*", "--quiet")
-    assert not found & (ENGINES | HEAVY - ({"numba", "scipy"} if long else set()))
+def test_own_methods_import_no_engine_and_nothing_heavy(tmp_path: Path) -> None:
+    short = [name for name in scenes.names() if name != "long-chain"]
+    found = imported(tmp_path, *(f"run {name} --method own:*semi* --quiet" for name in short))
+    assert not found & (ENGINES | HEAVY)
     assert "h5py" in found
 
 
-LONG = {"long-chain"}
-"""Scenes of enough spring-steps for compiling to pay; numba imports scipy."""
+def test_enough_spring_steps_for_compiling_to_pay_import_the_compiler_and_no_engine(tmp_path: Path) -> None:
+    steps = own.WORTH // scenes.load_scene("long-chain").n
+    found = imported(tmp_path, f"run long-chain --steps {steps} --method own:semi-implicit-euler --quiet")
+    assert "numba" in found
+    assert not found & (ENGINES | {"matplotlib"})
 
 
 def test_a_circuit_starts_no_particle_engine(tmp_path: Path, need: Need) -> None:
     need("sundials:bdf")
-    found = imported(tmp_path, "run", "lc-circuit", "--quiet")
+    found = imported(tmp_path, "run lc-circuit --quiet")
     assert "sksundae" in found
     assert not found & {"openmm", "ase", "numba", "matplotlib"}
 
 
 def test_two_hundred_steps_of_a_spring_compile_and_draw_nothing(tmp_path: Path) -> None:
-    assert not imported(tmp_path, "run", "spring", "--quiet") & {"numba", "matplotlib"}
+    assert not imported(tmp_path, "run spring --quiet") & {"numba", "matplotlib"}
 
 
 def test_a_quiet_run_formats_no_tables(tmp_path: Path) -> None:
-    assert "rich" not in imported(tmp_path, "run", "spring", "--method", "own:*", "--quiet")
+    assert "rich" not in imported(tmp_path, "run spring --method own:* --quiet")
 
 
 def stored(name: str, folder: Path, **changes: Any) -> dict[str, tuple[int, ...]]:

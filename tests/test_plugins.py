@@ -18,6 +18,8 @@ from springcheck import engines
 from springcheck.cli import main
 from springcheck.errors import MethodError
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 EXAMPLE = Path(__file__).parent / "plugin-example"
 
 
@@ -83,9 +85,8 @@ def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_
     shutil.rmtree(site)
     assert "PEFRL" not in springcheck(tmp_path, "list").stdout
     for command in ("inspect", "check", "plot", "identify"):
-        read = springcheck(tmp_path, command, "spring-uneven.h5")
-        assert read.returncode in (0, 1), (command, read.stderr)
-        assert "Traceback" not in read.stderr
+        # in this process, which knows nothing of the package either
+        assert main([command, "spring-uneven.h5"]) in (0, 1), command
     again = springcheck(tmp_path, "run", "spring-uneven", "--method", "pefrl:pefrl")
     assert again.returncode == 2
     assert again.stderr.startswith("springcheck: unknown engine 'pefrl'")
@@ -98,11 +99,6 @@ def test_a_scheme_of_its_own_is_carried_out_wrongly_and_the_verdicts_say_so(tmp_
     assert (
         main(["run", "spring", "--method", "pefrl:*", "--engine", str(wrong), "--quiet", "-o", "x.h5"]) == 1
     )
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def test_a_file_is_an_engine_for_one_call_and_runs_beside_the_others(

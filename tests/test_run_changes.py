@@ -15,13 +15,10 @@ from springcheck.studies import keeper
 from springcheck.studies.stability.result import fastest
 from springcheck.text.wording import count, ordinal
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 Captured = pytest.CaptureFixture[str]
 EULER = ["--method", "own:euler"]
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def test_numbers_are_set_as_if_the_file_had_them() -> None:

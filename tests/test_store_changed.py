@@ -16,6 +16,8 @@ from springcheck import store
 from springcheck.cli import main
 from springcheck.store import seal
 
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
+
 LABEL, OTHER = "own:euler", "own:semi-implicit-euler"
 Q = f"/observables/{LABEL}/q/value"
 
@@ -25,11 +27,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("whole") / "s.h5"
     assert main(["run", "spring", "--method", LABEL, "--method", OTHER, "--quiet", "-o", str(path)]) == 0
     return path
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def flipped(whole: Path, name: str) -> None:

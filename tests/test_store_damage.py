@@ -162,6 +162,7 @@ CHANGES = [
 ]
 
 
+@pytest.mark.usefixtures("tried_here")
 @pytest.mark.parametrize(("change", "place"), CHANGES)
 def test_what_is_missing_or_of_the_wrong_kind_is_named(
     whole: Path, tmp_path: Path, change: Callable[[Any], None], place: str
@@ -284,6 +285,7 @@ def test_a_fixed_interval_and_velocities_at_fewer_steps_are_understood(tmp_path:
     assert np.array_equal(found.v, fewer)
 
 
+@pytest.mark.usefixtures("tried_here")
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
