@@ -11,6 +11,7 @@ import pytest
 
 from springcheck import checks, schemes, simulate
 from springcheck.checks import experiments, laws
+from springcheck.checks.stats import student
 from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -18,7 +19,6 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
-from springcheck.stats import student
 from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
 

@@ -19,12 +19,12 @@ from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.experiments import symmetric
+from springcheck.checks.stats import line, student
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
-from springcheck.stats import line, student
 from springcheck.trajectory import Limits, Trajectory, Verdict
 
 HALVINGS = 6

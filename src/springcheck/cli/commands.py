@@ -150,7 +150,7 @@ def _identify(options: Namespace) -> int:
 
 
 def _judge(options: Namespace) -> int:
-    from springcheck.doors import file
+    from springcheck.cli import file
 
     found = file.judge(
         Path(options.file),

@@ -64,7 +64,7 @@ def draw_foreign(
     """Draw the states in a file of any program, as `draw`; `particle` counts coordinates from 0 on."""
     from matplotlib.figure import Figure
 
-    from springcheck.doors.file import states_in
+    from springcheck.cli.file import states_in
     from springcheck.figures.style import save, style
 
     found = states_in(path, columns, step, trajectory)

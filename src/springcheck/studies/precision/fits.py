@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from springcheck import schemes
+from springcheck.checks.stats import line
 from springcheck.engines.contract import Method
 from springcheck.physics.arrays import Arithmetic
-from springcheck.stats import line
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import Point
 

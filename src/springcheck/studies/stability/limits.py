@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from springcheck import engines, schemes, simulate
+from springcheck.checks.stats import line
 from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.stats import line
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
 from springcheck.studies.tables import column
