@@ -14,7 +14,7 @@ from springcheck import schemes, simulate
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
 from springcheck.figures import chain, looks, overlay
-from springcheck.figures.motion import Exact, periods
+from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -239,3 +239,11 @@ def test_a_coarse_atlas_has_no_gaps_between_its_cells() -> None:
     row = np.array([0, gap, gap, 1, gap, gap, 2, gap, gap, gap, gap, gap, gap])
     np.testing.assert_array_equal(figure._filled(row)[:9], [0, 0, 1, 1, 1, 2, 2, 2, 2])
     assert np.isnan(figure._filled(row)[9:]).all()
+
+
+def test_the_exact_solution_is_a_smooth_line_where_a_stiff_motion_decays_at_once() -> None:
+    t, q, p = smooth(scenefile.load_scene("detest-b1"), 0.0, 20.0) or pytest.fail("it has one")
+    assert np.all(np.diff(t) > 0)
+    assert (t[0], t[-1]) == (0, pytest.approx(20))
+    jumps = np.hypot(*(np.diff(x, axis=0) / np.ptp(x, axis=0) for x in (q, p)))
+    assert np.max(jumps) < 0.1

@@ -16,6 +16,8 @@ Motion = tuple[Floats, Floats, Floats]
 
 SMOOTH = 1500
 """Points of a smooth line."""
+SPLIT, CLOSE = 64, 20
+"""Parts of the distance of its points, and distances from its start within which there are more."""
 
 
 def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> Motion | None:
@@ -29,9 +31,11 @@ def smooth(scene: Scene, first: float, last: float) -> Motion | None:
     if not exact.has_true_motion(scene):
         return None
     begin, end = (round(x / abs(scene.step)) for x in (first, last))
-    # some 1500 whole parts of steps, or whole steps
-    finer = max(1, -(-SMOOTH // max(1, end - begin)))
-    steps = np.unique(np.rint(np.linspace(begin * finer, end * finer, SMOOTH + 1)).astype(np.int64))
+    # whole parts of steps, or whole steps; closer where a stiff motion may decay
+    finer = SPLIT * max(1, -(-SMOOTH // max(1, end - begin)))
+    even = np.linspace(begin * finer, end * finer, SMOOTH + 1)
+    close = begin * finer + np.geomspace(1, CLOSE * max(1, even[1] - even[0]), CLOSE * 10)
+    steps = np.unique(np.rint(np.concatenate([even, close[close < even[-1]]])).astype(np.int64))
     q, p = exact.true_motion(scene, steps, scene.step / finer)
     return (
         np.asarray(steps * (scene.step / finer), np.float64),
