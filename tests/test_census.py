@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,8 @@ from springcheck import engines, simulate
 from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
 from springcheck.studies.census import measure as census
+from springcheck.studies.census.result import Entry
+from springcheck.studies.team import Processes
 from springcheck.trajectory import Trajectory
 
 OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
@@ -46,6 +48,21 @@ def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) 
     restored = census.stored("c.h5")
     assert [x.method for x in restored.entries] == list(OWN)
     assert np.array_equal(restored.entries[0].q, simulate.run(load_scene("spring"), OWN[0]).q[:, 0])
+
+
+def test_a_census_by_workers_is_that_of_one_but_for_the_times_which_they_do_not_measure() -> None:
+    assert np.isnan(census.entry(engines.parse(OWN[0])).seconds)
+    two, one = (census.record(f"{n}.h5", OWN, team=Processes(n)) for n in (2, 1))
+    for many, alone in zip(two.entries, one.entries, strict=True):
+        assert min(many.seconds, alone.seconds) > 0
+        assert np.array_equal(many.q, alone.q)
+        same = [{**vars_of(x), "seconds": 0.0, "q": None, "p": None} for x in (many, alone)]
+        assert repr(same[0]) == repr(same[1])
+    assert [x.seconds for x in census.stored("2.h5").entries] == [x.seconds for x in two.entries]
+
+
+def vars_of(entry: Entry) -> dict[str, object]:
+    return {field.name: getattr(entry, field.name) for field in fields(entry)}
 
 
 def test_an_engine_that_is_not_what_it_is_declared_as_is_found_out(

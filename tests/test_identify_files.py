@@ -72,6 +72,23 @@ def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.Captu
     assert found["step"] == pytest.approx(H)
 
 
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_many_files_are_answered_in_their_order(workers: str, capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["a.h5md", "nothing.csv", "c.h5md"]
+    for name, steps in ((names[0], 2), (names[2], 3)):
+        Path(written(*motion("velocity-verlet", steps), kind="f4")).rename(name)
+    assert main(["identify", *names, "--workers", workers]) == 2
+    shown = capsys.readouterr()
+    assert shown.err.count("springcheck: ") == 1
+    assert "nothing.csv" in shown.err
+    assert shown.out.index("a.h5md") < shown.out.index("c.h5md")
+    assert main(["identify", *names, "--workers", workers, "--json"]) == 2
+    found = json.loads(capsys.readouterr().out)["files"]
+    assert [one["file"] for one in found] == names
+    assert [one.get("stride") for one in found] == [2, None, 3]
+    assert "nothing.csv" in found[1]["error"]
+
+
 def test_what_is_stated_is_held_against_the_file(capsys: pytest.CaptureFixture[str]) -> None:
     path = written(*motion(), kind="f4")
     stated = ["--mass", str(M), "--step", str(H), "--json"]

@@ -13,13 +13,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from springcheck import interrupts
 from springcheck.cli import output, slips
 from springcheck.cli.commands import COMMANDS
-from springcheck.errors import SpringcheckError, StoreError, StoreWarning
+from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study
 
@@ -38,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupts.announce(f"interrupted; {what}")
     try:
         slips.look(options)
-        with _said(), _readable(options):
+        read = getattr(options, "file", None) or getattr(options, "source", None)
+        with _said(), output.readable(read):
             if any(getattr(options, name, None) for name in ("engine", "stepper", "program")):
                 from springcheck import doors
 
@@ -73,24 +73,6 @@ def _said() -> Iterator[None]:
 
         warnings.showwarning = show
         yield
-
-
-@contextmanager
-def _readable(options: argparse.Namespace) -> Iterator[None]:
-    """The last line of defence of commands that read a file: whatever is in it, no traceback."""
-    path = getattr(options, "file", None) or getattr(options, "source", None)
-    try:
-        yield
-    except (SpringcheckError, OSError):
-        raise
-    except Exception as error:
-        if path is None or interrupts.seen():
-            raise
-        trace = error.__traceback__
-        while trace is not None and trace.tb_next is not None:
-            trace = trace.tb_next
-        where = f", line {trace.tb_lineno} of {Path(trace.tb_frame.f_code.co_filename).name}" if trace else ""
-        raise StoreError(f"{path}: cannot be made sense of ({type(error).__name__}{where})") from error
 
 
 def _interrupted(what: str) -> int:

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
-from contextlib import redirect_stdout
+from collections.abc import Callable, Sequence
+from contextlib import closing, redirect_stdout
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
 from springcheck.studies.study import JSON, QUIET, Argument, engine_option
+from springcheck.studies.team import processes
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,31 +122,90 @@ def _columns(options: Namespace) -> list[str]:
 
 
 def _identify(options: Namespace) -> int:
-    from springcheck import formats, identify
-    from springcheck.identify import files, text
+    from springcheck import identify
 
-    if (options.file is None) == (options.integrator is None):
+    if bool(options.files) == (options.integrator is not None):
         raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
-    doubts: list[dict[str, str]] = []
     if options.integrator is not None:
         # what it prints is not ours to show
         with redirect_stdout(sys.stderr):
             integrator = identify.load_stepper(options.integrator)
             found = {options.integrator: identify.identify_stepper(integrator)}
-    else:
-        path = Path(options.file)
-        if formats.is_hdf5(path):
-            doubts = output.doubts(options.file)
-        names = "mass", "stiffness", "friction", "step"
-        stated = {name: getattr(options, name) for name in names}
-        found = files.identify_file(path, options.trajectory, _columns(options), stated)
-    output.warn(options.file, doubts)
-    documents = [{"trajectory": label, **one.document()} for label, one in found.items()]
+        return _identified(options.integrator, found, [], options)
+    stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}
+    parts = [
+        partial(_look, file, options.trajectory, _columns(options), stated, len(options.files) > 1)
+        for file in options.files
+    ]
+    if len(parts) > 1:
+        return _many(parts, options)
+    found, doubts = parts[0]()
+    return _identified(options.files[0], found, doubts, options)
+
+
+def _many(parts: Sequence[Callable[[], Any]], options: Namespace) -> int:
+    """What many files hold, in the order in which they were given."""
+    from springcheck.studies.team import Processes
+
+    known: dict[int, Any] = {}
+    documents: list[dict[str, Any]] = []
+    statuses: list[int] = []
+    with closing(Processes(options.workers).carried_out(parts)) as found:
+        for i, answer in found:
+            known[i] = answer
+            while (j := len(statuses)) in known:
+                file, one = options.files[j], known.pop(j)
+                if isinstance(one, str):
+                    print(f"springcheck: {one}", file=sys.stderr)
+                    statuses.append(2)
+                    documents.append({"file": file, "error": one})
+                    continue
+                judged, doubts = one
+                statuses.append(_identified(file, judged, doubts, options, documents))
     if options.json:
-        document = documents[0] if len(documents) == 1 else {"identifications": documents}
-        output.document({**document, "not_trusted": doubts})
-    else:
-        output.show([line for label, one in found.items() for line in text.identification(label, one)])
+        output.document({"files": documents})
+    return 1 if 1 in statuses else max(statuses)
+
+
+def _look(
+    file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None], many: bool
+) -> Any:
+    """What a file holds and what of it cannot be trusted; of one of many also why it cannot be read."""
+    from springcheck import formats
+    from springcheck.identify import files
+
+    try:
+        with output.readable(file):
+            doubts = output.doubts(file) if formats.is_hdf5(Path(file)) else []
+            return files.identify_file(Path(file), trajectory, columns, stated), doubts
+    except (SpringcheckError, OSError) as error:
+        if not many:
+            raise
+        return str(error)
+
+
+def _identified(
+    file: str,
+    found: Any,
+    doubts: list[dict[str, str]],
+    options: Namespace,
+    documents: list[dict[str, Any]] | None = None,
+) -> int:
+    """Show what a file holds -> the exit status; one of many as a document among `documents`."""
+    from springcheck.identify import text
+
+    output.warn(file, doubts)
+    each = [{"trajectory": label, **one.document()} for label, one in found.items()]
+    document = {**(each[0] if len(each) == 1 else {"identifications": each}), "not_trusted": doubts}
+    if documents is not None:
+        documents.append({"file": file, **document})
+    elif options.json:
+        output.document(document)
+    if not options.json:
+        titles = {label: label for label in found}
+        if documents is not None:
+            titles = {label: file if label == Path(file).name else f"{file}, {label}" for label in found}
+        output.show([x for label, one in found.items() for x in text.identification(titles[label], one)])
     fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())
     return 1 if doubts or not fits else 2 if any(one.undecided for one in found.values()) else 0
 
@@ -244,7 +305,7 @@ COMMANDS = (
         _argument("word", metavar="NAME", help="a check, scheme, engine:method, fault or finding"),
     ), engines=True),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
-        _argument("file", metavar="FILE", nargs="?", help="a store, or any H5MD file with velocities"),
+        _argument("files", metavar="FILE", nargs="*", help="stores, or any H5MD files with velocities"),
         _GROUP,
         _argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
         _argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
@@ -253,6 +314,8 @@ COMMANDS = (
         _argument("--step", type=float, metavar="H", help="is this the time step?"),
         _argument("--stepper", dest="integrator", metavar="MODULE:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
+        _argument("--workers", type=processes, default=1, metavar="N",
+                  help="processes that look at many files (default 1)"),
         JSON,
     )),
     Command("judge", "is a trajectory of any program what its scheme promises", _judge, (

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springcheck.errors import plain
+from springcheck import interrupts
+from springcheck.errors import SpringcheckError, StoreError, plain
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -58,6 +59,23 @@ def warn(file: str, found: Sequence[dict[str, str]]) -> None:
         first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
         more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
         print(f"springcheck: {plain(f'{file} is not what was written: {first}', 400)}{more}", file=sys.stderr)
+
+
+@contextmanager
+def readable(file: str | None) -> Iterator[None]:
+    """The last line of defence of commands that read a file: whatever is in it, no traceback."""
+    try:
+        yield
+    except (SpringcheckError, OSError):
+        raise
+    except Exception as error:
+        if file is None or interrupts.seen():
+            raise
+        trace = error.__traceback__
+        while trace is not None and trace.tb_next is not None:
+            trace = trace.tb_next
+        where = f", line {trace.tb_lineno} of {Path(trace.tb_frame.f_code.co_filename).name}" if trace else ""
+        raise StoreError(f"{file}: cannot be made sense of ({type(error).__name__}{where})") from error
 
 
 @contextmanager

@@ -7,6 +7,7 @@ kept, and the same command goes on with another one.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -66,6 +67,7 @@ class Cluster:
             ) from None
         how: dict[str, Any] = {"address": self.place}
         with ExitStack() as stack:
+            stack.enter_context(_silent())
             cluster = None
             if "://" not in self.place:
                 if not Path(self.place).is_file():
@@ -161,15 +163,19 @@ def _answers(
             if future.status == "finished":
                 try:
                     answer = future.result(timeout=patience)
-                except (OSError, TimeoutError):
-                    # the worker that held it is gone
+                except (KeyboardInterrupt, GeneratorExit):
+                    raise
+                except BaseException:
+                    # the worker that held it is gone: CommClosedError, CancelledError, KilledWorker ...
                     _alive(client)
                     give(i)
                     continue
                 done.add(i)
                 yield i, answer
             elif future.status in ("cancelled", "lost"):
-                raise SpringcheckError(GONE)
+                # lost: the worker has died after it had finished
+                _alive(client)
+                give(i)
             else:
                 _alive(client)
                 cause = future.exception(timeout=patience)
@@ -184,6 +190,28 @@ def _answers(
             raise
         raise SpringcheckError(GONE) from error
     client.cancel(list(number), force=True)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """What the library logs of connections that are lost is not for users: what is to be said is raised."""
+    names = (
+        "distributed",
+        "distributed.client",
+        "distributed.core",
+        "tornado",
+        "tornado.application",
+        "asyncio",
+    )
+    loggers = [logging.getLogger(name) for name in names]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
 
 
 def _alive(client: Any) -> None:

@@ -68,7 +68,7 @@ def options(parser: ArgumentParser, default: int = 1) -> None:
     """The options of a study that can be measured by many."""
     parser.add_argument(
         "--workers",
-        type=_count,
+        type=processes,
         default=default,
         metavar="N",
         help=f"processes that measure at the same time (default {default})",
@@ -81,7 +81,8 @@ def options(parser: ArgumentParser, default: int = 1) -> None:
     )
 
 
-def _count(text: str) -> int:
+def processes(text: str) -> int:
+    """A number of them on the command line."""
     if not (text.isdecimal() and 0 < int(text) <= 4096):
         raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to 4096 is needed")
     return int(text)

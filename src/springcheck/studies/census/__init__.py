@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 
+from springcheck.studies import team
 from springcheck.studies.study import Study, store_options
 
 
 def _options(parser: ArgumentParser) -> None:
+    team.options(parser)
     store_options(parser, "census.h5")
 
 

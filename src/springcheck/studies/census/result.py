@@ -40,7 +40,7 @@ class Entry:
     force_calls: float
     """A step, counted by us."""
     seconds: float
-    """A step, on `spring-uneven`, every state read."""
+    """A step, on `spring-uneven`, every state read; with nothing of ours beside it."""
     digest: str
     """Of the states of the blog's spring: equal for engines that agree bit for bit."""
     q: Floats
