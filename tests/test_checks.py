@@ -70,7 +70,7 @@ def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
         run = plain(scene, name)
         size = int(rng.integers(2, 30))
         pieces = [
-            checks.judge(scene, part_of(run, slice(first, first + size + 1)))
+            checks.judge(scene, part_of(run, slice(first, first + size + 1)), piece=True)
             for first in range(0, len(run.t), size)
         ]
         assert alarms(checks.worst(pieces)) == [], seed
@@ -94,7 +94,7 @@ def test_a_slip_between_two_pieces_shows_in_the_closed_form_of_those_after_it() 
     late = slice(50, None)
     q = run.q[late] + 1e-11
     piece = replace(run, t=run.t[late], q=q, p=run.p[late], energy=scene.system.energy(q, run.p[late]))
-    assert any(alarm.startswith("closed-form") for alarm in alarms(checks.judge(scene, piece)))
+    assert any(alarm.startswith("closed-form") for alarm in alarms(checks.judge(scene, piece, piece=True)))
 
 
 @pytest.mark.skipif(not WIDE, reason="where references round like doubles, they are the textbook's numbers")

@@ -11,6 +11,7 @@ import pytest
 import springcheck
 from springcheck import checks, schemes
 from springcheck.physics import exact
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.studies.faults import clean, steppers
@@ -51,6 +52,23 @@ def test_many_springs_on_one_particle_round_once_more_each(label: str, springs: 
     pull = WallSpring(i=np.zeros(springs, int), k=np.full(springs, 2.9 / springs), at=np.full(springs, 0.1))
     scene = one(pull, step=0.1, steps=60)
     assert alarms(checks.judge(scene, springcheck.simulate(scene, label))) == []
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "rk4", "implicit-euler"])
+@pytest.mark.parametrize("every", [1, 7])
+def test_an_engine_may_count_positions_from_its_walls(name: str, every: int) -> None:
+    """They are rounded as numbers of the size of the wall's place, also where the position comes near 0."""
+    scheme = schemes.SCHEMES[name]
+    scene = one(wall(0.1, 1.7), q=0.0005, p=-0.02, step=0.02, steps=14, every=every)
+    own = replace(scene, q=scene.q - 1.7, terms=(wall(0.1),))
+    step, state = steppers.textbook(own, scheme), [own.q, own.p]
+
+    def counted(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
+        state[:] = step(i, *state)
+        return state[0] + 1.7, state[1]
+
+    scene = replace(scene, q=own.q + 1.7)
+    assert alarms(checks.judge(scene, steppers.record(scene, scheme, counted))) == []
 
 
 WELLS: dict[str, tuple[Term, ...]] = {

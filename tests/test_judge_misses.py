@@ -195,3 +195,17 @@ def test_what_an_adaptive_method_says_of_itself_is_not_believed() -> None:
     off = replace(run, q=run.q * (1 + 1e-2), force_calls=10**12)
     off = replace(off, energy=scene.system.energy(off.q, off.p))
     assert "tolerance" in failed(scene, off)
+
+
+def test_a_trajectory_without_its_first_frame_is_none_of_the_scene() -> None:
+    """Of a well every later frame may be right although the motion began elsewhere."""
+    well = Quartic(i=np.array([0]), b=np.array([2.3]), at=np.zeros(1))
+    scene = clean.scene(np.array([1.3]), (well,), np.array([0.9]), np.array([0.4]), step=0.05, steps=30)
+    scheme = schemes.SCHEMES["velocity-verlet"]
+    run = steppers.record(scene, scheme, steppers.textbook(scene, scheme), start=(scene.q + 1, scene.p))
+    cut = replace(run, t=run.t[1:], q=run.q[1:], p=run.p[1:], energy=None)
+    asked = replace(scene, quantities=("q", "p"))
+    assert [v.check for v in springcheck.judge(asked, cut) if v.passed is False] == ["start"]
+    # a later piece of a long run says so
+    later = {v.check: v.passed for v in checks.judge(asked, cut, piece=True)}
+    assert later["start"] is None

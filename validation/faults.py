@@ -23,15 +23,18 @@ from springcheck.studies.faults.measure import judged_labels, study
 from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.team import Processes
 
+SHARPEST = 5
+"""Checks of each fault whose limits are printed, the smallest first."""
+
 
 def table(found: FaultReport) -> list[str]:
     """The README's table, as Markdown."""
-    lines = ["| fault | size | seen from | by | rejected by |", "|---|---|---|---|---|"]
+    lines = ["| fault | size | seen from | rejected by |", "|---|---|---|---|"]
     for result in found.results:
-        best = min(result.limits, key=lambda name: result.limits[name], default="")
+        best = sorted(result.limits.items(), key=lambda item: item[1])[:SHARPEST]
         size = "" if result.size is None else f"{result.size:.0e}"
-        limit = f"{result.limits[best]:.1e}" if best else ""
-        lines.append(f"| {result.about} | {size} | {limit} | {best} | {', '.join(result.rejected_by)} |")
+        limits = ", ".join(f"{limit:.1e} {name}" for name, limit in best)
+        lines.append(f"| {result.about} | {size} | {limits} | {', '.join(result.rejected_by)} |")
     return lines
 
 

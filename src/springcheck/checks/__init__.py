@@ -112,9 +112,14 @@ def judge_thoroughly(
     return verdicts
 
 
-def judge(scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS) -> list[Verdict]:
-    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None."""
-    case = Case(trajectory=trajectory, scene=scene)
+def judge(
+    scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS, *, piece: bool = False
+) -> list[Verdict]:
+    """Every check of a trajectory of this scene, or of a piece of one, which may begin after the start.
+
+    What does not apply is among them, `passed` None.
+    """
+    case = Case(trajectory=trajectory, scene=scene, piece=piece)
     return [check(case) for check in checks]
 
 

@@ -29,6 +29,8 @@ class Case:
 
     trajectory: Trajectory
     scene: Scene
+    piece: bool = False
+    """Whether the trajectory may begin after the start, as the later pieces of a long one do."""
 
     @cached_property
     def _made(self) -> dict[Callable[[Case], Any], Any]:
@@ -296,10 +298,15 @@ class Case:
         return np.asarray(q), np.asarray(self.modes.spread(reach) * self.modes.root_m)
 
     @cached_property
-    def rest_positions(self) -> Floats:
-        """Where springs between particles have their rest lengths, 0 where they cannot agree (n,)."""
-        found = self.judged.system.rest_positions
-        return np.zeros(self.scene.n) if found is None else found
+    def origins(self) -> Floats:
+        """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
+        have their rest lengths, or from the nearest place to which a term of its own ties a particle."""
+        rest = self.judged.system.rest_positions
+        sites = np.full(self.scene.n, np.inf)
+        for term in self.judged.terms:
+            if term.bodies == 1 and term.origin:
+                np.minimum.at(sites, term.particles[0], np.abs(getattr(term, term.origin)))
+        return np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
 
     @cached_property
     def norm(self) -> Norm:

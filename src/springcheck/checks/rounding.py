@@ -55,7 +55,7 @@ def of_step(
     # the scheme's own step, which it is compared with, rounds as well
     state = how.state + ROUNDOFF
     # an engine may count positions from where the springs rest, and so round those
-    of_q, of_p = state * (size_q + np.abs(case.rest_positions)), state * size_p
+    of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
         of_p = of_p + how.state * m * (q + size_q) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products

@@ -199,7 +199,7 @@ def judge(
     for pieces in _together(streams):
         judged_frames += max(len(piece.t) for piece in pieces.values())
         for name, piece in pieces.items():
-            verdicts[name].append(checks.judge(scene, piece))
+            verdicts[name].append(checks.judge(scene, piece, piece=True))
             if name not in failed and any(_tells(v) for v in verdicts[name][-1]):
                 failed[name] = piece
             tallies[name].add(piece)
