@@ -17,7 +17,7 @@ from typing import Any
 
 from springcheck import interrupts
 from springcheck.cli import output, slips
-from springcheck.cli.commands import COMMANDS
+from springcheck.cli.commands import COMMANDS, Command
 from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study
@@ -28,7 +28,8 @@ INTERRUPTED = interrupts.STATUS
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 a mistake."""
     try:
-        options = _parser().parse_args(arguments)
+        words = sys.argv[1:] if arguments is None else arguments
+        options = _parser(words).parse_args(words)
     except OSError as error:
         return _mistake(error)
     command: Callable[[argparse.Namespace], int] = options.command
@@ -93,7 +94,8 @@ def _mistake(error: SpringcheckError | OSError) -> int:
     return 2
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """Every command, with its options where these words name it: setting up all of them takes long."""
     parser = slips.Parser(
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
@@ -103,15 +105,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
-    for study in STUDIES:
-        parser_of = commands.add_parser(study.name, help=study.about)
-        study.options(parser_of)
-        parser_of.set_defaults(command=partial(_study, study), keeps=study.keeps)
-
-    for command in COMMANDS:
-        parser_of = commands.add_parser(command.name, help=command.about)
-        command.options(parser_of)
-        parser_of.set_defaults(command=command.perform)
+    known: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
+    for one in known:
+        parser_of = commands.add_parser(one.name, help=one.about)
+        if one.name in words:
+            one.options(parser_of)
+        if isinstance(one, Study):
+            parser_of.set_defaults(command=partial(_study, one), keeps=one.keeps)
+        else:
+            parser_of.set_defaults(command=one.perform)
     return parser
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact import linear, wells
+from springcheck.physics.exact import linear
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -70,6 +70,8 @@ def solution(system: System) -> Solution | None:
             particles=everything, scene=system.scene, found=None, motion=linear.motion, doubt=linear.doubt
         )
         return Solution(n=system.n, groups=(whole,))
+    from springcheck.physics.exact import wells
+
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
     left = ~nothing

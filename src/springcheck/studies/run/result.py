@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from springcheck import checks
 from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import plain
-from springcheck.studies.run.drawable import Drawable, drawable
 from springcheck.trajectory import Comparison, Verdict
+
+if TYPE_CHECKING:
+    from springcheck.studies.run.drawable import Drawable
 
 FAULT = "fault"
 """What stands for an engine in the labels of engines broken on purpose."""
@@ -144,6 +146,8 @@ class Stored:
     @cached_property
     def drawable(self) -> Drawable:
         """Its trajectories, as far as they are drawn."""
+        from springcheck.studies.run.drawable import drawable
+
         return drawable(self.path)
 
     @property
