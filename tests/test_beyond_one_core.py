@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from springcheck import cli, engines, store
 from springcheck.physics import scenefile
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
+from springcheck.studies.precision import text
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
 
@@ -100,3 +102,12 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
         assert len({point.steps for point in points}) == len(points)
     assert any(point.run_repeats for point in many.points)
     assert precision.stored(tmp_path / "two.h5").points == many.points
+    # who measured: the workers' errors and the times of this process
+    assert {piece for piece, _ in store.measured_by(tmp_path / "two.h5")} == {f"precision/{x}" for x in OWN}
+    untimed = [replace(x, run_repeats=()) if x == many.points[0] else x for x in many.points]
+    before, after = (
+        sum(x.complete and not x.run_repeats for x in points) for points in (many.points, untimed)
+    )
+    said = "\n".join(map(str, text.lines(replace(many, points=tuple(untimed)))))
+    assert after == before + 1
+    assert f"{after} points have errors alone: workers measure no times" in said

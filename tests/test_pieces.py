@@ -96,6 +96,20 @@ def test_pieces_of_other_columns_are_refused_and_kept(tmp_path: Path) -> None:
         assert list(journal.tables()) == ["t/a/0", "t/a/1"]
 
 
+def test_a_piece_that_is_damaged_before_the_commit_is_not_put_into_the_store(tmp_path: Path) -> None:
+    path = tmp_path / "s.h5"
+    with keeper.kept(path, "squares") as kept:
+        kept.results(pieces(3))
+        part = sorted(parts_folder(path).glob("rows-*"))[1]
+        content = bytearray(part.read_bytes())
+        at = content.index(np.float64(4.0).tobytes())
+        content[at + 6] ^= 1
+        part.write_bytes(content)
+        with pytest.raises(StoreError, match=r"000001\.h5 is damaged"):
+            kept.commit("squares", {})
+    assert not path.exists()
+
+
 def test_a_damaged_piece_alone_is_measured_again(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     with keeper.kept(path, "squares") as kept:

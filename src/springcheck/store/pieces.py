@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import access, digests, tables
+from springcheck.store import access, digests, seal, tables
 from springcheck.store.parts import name_of, table_of
 from springcheck.store.tables import Table
 
@@ -122,11 +122,12 @@ def _join(file: Any, name: str, parts: Sequence[Path], provenance: Provenance) -
     }
     sums = {column: hashlib.sha256() for column in whole}
     for j, part in enumerate(parts):
+        known = seal.find(part)
+        if known is None or not seal.is_whole(part, known):
+            raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
         with h5py.File(part, "r", locking="best-effort") as source:
             provenance.note(name_of(part), by_of(source))
             rows = source[name_of(part)]
-            if digests.of_table(rows) != rows.attrs["sha256"]:
-                raise StoreError(f"{part.name} is damaged: remove it, then give the same command again")
             found = {column: access.column(rows[column]) for column in access.members(rows)}
             like = {column: (x.dtype.kind, x.shape[1:]) for column, x in found.items()}
             if like != {
