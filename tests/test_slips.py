@@ -93,6 +93,7 @@ def test_a_name_that_is_no_file(
         ("identify --stepper steppers:step --mass 3", ("--mass", "--stepper")),
         ("identify --stepper steppers:step --trajectory x", ("--trajectory", "--stepper")),
         ("inspect a.h5 --rows 3", ("--rows", "--trajectory")),
+        ("inspect a.h5 --rows " + "x" * 5000, ("--rows", "xx .. xx")),
     ],
 )
 def test_numbers_names_and_options_that_serve_nothing(

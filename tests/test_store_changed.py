@@ -53,6 +53,8 @@ COMMANDS = [
     ["plot", "s.h5", "-o", "pictures"],
     ["identify", "s.h5"],
     ["identify", "s.h5", "--json"],
+    ["judge", "s.h5", "--scene", "spring", "--scheme", "explicit-euler", "--trajectory", LABEL],
+    ["judge", "s.h5", "--scene", "spring", "--scheme", "explicit-euler", "--trajectory", LABEL, "--json"],
     ["run", "--from", "s.h5"],
     ["run", "--from", "s.h5", "--json"],
 ]

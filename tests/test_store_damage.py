@@ -1,7 +1,7 @@
 """A file that is damaged, foreign or no HDF5 is told in one line: no traceback, no hang, no crash.
 
 Every damage must be found, too: a byte flipped anywhere in a store of ours is named by `check`.
-validation/store_fuzz.py tries thousands more.
+validation/campaign.py tries thousands more.
 """
 
 from __future__ import annotations

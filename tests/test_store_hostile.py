@@ -1,47 +1,80 @@
-"""A stranger's store may be inspected, drawn, exported, run again: it shows nothing of ours, and it ends.
+"""Whatever is given to springcheck is answered: a stranger's store shows nothing of ours, and it ends.
 
-A short form of validation/hostile.py, which says what must hold.
+A short form of validation/campaign.py, which says what must hold.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
+import campaign
+import forked
 import hostile
 
-RESTS = {
-    # what still does harm; struck off as it is mended
-}
+SERVED = tuple[campaign.Place, forked.Warm]
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return hostile.base(tmp_path_factory.mktemp("base"))
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SERVED]:
+    place, server = campaign.Place(tmp_path_factory.mktemp("campaign")), forked.Warm()
+    place.print_whole(server)
+    yield place, server
+    server.close()
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[hostile.Server]:
-    made = hostile.Server()
-    yield made
-    made.close()
+@pytest.mark.parametrize("kind", hostile.KINDS)
+def test_a_hostile_store_does_no_harm(kind: str, served: SERVED) -> None:
+    place, server = served
+    number = list(hostile.KINDS).index(kind)
+    # every second one with a seal; every eighth is drawn, which takes as long as all other commands together
+    case = place.make("hostile", number + len(hostile.KINDS) * (number % 2))
+    assert case.what == kind
+    assert place.answer(case, server).wrong == []
 
 
-@pytest.mark.parametrize("name", hostile.KINDS)
-def test_a_hostile_store_does_no_harm(
-    name: str, whole: Path, tmp_path: Path, server: hostile.Server, request: pytest.FixtureRequest
-) -> None:
-    if name in RESTS:
-        request.applymarker(pytest.mark.xfail(strict=True, reason=RESTS[name]))
-    own, place = tmp_path / "own", tmp_path / "stores"
-    own.mkdir()
-    place.mkdir()
-    hostile.secrets(own)
-    seed = sorted(hostile.KINDS).index(name)
-    hostile.build(name, whole, place / "s.h5", own, seed, forged=seed % 2 == 0)
-    # every third kind is drawn: a picture takes as long as all other commands together
-    results = server(place / "s.h5", drawn=seed % 3 == 0)
-    found = {" ".join(one.command): one.wrong for one in results if one.wrong}
-    assert found == {}
+@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("part", ["scenes", "mutated", "arguments", "doors"])
+def test_what_is_broken_at_random_is_answered(part: str, number: int, served: SERVED) -> None:
+    place, server = served
+    assert place.answer(place.make(part, number), server).wrong == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"status": 99}, "exit status"),
+        ({"err": "Traceback (most recent call last):"}, "traceback"),
+        ({"status": 2, "out": ""}, "0 lines"),
+        ({"status": 2, "err": "a\nb\n"}, "2 lines"),
+        ({"err": "x" * 501}, "501 characters"),
+        ({"out": "\x1b[2J"}, "control"),
+        ({"out": hostile.SECRET}, "another file"),
+        ({"seconds": 21.0}, "21.0 s"),
+        ({"memory": 2 << 30}, "2.0 GiB"),
+        ({"out": "8.15"}, "as if nothing were"),
+    ],
+)
+def test_what_must_not_happen_is_seen(changed: dict[str, object], said: str) -> None:
+    fine = {"command": ("check", "s.h5"), "status": 0, "seconds": 1.0, "memory": 1, "out": "4.7", "err": ""}
+    assert not list(campaign.wrongs(forked.Result(**fine), signalled=False, whole=("4.7",)))  # type: ignore[arg-type]
+    found = list(campaign.wrongs(forked.Result(**{**fine, **changed}), signalled=False, whole=("4.7",)))  # type: ignore[arg-type]
+    assert any(said in what for what in found), found
+
+
+def test_a_file_that_nobody_gave_is_seen_by_its_system_call(served: SERVED) -> None:
+    place, _ = served
+    log = place.home / "log"
+    lines = [
+        f'7 chdir("{place.work}") = 0',
+        f'7 openat(AT_FDCWD<{place.work}>, "s.toml", O_RDONLY) = 3<s.toml>',
+        f'7 openat(AT_FDCWD<{place.work}>, "../../own/secret.txt", O_RDONLY) = 3',
+        f'7 openat(AT_FDCWD<{place.work}>, "/etc/passwd", O_RDWR) = 3',
+        f'7 openat(AT_FDCWD<{place.work}>, "/etc/fstab", O_RDONLY) = 3',
+        f'7 openat(AT_FDCWD<{place.work}>, "/home/x", O_RDONLY) = -1 ENOENT (No such file or directory)',
+    ]
+    log.write_text("\n".join(lines))
+    secret, n = f"{place.own}/secret.txt", place.cases
+    assert campaign.trace(log, place, {n: ()}) == {n: [f"openat {secret}", "openat /etc/passwd"]}
+    assert campaign.trace(log, place, {n: (secret,)}) == {n: ["openat /etc/passwd"]}

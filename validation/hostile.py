@@ -1,79 +1,32 @@
-"""Stores that a stranger made to do harm: built here, and shown to every command in a process of its own.
-
-    python validation/hostile.py [stores] [mutated]
+"""Stores that a stranger made to do harm, and damaged files; `campaign.py` shows them to every command.
 
 Each kind (`KINDS`) changes a whole store: numbers that lie in other files, sizes that memory cannot hold,
-links that lead in circles, texts with control characters, fields of the wrong type.  Every second one gets
-a seal of its own, which anyone can write.  Every command that reads a store is then given it, in a process
-forked for the purpose.  What must hold, whatever the file:
-
-* exit status 0, 1 or 2; no traceback; a message on standard error of one line and 500 characters at most;
-* no control character on standard output or standard error;
-* at most 1 GiB of memory and 20 seconds of the processor;
-* nothing of a file beside it is shown, and nothing is written but into the folder of the command.
-
-So far one store of each of the 44 kinds was shown to every command (352 commands, every second store with a
-seal): no crash, no traceback, nothing of another file, all within bounds; `identify` said two lines instead
-of one of 7 of them, of which two were repeated after a change and passed.
+links that lead in circles, texts with control characters, fields of the wrong type.  Damaged are a store of
+ours, the same without its seal, an exported trajectory and files in the oldest and newest format of libhdf5:
+bytes flipped, ranges overwritten, ends cut off, datasets and attributes removed or replaced by others of the
+wrong type.  Every second one gets a seal of its own, which anyone can write.
 """
 
 # ruff: noqa: D103 (the name of a kind says it)
 from __future__ import annotations
 
-import contextlib
-import json
-import os
 import random
-import resource
 import shutil
-import signal
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from arguments import arguments
-from springcheck.errors import StoreError
-from springcheck.store import seal, trust
-from store_fuzz import damaged
+from springcheck import store
+from springcheck.store import seal
 
 LABEL, OTHER = "own:euler", "own:semi-implicit-euler"
 SECRET = "do-not-show-this-4711"
 SECRET_NUMBER = 4711.0815
 BASE = f"observables/{LABEL}"
-MEMORY, SECONDS, MESSAGE = 1 << 30, 20.0, 500
 NASTY = "\x1b]0;owned\x07\x1b[2J\u202e\x9b31m\r\nx$\\frac{$<script>"
-
-COMMANDS: tuple[tuple[str, ...], ...] = (
-    ("inspect", "FILE"),
-    ("inspect", "FILE", "--json"),
-    ("inspect", "FILE", "--trajectory", "LABEL", "--verdicts"),
-    ("plot", "FILE", "-o", "pictures"),
-    ("check", "FILE"),
-    ("export", "FILE", "LABEL", "out.h5md"),
-    ("identify", "FILE"),
-    ("run", "--from", "FILE"),
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """What one command made of one store: seconds, peak memory [B], and what must not happen."""
-
-    command: tuple[str, ...]
-    status: int
-    seconds: float
-    memory: int
-    out: str
-    err: str
-    wrong: tuple[str, ...]
-
 
 Change = Callable[[Any, random.Random, Path], None]
 KINDS: dict[str, Change] = {}
@@ -559,11 +512,6 @@ def base(folder: Path) -> Path:
 
 def build(name: str, whole: Path, path: Path, own: Path, seed: int, *, forged: bool) -> None:
     """A hostile store of a kind; `own` holds the reader's files, `forged` gives it a seal."""
-    if name == "mutated":
-        damaged(whole.read_bytes(), random.Random(seed), path)
-        if forged:
-            seal.attach(path, [])
-        return
     shutil.copyfile(whole, path)
     with h5py.File(path, "r+", libver=("v110", "latest")) as file:
         KINDS[name](file, random.Random(seed), own)
@@ -573,185 +521,67 @@ def build(name: str, whole: Path, path: Path, own: Path, seed: int, *, forged: b
         seal.attach(path, [] if "frames" in name or "rows" in name or seed % 3 else known.extents)
 
 
-def wrong(status: int, out: str, err: str, seconds: float, memory: int) -> Iterator[str]:
-    """What must not happen."""
-    if status not in {0, 1, 2}:
-        yield f"exit status {status}"
-    if "Traceback" in err or "Traceback" in out:
-        yield "a traceback"
-    lines = err.splitlines()
-    if status == 2 and len(lines) != 1:
-        yield f"{len(lines)} lines of message"
-    if any(len(line) > MESSAGE for line in lines):
-        yield f"a message of {max(map(len, lines))} characters"
-    strange = {
-        c for c in out + err if (ord(c) < 32 and c != "\n") or 127 <= ord(c) < 160 or c in "\u202e\u2066"
-    }
-    if strange:
-        yield f"control characters {sorted(strange)!a}"
-    for text in (out, err):
-        if SECRET in text or "4711.08" in text:
-            yield "another file is shown"
-    if seconds > SECONDS:
-        yield f"{seconds:.1f} s"
-    if memory > MEMORY:
-        yield f"{memory / MEMORY:.1f} GiB"
-
-
-def show(command: tuple[str, ...], path: Path, label: str, folder: Path) -> Result:
-    """Run a command in a forked process, in a folder of its own."""
-    words = [{"FILE": str(path), "LABEL": label}.get(word, word) for word in command]
-    pid = os.fork()
-    if pid == 0:
-        status = 99
-        try:
-            os.chdir(folder)
-            for number, name in ((1, "out"), (2, "err")):
-                os.dup2(os.open(f".{name}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
-            resource.setrlimit(resource.RLIMIT_AS, (4 * MEMORY, 4 * MEMORY))
-            from springcheck.cli import main
-
-            status = main(words)
-            sys.stdout.flush()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        except BaseException:
-            import traceback
-
-            traceback.print_exc()
-            sys.stderr.flush()
-        finally:
-            os._exit(status)
-    old = signal.signal(signal.SIGALRM, lambda *_: os.kill(pid, signal.SIGKILL))
-    signal.setitimer(signal.ITIMER_REAL, 10 * SECONDS)
-    _, raw, usage = os.wait4(pid, 0)
-    signal.setitimer(signal.ITIMER_REAL, 0)
-    signal.signal(signal.SIGALRM, old)
-    # of the processor: a busy machine is no fault of the store
-    seconds = usage.ru_utime + usage.ru_stime
-    status = os.waitstatus_to_exitcode(raw)
-    out, err = (
-        (folder / f".{name}").read_bytes().decode("utf-8", "backslashreplace") for name in ("out", "err")
-    )
-    memory = usage.ru_maxrss * 1024
-    found = list(wrong(status, out, err, seconds, memory))
-    written = {p.name for p in folder.iterdir()} - {".out", ".err", "pictures", "out.h5md"}
-    found += [f"{name} was written" for name in sorted(written)]
-    return Result(
-        command=command, status=status, seconds=seconds, memory=memory, out=out, err=err, wrong=tuple(found)
-    )
-
-
-def every_command(path: Path, label: str = LABEL, *, drawn: bool = True) -> list[Result]:
-    """A store before every command; the folder it lies in must not change.  `drawn`: by plot too."""
-    found = []
-    before = {p.name for p in path.parent.iterdir()}
-    # once for all of them: what is forked from here inherits the answer
-    for way in (trust.OURS, trust.FOREIGN):
-        with contextlib.suppress(StoreError):
-            trust.guarded(path, way)
-    for command in COMMANDS:
-        if command[0] == "plot" and not drawn:
-            continue
-        with tempfile.TemporaryDirectory() as name:
-            found.append(show(command, path, label, Path(name)))
-    beside = {p.name for p in path.parent.iterdir()} - before
-    if beside:
-        raise AssertionError(f"{path}: written beside it: {beside}")
+def originals(whole: Path, folder: Path) -> dict[str, bytes]:
+    """Files to damage, by kind."""
+    rng = np.random.default_rng(3)
+    store.export(whole, LABEL, folder / "e.h5md")
+    known = seal.find(whole)
+    assert known is not None
+    content = whole.read_bytes()
+    found = {"sealed": content, "unsealed": content[: known.end], "export": (folder / "e.h5md").read_bytes()}
+    for libver in ("earliest", "latest"):
+        with h5py.File(folder / f"{libver}.h5", "w", libver=libver) as file:
+            group = file.create_group("particles/all")
+            for name in ("position", "velocity"):
+                values = rng.normal(size=(20, 3, 3)).astype("f4")
+                element = group.create_group(name)
+                element.create_dataset(
+                    "value", data=values, chunks=(5, 3, 3), compression="gzip", shuffle=True
+                )
+                element["step"], element["time"] = np.arange(20), 0.1 * np.arange(20)
+                element["value"].attrs["unit"] = "nm"
+            group["mass"] = np.ones(3)
+        found[libver] = (folder / f"{libver}.h5").read_bytes()
     return found
 
 
-def warm() -> None:
-    """Import what the commands import, so that a forked one need not."""
-    from springcheck.cli import inspect  # noqa: F401
-    from springcheck.identify import files  # noqa: F401
-    from springcheck.studies.extremes import figure  # noqa: F401
-    from springcheck.studies.precision import figure as f1  # noqa: F401
-    from springcheck.studies.run import figure as f2  # noqa: F401
-    from springcheck.studies.stability import figure as f3  # noqa: F401
+def damaged(content: bytes, rng: random.Random, path: Path) -> None:
+    """Write a damaged copy."""
+    changed = bytearray(content)
+    how = rng.random()
+    if how < 0.55:
+        for _ in range(rng.choice([1, 1, 2, 5, 20])):
+            changed[rng.randrange(len(changed))] = rng.choice([0, 255, 128, rng.randrange(256)])
+    elif how < 0.65:
+        start = rng.randrange(len(changed))
+        end = min(len(changed), start + rng.randrange(1, 400))
+        changed[start:end] = rng.randbytes(end - start)
+    elif how < 0.75:
+        del changed[rng.randrange(len(changed)) :]
+    path.write_bytes(changed)
+    if how >= 0.75:
+        with h5py.File(path, "r+", libver=("v110", "latest")) as file:
+            for _ in range(rng.choice([1, 2, 4])):
+                mutilate(file, rng)
 
 
-def serve() -> None:
-    """Answer lines of JSON [path, label, drawn] with the results: one process that forks, without threads."""
-    warm()
-    for line in sys.stdin:
-        path, label, drawn = json.loads(line)
-        answer = [
-            [x.command, x.status, x.seconds, x.memory, x.out, x.err, x.wrong]
-            for x in every_command(Path(path), label, drawn=drawn)
-        ]
-        print(json.dumps(answer), flush=True)
-
-
-class Server:
-    """`serve` in a process of its own, with one thread for all numerics."""
-
-    def __init__(self, *before: str) -> None:
-        """`before`: words of a command in front of it, such as strace's."""
-        threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-        self._process = subprocess.Popen(
-            [*before, sys.executable, __file__, "--serve"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, **threads},
-        )  # fmt: skip
-
-    def __call__(self, path: Path, label: str = LABEL, *, drawn: bool = True) -> list[Result]:
-        """What every command makes of a store."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        print(json.dumps([str(path), label, drawn]), file=self._process.stdin, flush=True)
-        return [
-            Result(
-                command=tuple(c), status=status, seconds=seconds, memory=memory, out=out, err=err,
-                wrong=tuple(found),
-            )
-            for c, status, seconds, memory, out, err, found in json.loads(self._process.stdout.readline())
-        ]  # fmt: skip
-
-    def close(self) -> None:
-        """End it."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.close()
-        self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
-
-
-def main() -> int:
-    """All stores; the exit status says whether one of them did harm."""
-    if sys.argv[1:2] == ["--serve"]:
-        serve()
-        return 0
-    given = arguments(__doc__, stores=500, mutated=5000)
-    count = given.stores + given.mutated
-    bad, shown, longest, largest = 0, 0, 0.0, 0
-    with tempfile.TemporaryDirectory() as name:
-        folder, own, place = Path(name), Path(name) / "own", Path(name) / "stores"
-        own.mkdir()
-        place.mkdir()
-        secrets(own)
-        whole = base(folder)
-        server = Server()
-        for i in range(count):
-            what = list(KINDS)[i % len(KINDS)] if i < given.stores else "mutated"
-            path = place / "s.h5"
-            build(what, whole, path, own, i, forged=i // len(KINDS) % 2 == 1)
-            for result in server(path):
-                shown += 1
-                longest, largest = max(longest, result.seconds), max(largest, result.memory)
-                if result.wrong:
-                    bad += 1
-                    words = " ".join(result.command)
-                    print(f"{i} {what}: {words}: {'; '.join(result.wrong)}: {result.err[-300:]!r}")
-            path.unlink()
-        server.close()
-    print(
-        f"{given.stores} hostile stores of {len(KINDS)} kinds, {given.mutated} mutated, {shown} commands: "
-        f"{bad} wrong; "
-        f"at most {longest:.1f} s and {largest / 2**20:.0f} MiB"
-    )
-    return int(bad > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def mutilate(file: Any, rng: random.Random) -> None:
+    """Remove one object or attribute, or put one of the wrong type in its place."""
+    names: list[str] = []
+    file.visit(names.append)
+    if not names:
+        return
+    name = rng.choice(names)
+    wrong: list[Any] = ["text", 1.5, np.zeros((2, 2, 2), "i2"), np.zeros(0), np.array([b"x"]), np.nan]
+    keys = list(file[name].attrs) if name in file else []
+    if keys and rng.random() < 0.4:
+        key = rng.choice(keys)
+        del file[name].attrs[key]
+        if rng.random() < 0.7:
+            file[name].attrs[key] = rng.choice(wrong)
+    elif name in file:
+        del file[name]
+        if rng.random() < 0.6:
+            file[name] = rng.choice(wrong)
+        elif rng.random() < 0.3:
+            file.create_group(name)

@@ -28,7 +28,6 @@ caught since, and no such line was seen again.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import random
 import shutil
@@ -42,6 +41,7 @@ from pathlib import Path
 from typing import Any
 
 from arguments import arguments
+from forked import Warm
 from springcheck import interrupts
 
 WITHIN = 2.0
@@ -154,74 +154,6 @@ class Fresh:
             os.killpg(self.pid, signal.SIGKILL)
             out, err = self._process.communicate()
         return self._process.returncode, out, err
-
-
-class Warm:
-    """A process that has imported everything, and forks one for each command."""
-
-    def __init__(self) -> None:
-        threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-        self._process = subprocess.Popen(
-            [sys.executable, __file__, "--serve"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, **threads},
-        )  # fmt: skip
-
-    def __call__(self, command: tuple[str, ...], folder: Path, temporary: str) -> Warm:
-        """Start a command."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._streams = Path(temporary).with_suffix(".out"), Path(temporary).with_suffix(".err")
-        print(
-            json.dumps([command, str(folder), temporary, *map(str, self._streams)]),
-            file=self._process.stdin,
-            flush=True,
-        )
-        self.pid = int(self._process.stdout.readline())
-        return self
-
-    def ended(self) -> bool:
-        """Whether it has ended: a zombie until it is waited for."""
-        with contextlib.suppress(OSError):
-            return Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-        return True
-
-    def wait(self) -> tuple[int, str, str]:
-        """Exit status, output, errors."""
-        assert self._process.stdout is not None
-        status = int(self._process.stdout.readline())
-        out, err = (path.read_bytes().decode(errors="backslashreplace") for path in self._streams)
-        for path in self._streams:
-            path.unlink()
-        return status, out, err
-
-    def close(self) -> None:
-        """End it."""
-        self._process.communicate()
-
-
-def serve() -> int:
-    """Fork a process for each line of JSON; there it returns the command's exit status, here 0 in the end."""
-    import hostile
-    from springcheck.__main__ import main as springcheck
-
-    hostile.warm()
-    for line in sys.stdin:
-        command, folder, temporary, out, err = json.loads(line)
-        child = os.fork()
-        if child == 0:
-            os.setsid()
-            for number, name in ((0, os.devnull), (1, out), (2, err)):
-                os.dup2(os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC), number)
-            os.chdir(folder)
-            os.environ["TMPDIR"] = tempfile.tempdir = temporary
-            sys.argv[1:] = command
-            return springcheck()
-        print(child, flush=True)
-        # it stays a zombie as long as it may get a signal: its number is not given away
-        os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)
-        _, raw = os.waitpid(child, 0)
-        print(os.waitstatus_to_exitcode(raw), flush=True)
-    return 0
 
 
 def interrupted(
@@ -347,8 +279,6 @@ def _fresh(folder: Path, store: Path) -> Path:
 
 def main() -> int:
     """Run the campaign."""
-    if sys.argv[1:2] == ["--serve"]:
-        return serve()
     given = arguments(__doc__, interrupts=500, seed=11)
     # a shell starts a command in the background with SIGINT ignored, and every child would inherit that
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -211,8 +211,10 @@ def _identified(
 
 
 def _judge(options: Namespace) -> int:
+    from springcheck import formats
     from springcheck.cli import file
 
+    doubts = output.doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
     found = file.judge(
         Path(options.file),
         scene=options.scene,
@@ -221,11 +223,12 @@ def _judge(options: Namespace) -> int:
         step=options.step,
         trajectory=options.trajectory,
     )
+    output.warn(options.file, doubts)
     if options.json:
-        output.document(found.document())
+        output.document({**found.document(), "not_trusted": doubts})
     else:
         output.show(found.lines())
-    return found.status
+    return found.status or int(bool(doubts))
 
 
 def _check(options: Namespace) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from springcheck.errors import SpringcheckError, nearest
+from springcheck.errors import LONGEST_MESSAGE, SpringcheckError, nearest, plain
 
 NAMES = {
     "scene": "SCENE",
@@ -38,7 +38,7 @@ class Parser(argparse.ArgumentParser):
         if wrong:
             known = [word.strip(" '") for word in wrong[2].split(",")]
             message = f"{wrong[1]!r} is no command{nearest(wrong[1], known)}; there are {', '.join(known)}"
-        sys.stderr.write(f"springcheck: {message}\n")
+        sys.stderr.write(f"springcheck: {plain(message, LONGEST_MESSAGE)}\n")
         raise SystemExit(2)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
