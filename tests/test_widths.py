@@ -213,3 +213,12 @@ def test_any_table_fits_any_terminal_with_all_its_cells(seed: int) -> None:
 
 def test_a_store_is_named_as_it_is(folder: Path) -> None:
     assert store.check(folder / "run.h5") == []
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_explanations_break_between_words(width: int, monkeypatch: Patch, capsys: Captured) -> None:
+    whole = shown(["explain", "step-defect"], None, monkeypatch, capsys)
+    assert max(map(len, whole.splitlines())) > 200
+    folded = shown(["explain", "step-defect"], width, monkeypatch, capsys)
+    assert max(map(len, folded.splitlines())) <= width
+    assert folded.split() == whole.split()

@@ -113,7 +113,7 @@ def _explain(options: Namespace) -> int:
     from springcheck.cli import explain
 
     for line in explain.lines(options.word):
-        print(line)
+        print(output.folded(line))
     return 0
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import inspect
 import math
-import textwrap
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
@@ -19,9 +18,6 @@ from springcheck.studies.faults.table import FAULTS
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning
-
-WIDTH = 100
-"""Columns of a line."""
 
 STAGES = {
     "kick": "p = p + {c}F",
@@ -77,16 +73,16 @@ def check_lines(check: Any) -> Iterator[str]:
     """What holds where a check passes, how, and for what it applies; what it must reject."""
     yield f"{check.name}, a check of the {check.family}"
     first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n")
-    yield from _folded(first)
+    yield _line(first)
     if rest.strip():
         yield ""
         yield from rest.strip("\n").splitlines()
     yield ""
-    yield from _folded(f"Applies to: {check.needs}")
+    yield _line(f"Applies to: {check.needs}")
     held = [fault for fault in FAULTS if check.name in fault.caught_by]
     if held:
         names = (fault.name + ("" if fault.size is None else f" of {fault.size:.0e}") for fault in held)
-        yield from _folded(f"Must reject, and is held to it: {', '.join(names)}")
+        yield _line(f"Must reject, and is held to it: {', '.join(names)}")
 
 
 def sentence(check: Any) -> str:
@@ -103,24 +99,24 @@ def _seen(check: Any) -> Iterator[str]:
         return
     passed = [fault.name for fault in FAULTS if measure.Probe(fault).passed(check.name, fault.size)]
     if passed:
-        yield from _folded(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
+        yield _line(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
 
 
 def _fault(fault: Fault) -> Iterator[str]:
     from springcheck.studies.faults import measure
 
     yield f"{fault.name}: {fault.about}"
-    yield from _folded(
+    yield _line(
         f"A fault: {fault.scheme} on a {fault.scene}, broken on purpose"
         + ("" if fault.size is None else f"; its size in the table is {fault.size:.0e}")
     )
     probe = measure.Probe(fault)
     verdicts = {name: probe.passed(name, fault.size) for name in measure.RECORDED}
-    yield from _folded(f"Must be rejected by: {', '.join(fault.caught_by)}")
+    yield _line(f"Must be rejected by: {', '.join(fault.caught_by)}")
     seen = [name for name, passed in verdicts.items() if passed is False]
-    yield from _folded(f"Recorded states are rejected by: {', '.join(seen) or 'none'}")
+    yield _line(f"Recorded states are rejected by: {', '.join(seen) or 'none'}")
     passing = [name for name, passed in verdicts.items() if passed]
-    yield from _folded(f"and passed by: {', '.join(passing) or 'none'}")
+    yield _line(f"and passed by: {', '.join(passing) or 'none'}")
     if fault.size is not None and seen:
         limits = {name: limit for name in seen if (limit := probe.limit(name)) is not None}
         if limits:
@@ -130,12 +126,12 @@ def _fault(fault: Fault) -> Iterator[str]:
 
 def meaning_lines(meaning: Meaning) -> Iterator[str]:
     """A finding of `springcheck identify`."""
-    yield from _folded(f"{meaning.name}, a finding of identify: {meaning.title}")
+    yield _line(f"{meaning.name}, a finding of identify: {meaning.title}")
     yield f"  {meaning.formula}"
-    yield from _folded(f"Sees: {meaning.sees}")
-    yield from _folded(f"Does not see: {meaning.misses}")
+    yield _line(f"Sees: {meaning.sees}")
+    yield _line(f"Does not see: {meaning.misses}")
     if meaning.source:
-        yield from _folded(f"Source: {meaning.source}")
+        yield _line(f"Source: {meaning.source}")
 
 
 def _method(name: str) -> Iterator[str]:
@@ -165,7 +161,7 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         yield f"Order {scheme.order}; {area}; bounded on a spring: {where}"
     if scheme.source:
-        yield from _folded(f"Source: {scheme.source}")
+        yield _line(f"Source: {scheme.source}")
 
 
 def _tableau(a: Sequence[Sequence[Fraction]], b: Sequence[Fraction]) -> Iterator[str]:
@@ -180,5 +176,5 @@ def _sum(row: Sequence[Fraction]) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def _folded(text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH, break_on_hyphens=False)
+def _line(text: str) -> str:
+    return " ".join(text.split())

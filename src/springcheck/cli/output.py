@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +36,13 @@ def show(lines: Sequence[RenderableType]) -> None:
             console.print(line, crop=False)
     # a line that was folded ends in a blank, which a file or a diff need not keep
     print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
+def folded(line: str) -> str:
+    """A line broken between words where the terminal ends; as it is in a pipe."""
+    if not line or not sys.stdout.isatty():
+        return line
+    return textwrap.fill(line, shutil.get_terminal_size().columns, break_on_hyphens=False)
 
 
 def document(data: Any) -> None:

@@ -95,7 +95,7 @@ class Chart {
   draw() {
     const { spec } = this, wordy = (scale) => (scale.named ? Math.max(...scale.values.map((v) => v.length)) : 0);
     // names are written in full: at the left, and upwards below
-    const L = 62 + 6.4 * Math.max(0, wordy(spec.y) - 5), R = 12, T = 12, B = 46 + 6.4 * Math.max(0, wordy(spec.x) - 2);
+    const L = 62 + 6.4 * Math.max(0, wordy(spec.y) - 5), R = 12, T = 12, B = 46 + 7.4 * Math.max(0, wordy(spec.x) - 2);
     const W = (this.W = Math.max(280, this.box.clientWidth || 440));
     const tall = spec.y.named ? spec.y.values.length * 14 + T + B : Math.min(420, Math.max(260, Math.round(W * 0.72)));
     const H = (this.H = tall);
