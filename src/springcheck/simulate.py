@@ -5,7 +5,6 @@ The engine only moves.  Clock, chunks, energies, progress and divergence are kep
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
@@ -15,7 +14,8 @@ import numpy as np
 
 from springcheck import engines
 from springcheck.engines.contract import Label, Simulation, Stopped
-from springcheck.errors import MethodError, SceneError
+from springcheck.errors import MethodError
+from springcheck.physics import memory
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
@@ -198,16 +198,11 @@ class Gather:
     """A sink that keeps everything in memory."""
 
     def __init__(self, scene: Scene) -> None:
-        size = scene.frames * (2 * scene.n + 2) * 8
-        memory = (
-            os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 1 << 33
+        memory.need(
+            scene.frames * (2 * scene.n + 2) * 8,
+            f"scene {scene.name}: {scene.frames} frames of {scene.n} particles",
+            "raise record.every, or let `springcheck run` stream to a file",
         )
-        if size > memory // 2:
-            raise SceneError(
-                f"scene {scene.name}: {scene.frames} frames of {scene.n} particles take {size / 1e9:.3g} GB, "
-                "more than half of this machine's memory; raise record.every, or let `springcheck run` "
-                "stream to a file"
-            )
         self._frames = 0
         self._t = np.empty(scene.frames)
         self._q, self._p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))

@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import SceneError
+from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
+
+SCENE_BYTES = 150
+"""Memory of a mass of a chain, before anything is run; see `need`."""
 
 
 def spring(
@@ -65,6 +69,7 @@ def chain(
     """
     if not isinstance(masses, int) or masses < 1:
         raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")
+    memory.need(masses * SCENE_BYTES, f"{masses} masses", "a shorter chain has the same waves")
     _, m, q, p = _together(masses=np.zeros(masses), m=m, q=q, p=p)
     links, walls = _between(masses, np.asarray(k, np.float64))
     if not (len(waves) or np.any(q) or np.any(p)):

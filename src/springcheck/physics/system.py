@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
-from springcheck.physics import graph
+from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
@@ -215,6 +215,9 @@ class System:
 
     def hessian(self, q: Reals) -> Extended:
         """Second derivatives of the potential energy at q (n,) -> (n, n) [M/T2], extended precision."""
+        if self.n > MOST_DENSE:
+            what = f"second derivatives of {self.n} particles, n x n numbers,"
+            memory.need(2 * 16 * self.n**2, what, "a shorter chain, or another method, needs none")
         out = np.zeros((self.n, self.n), dtype=np.longdouble)
         wide = np.asarray(q, dtype=np.longdouble)
         for term in self.terms:

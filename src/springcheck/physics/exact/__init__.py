@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 __all__ = ["EPS", "Modes", "has_true_motion", "modes", "true_motion", "uncertainty"]
 
 
+MOST_NUMBERS = 1 << 20
+"""Positions that are worked out at a time, in extended precision."""
+
+
 def modes(scene: Scene) -> Modes:
     """Normal modes of a linear scene.  ValueError where there are none (see `System.has_modes`)."""
     return scene.system.modes
@@ -48,7 +52,15 @@ def true_motion(scene: Scene, steps: Integers, h: float) -> tuple[Extended, Exte
     known = scene.system.solution
     if known is None:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
-    return known(steps, h)
+    # each time by itself: what is worked out on the way takes ten times the memory of the result
+    rows = max(1, MOST_NUMBERS // scene.n)
+    if len(steps) <= rows:
+        return known(steps, h)
+    q, p = np.empty((2, len(steps), scene.n), np.longdouble)
+    for begin in range(0, len(steps), rows):
+        some = slice(begin, begin + rows)
+        q[some], p[some] = known(steps[some], h)
+    return q, p
 
 
 def uncertainty(scene: Scene, duration: float) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from springcheck.physics import memory
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.text.wording import ordinal
@@ -14,6 +15,12 @@ from springcheck.trajectory import Trajectory
 
 MOST_FRAMES = 4001
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
+
+FEWEST_FRAMES, MOST_NUMBERS = 16, 1 << 22
+"""Frames of very many particles, and positions of all of them."""
+
+FIGURE_BYTES, RUN_BYTES = 160, 64
+"""Memory for a frame of one particle: of the exact solution, and of each run."""
 
 END_FRAMES = 500
 """Frames at the end of a run whose motion is too fast for that."""
@@ -37,19 +44,28 @@ class Drawable:
 def drawable(path: Path) -> Drawable:
     """Scene and trajectories of a store to draw."""
     summary = keeper.summary(path)
+    scene = keeper.stored_scene(path)
+    frames = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_NUMBERS // scene.n))
+    memory.need(
+        scene.n * min(frames, scene.frames) * (FIGURE_BYTES + RUN_BYTES * len(summary.runs)),
+        f"the figures of {scene.n} particles",
+        "inspect and report show their numbers",
+    )
     runs: dict[str, Trajectory] = {}
     notes = []
     fast = False
     for run in summary.runs:
-        runs[run.label], stride = keeper.strided(path, run.label, MOST_FRAMES)
+        runs[run.label], stride = keeper.strided(path, run.label, frames)
         if stride > 1:
             notes.append(f"{run.label}: every {ordinal(stride)} of {run.frames} frames is drawn")
             fast |= not _shows_motion(runs[run.label])
     followed = runs
     if fast:
-        followed = {run.label: keeper.end(path, run.label, END_FRAMES) for run in summary.runs}
-        notes.append(f"position and phase portrait: the last {END_FRAMES} frames, energy: the whole run")
-    return Drawable(scene=keeper.stored_scene(path), runs=runs, followed=followed, notes=notes)
+        followed = {run.label: keeper.end(path, run.label, min(END_FRAMES, frames)) for run in summary.runs}
+        notes.append(
+            f"position and phase portrait: the last {min(END_FRAMES, frames)} frames, energy: the whole run"
+        )
+    return Drawable(scene=scene, runs=runs, followed=followed, notes=notes)
 
 
 def _shows_motion(run: Trajectory) -> bool:

@@ -17,7 +17,7 @@ from springcheck import checks, engines, simulate
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import exact, scenefile
+from springcheck.physics import exact, memory, scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
@@ -29,6 +29,10 @@ from springcheck.trajectory import Comparison, Trajectory, Verdict
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
     from springcheck.studies.run.faulty import Broken
+
+RUN_BYTES, MORE_BYTES = 2300, 700
+"""Peak memory of a run for each particle of a chain, and for each method after the first: least of what
+validation/chain_cost.py measured."""
 
 PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
@@ -112,6 +116,11 @@ def run(
         from springcheck.studies.run.faulty import broken
 
         wrong = [broken(text) for text in dict.fromkeys(faults)]
+    memory.need(
+        scene.n * (RUN_BYTES + MORE_BYTES * (len(labels) - 1)),
+        f"scene {scene.name}: judging {scene.n} particles by {len(labels)} methods would",
+        "fewer particles, or one --method at a time, take less",
+    )
     bar = _Bar(progress, len(labels) * (1 + thorough))
     command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
     with keeper.kept(path, command, force=force) as kept:

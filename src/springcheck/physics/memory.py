@@ -1,0 +1,45 @@
+"""Memory that a computation would take, against what is there: it is refused before it begins."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from springcheck.errors import SceneError
+
+LIMITS = (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"))
+"""Of a control group below its root, and what is used of them: versions 2 and 1."""
+
+
+def available(root: Path = Path("/")) -> int | None:
+    """Bytes that this process may still take: of the machine, of its control group, of its own limit.
+
+    None on systems that say nothing of it.
+    """
+    found = []
+    with suppress(OSError, ValueError, StopIteration):
+        lines = (root / "proc/meminfo").read_text().splitlines()
+        found.append(1024 * int(next(x for x in lines if x.startswith("MemAvailable:")).split()[1]))
+    for most, used in LIMITS:
+        # without a limit the file says "max"
+        with suppress(OSError, ValueError):
+            group = root / "sys/fs/cgroup"
+            found.append(int((group / most).read_text()) - int((group / used).read_text()))
+    with suppress(ImportError, OSError, ValueError, AttributeError):
+        import resource
+
+        most_here = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if most_here != resource.RLIM_INFINITY:
+            pages = int((root / "proc/self/statm").read_text().split()[0])
+            found.append(most_here - pages * os.sysconf("SC_PAGE_SIZE"))
+    return max(0, min(found)) if found else None
+
+
+def need(size: float, what: str, then: str) -> None:
+    """SceneError where `what` takes more bytes than are available; `then` says what to do."""
+    there = available()
+    if there is not None and size > there:
+        raise SceneError(
+            f"{what} take {size / 1e9:.3g} GB of memory and {there / 1e9:.3g} GB are available here; {then}"
+        )
