@@ -15,10 +15,10 @@ from springcheck.checks.stats import student
 from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.arrays import WIDE
+from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring
+from springcheck.physics.terms import Morse, Spring, WallSpring
 from springcheck.studies.faults import clean, steppers
 from springcheck.trajectory import Trajectory
 
@@ -173,3 +173,59 @@ def test_the_drift_of_a_rounded_one_step_matrix_is_named() -> None:
     verdict = laws.rounding_bias(checks.Bench(scene=laws.SPRING, label="", run=run))
     assert verdict.passed is False
     assert "matrix whose elements are rounded" in verdict.why
+
+
+def test_an_anharmonic_motion_that_grows_may_come_back_as_far_off_as_its_tangent_says() -> None:
+    """A mass that a wall pushes away and a bond: a rounding grows by 1e13 in 70 steps."""
+    end = np.array([0])
+    terms = (
+        WallSpring(i=end, k=np.array([-1.1]), at=np.zeros(1)),
+        Morse(
+            a=end, b=end + 1, depth=np.array([16700.0]), steepness=np.array([0.0148]), rest=np.array([25.7])
+        ),
+    )
+    masses, start = np.array([4.3, 3.6]), (np.array([2.9, 60.1]), np.array([18.0, -3.4]))
+    scene = clean.scene(masses, terms, *start, step=-0.52, steps=70)
+    bench = checks.Bench(scene=scene, label="", run=plain("velocity-verlet"))
+    assert experiments.reversibility(bench).passed is not False
+    # while it has not grown it is judged, and an engine that loses some of its momenta is seen
+    for loss, passes in ((0.0, True), (1e-12, False)):
+
+        def run(made: Scene, label: str, loss: float = loss) -> Trajectory:
+            step = steppers.textbook(made, schemes.SCHEMES["velocity-verlet"])
+
+            def lossy(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
+                q, p = step(i, q, p)
+                return q, p * (1 - loss)
+
+            return steppers.record(made, schemes.SCHEMES["velocity-verlet"], lossy)
+
+        short = checks.Bench(scene=replace(scene, steps=12), label="", run=run)
+        assert experiments.reversibility(short).passed is passes
+
+
+def test_a_sum_of_another_length_in_company_is_no_influence() -> None:
+    """A dense one-step matrix of twice the size adds up in another order: its last digits differ."""
+    scheme = schemes.SCHEMES["velocity-verlet"]
+
+    def run(made: Scene, label: str) -> Trajectory:
+        n = made.n
+        whole = schemes.propagator(scheme, made, h=made.step).astype(np.float64)
+
+        def step(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
+            z = np.concatenate([q, p])
+            # the order of the sum depends on how many there are
+            out = whole @ z if n == 3 else np.sum(whole[:, ::-1] * z[::-1], axis=1)
+            return out[:n], out[n:]
+
+        return steppers.record(made, scheme, step)
+
+    a = np.arange(2)
+    links = Spring(a=a, b=a + 1, k=np.array([1.1, 3.7]), rest=np.zeros(2))
+    scene = clean.scene(
+        np.array([1.3, 0.7, 2.1]), (links,), np.array([0.2, 1.0, 1.9]), np.array([0.4, -0.3, 0.5]),
+        step=0.05, steps=50,
+    )  # fmt: skip
+    verdict = experiments.company(checks.Bench(scene=scene, label="", run=run))
+    assert verdict.passed is None
+    assert "rounding alone" in verdict.why

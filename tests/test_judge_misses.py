@@ -11,6 +11,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes
+from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
@@ -209,3 +210,21 @@ def test_a_trajectory_without_its_first_frame_is_none_of_the_scene() -> None:
     # a later piece of a long run says so
     later = {v.check: v.passed for v in checks.judge(asked, cut, piece=True)}
     assert later["start"] is None
+    # nor is a piece of a run that goes on the whole of it
+    whole = steppers.record(asked, scheme, steppers.textbook(asked, scheme))
+    some = replace(whole, t=whole.t[:9], q=whole.q[:9], p=whole.p[:9])
+    some = replace(some, outcome=replace(whole.outcome, status="continued", step=8))
+    assert [v.check for v in springcheck.judge(asked, some) if v.passed is False] == ["grid"]
+    assert all(v.passed is not False for v in checks.judge(asked, some, piece=True))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"q": np.zeros((7, 2))}, {"p": np.zeros((6, 1))}, {"energy": np.zeros(3)}, {"every": 0}, {"step": 0.0}],
+    ids=lambda change: next(iter(change)),
+)
+def test_frames_of_another_shape_are_refused_in_one_line(change: dict[str, Any]) -> None:
+    scene = clean.scene(np.ones(1), (), np.zeros(1), np.ones(1), step=0.1, steps=6)
+    run = steppers.record(scene, schemes.SCHEMES["rk4"], steppers.textbook(scene, schemes.SCHEMES["rk4"]))
+    with pytest.raises(SpringcheckError, match=r"^plain: [^\n]*$"):
+        springcheck.judge(scene, replace(run, **change))

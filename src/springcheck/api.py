@@ -58,8 +58,22 @@ def simulate(
 
 
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
-    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None."""
-    return checks.judge(_scene(scene), _trajectory(trajectory))
+    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None.
+
+    Raises SpringcheckError for frames of another shape, or without a step.
+    """
+    found, run = _scene(scene), _trajectory(trajectory)
+    frames = len(run.t)
+    for name, shape in {"q": (frames, found.n), "p": (frames, found.n), "energy": (frames,)}.items():
+        values = getattr(run, name)
+        if values is not None and (np.shape(values) != shape or not frames):
+            raise SpringcheckError(
+                f"{run.label}: {name} has the shape {np.shape(values)}; {frames} times of scene {found.name} "
+                f"need {shape}, and one at least"
+            )
+    if run.every < 1 or run.step == 0:
+        raise SpringcheckError(f"{run.label}: frames {run.every} steps of {run.step:g} apart are none")
+    return checks.judge(found, run)
 
 
 def compare(

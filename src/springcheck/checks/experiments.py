@@ -11,7 +11,8 @@ from springcheck.checks import sight
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import check
-from springcheck.checks.steps import fastest
+from springcheck.checks.steps import step_defect
+from springcheck.checks.stretch import JOINED, follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
@@ -201,7 +202,9 @@ def reversibility(bench: Bench) -> Verdict:
     if two_stage:
         state = _shifted(case.judged, scheme, state, -1)
     back = bench.run(replace(bench.scene, q=state[0], p=state[1], steps=steps, every=1), bench.label)
-    enlarged = _enlarged(case, 2 * steps + 2)
+    # of the way out alone: a way back that explodes must not enlarge what it is judged by
+    size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
+    enlarged = _enlarged(case, steps, state, size)
     if enlarged is None:
         return bench.not_applicable("reversibility", "the motion grows, and rounding with it")
     bound = case.roundings * enlarged
@@ -212,8 +215,6 @@ def reversibility(bench: Bench) -> Verdict:
     end = back.q[-1], back.p[-1]
     if two_stage:
         end = _shifted(case.judged, scheme, end, 1)
-    # of the way out alone: a way back that explodes must not enlarge what it is judged by
-    size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
     off = case.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
     # a motion that stood still after its turning point would end there, with the momenta flipped
     moved = case.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
@@ -245,13 +246,26 @@ def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
     return Limits(area=float(allowed / off)) if np.isfinite(off) and off > allowed else NOT_KNOWN
 
 
-def _enlarged(case: Case, steps: int) -> float | None:
-    """What the map makes of one rounding in each of so many steps; None where it grows without bound."""
+def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.floating) -> float | None:
+    """What becomes of one rounding in each of so many steps out and back, in roundings of this size; None
+    where that is not known.
+
+    A rounding on the way out is carried by all of the way back from where it was made, and so counts like
+    one that is made there on the way back.
+    """
     if case.linear:
-        total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
+        total, grown = schemes.amplification(case.matrices, case.w, np.array([2 * steps + 2]))
         return float(total[0]) if grown[0] < 2 else None
-    # a rounding shifts the energy, and with it the frequency of an anharmonic motion
-    return steps * (1 + steps * fastest(case) * abs(case.trajectory.step) / 2)
+    if case.joined and case.scene.n > JOINED:
+        return None
+    ways = [
+        follow(case, q[None].astype(np.longdouble), p[None].astype(np.longdouble), steps + 1)
+        for q, p in ((case.scene.q, case.scene.p), turned)
+    ]
+    if not all(np.all(known(case, way, steps)) for way in ways):
+        return None
+    ends = 2 * case.norm.size(ways[1].of_q, ways[1].of_p)[0]
+    return float(ends / size) if size > 0 else 0.0
 
 
 @check("mirror", family="repeat", needs="a fixed step and no friction")
@@ -297,6 +311,12 @@ def company(bench: Bench) -> Verdict:
         return bench.verdict("company", float("inf"), 0.0, "frames", "the two runs differ in length")
     n = scene.n
     differ = np.any((both.q[:, :n] != alone.q) | (both.p[:, :n] != alone.p), axis=1)
+    if np.any(differ):
+        part = replace(alone, q=both.q[:, :n].copy(), p=both.p[:, :n].copy())
+        if all(step_defect(Case(trajectory=run, scene=scene)).passed for run in (alone, part)):
+            return bench.not_applicable(
+                "company", "the two runs differ by rounding alone, as sums of another length do"
+            )
     return bench.verdict(
         "company", float(np.count_nonzero(differ)), 0.0, "frames", "systems side by side share nothing"
     )

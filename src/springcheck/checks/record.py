@@ -45,6 +45,8 @@ def grid(case: Case) -> Verdict:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
     if run.energy is None and "energy" in scene.quantities:
         wrong.append("there are no energies")
+    if run.outcome.status == "continued" and not case.piece:
+        wrong.append("it is a piece of a run that goes on")
     last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
     status = run.outcome.status
     if last > asked or (status == "complete" and last != asked):

@@ -13,7 +13,7 @@ from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflow
 from springcheck.checks.check import check
 from springcheck.checks.drag import drag
 from springcheck.checks.sight import States
-from springcheck.checks.stretch import Stretch
+from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.system import MOST_JOINED
 from springcheck.trajectory import Limits, Verdict
@@ -130,27 +130,10 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
     )
 
 
-BENT = 0.125
-"""Part of a motion up to which what rounding does to it goes by the tangent: beyond, the next order
-counts."""
-
-
 def _told(case: Case) -> NDArray[np.bool_]:
     """At which frames but the first the scheme's own state and what rounding does to it are known (f-1,)."""
-    ahead = case.ahead
-    assert ahead is not None
-    with np.errstate(all="ignore"):
-        parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
-        told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
-        if not case.straight and case.trajectory.every > 1:
-            span = case.trajectory.every * np.longdouble(abs(case.trajectory.step)) / case.judged.m
-            reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
-            near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
-                case.roundings * ahead.of_p <= BENT * reach_p
-            )
-            # with several solutions to a step, an engine may have found another one
-            told &= np.all(near, axis=1) & (ahead.turns < 1)
-    return np.asarray(told)
+    assert case.ahead is not None
+    return known(case, case.ahead, case.trajectory.every)
 
 
 def _by_norm(case: Case) -> Verdict:

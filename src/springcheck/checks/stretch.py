@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.checks import rounding
 from springcheck.physics.arrays import Extended, Force, Reals
@@ -49,6 +50,27 @@ class Stretch:
     last_q: Extended
     last_p: Extended
     """The allowance of the last step alone (f, n)."""
+
+
+BENT = 0.125
+"""Part of a motion up to which what rounding does to it goes by the tangent: beyond, the next order
+counts."""
+
+
+def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
+    """Of which of these ways of so many steps the end, and what rounding does to it, are known (f,)."""
+    with np.errstate(all="ignore"):
+        parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
+        told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
+        if not case.straight and steps > 1:
+            span = steps * np.longdouble(abs(case.trajectory.step)) / case.judged.m
+            reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
+            near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
+                case.roundings * ahead.of_p <= BENT * reach_p
+            )
+            # with several solutions to a step, an engine may have found another one
+            told &= np.all(near, axis=1) & (ahead.turns < 1)
+    return np.asarray(told)
 
 
 def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
