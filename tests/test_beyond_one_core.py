@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision import text
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
+from test_taking_up import raising
 
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 
@@ -45,18 +45,6 @@ def test_the_stores_of_one_and_of_two_workers_are_equal_value_for_value(name: st
     assert values(one) == values(two)
     assert len(values(one)) >= 3
     assert json.loads(store.document(one, name)) == json.loads(store.document(two, name))
-
-
-def raising(after: int) -> Callable[..., None]:
-    """A progress callback that is Ctrl-C at its `after`-th call."""
-    calls: list[object] = []
-
-    def told(*what: object) -> None:
-        calls.append(what)
-        if len(calls) == after:
-            raise KeyboardInterrupt
-
-    return told
 
 
 def test_what_workers_have_finished_is_taken_up_by_one_alone(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import re
+from argparse import Namespace
 from collections import Counter
 from pathlib import Path
 
@@ -101,19 +102,7 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
     scene = scenefile.load_scene("spring-uneven")
     found = precision.study(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
 
-    class Options:
-        points = True
-
-    printed = []
-    for width in (None, *WIDTHS):
-        capsys.readouterr()
-        with monkeypatch.context() as patch:
-            patch.setattr("sys.stdout.isatty", lambda wide=width: wide is not None, raising=False)
-            patch.setenv("COLUMNS", str(width or 1))
-            output.show(text.lines(found, Options()))  # type: ignore[arg-type]
-        printed.append(bare(capsys.readouterr().out))
-        assert not Counter(printed[0].split()) - Counter(printed[-1].split()), width
-        assert max(map(len, printed[-1].splitlines())) <= (width or 200)
+    on_terminals(text.lines(found, Namespace(points=True)), monkeypatch, capsys)
 
 
 def on_terminals(lines: Lines, monkeypatch: Patch, capsys: Captured) -> None:

@@ -19,6 +19,7 @@ from springcheck.engines.contract import (
     Method,
     Simulation,
     Stopped,
+    by_name,
     named,
 )
 from springcheck.errors import MethodError
@@ -112,19 +113,12 @@ ENGINE = Engine(
     module="Box2D",
     extra="box2d",
     methods=named(
-        Method(
-            name="force",
-            scheme="semi-implicit-euler",
-            about="ApplyForceToCenter before each step",
-            terms=EVERY_FORCE,
-            default=False,
-        ),
-        Method(
-            name="distance-joint",
-            scheme="implicit-euler",
-            about="b2DistanceJoint with a frequency and no damping, its length far from 0",
-            terms=frozenset({"wall-spring"}),
-            default=False,
+        by_name("force", "semi-implicit-euler", "ApplyForceToCenter before each step", EVERY_FORCE),
+        by_name(
+            "distance-joint",
+            "implicit-euler",
+            "b2DistanceJoint with a frequency and no damping, its length far from 0",
+            frozenset({"wall-spring"}),
         ),
     ),
     start=start,

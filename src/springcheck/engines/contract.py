@@ -162,6 +162,13 @@ class Engine:
         return self.module or self.distribution.replace("-", "_")
 
 
+def by_name(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need) -> Method:
+    """A method that is run by its name alone, never by default."""
+    return Method(
+        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False
+    )
+
+
 def named(*methods: Method) -> dict[str, Method]:
     """Methods by name, as `Engine` takes them."""
     return {method.name: method for method in methods}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.engines.bonds import walls
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, by_name, named
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping
@@ -81,19 +81,12 @@ ENGINE = Engine(
     distribution="dartpy",
     extra="dart",
     methods=named(
-        Method(
-            name="force",
-            scheme="semi-implicit-euler",
-            about="Skeleton.setForces before each step",
-            terms=EVERY_FORCE,
-            default=False,
-        ),
-        Method(
-            name="joint-spring",
-            scheme="implicit-euler",
-            about="spring and damping of the joint",
-            terms=frozenset({"wall-spring", "damping"}),
-            default=False,
+        by_name("force", "semi-implicit-euler", "Skeleton.setForces before each step", EVERY_FORCE),
+        by_name(
+            "joint-spring",
+            "implicit-euler",
+            "spring and damping of the joint",
+            frozenset({"wall-spring", "damping"}),
         ),
     ),
     start=start,

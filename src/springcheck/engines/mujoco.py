@@ -23,6 +23,7 @@ from springcheck.engines.contract import (
     Need,
     Simulation,
     Stopped,
+    by_name,
     named,
 )
 from springcheck.physics.arrays import Arithmetic, Floats
@@ -180,40 +181,34 @@ def _unheard(message: str) -> None:
     """What MuJoCo warns of shows in the states."""
 
 
-def _method(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need) -> Method:
-    return Method(
-        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False
-    )
-
-
 ENGINE = Engine(
     name="mujoco",
     title="MuJoCo",
     distribution="mujoco",
     extra="mujoco",
     methods=named(
-        _method("joint-spring", "semi-implicit-euler", "joint stiffness, integrator Euler", SPRINGS),
-        _method("joint-spring-implicit", "semi-implicit-euler", "joint stiffness, implicit", SPRINGS),
-        _method("joint-spring-implicitfast", "semi-implicit-euler", "joint stiffness, implicitfast", SPRINGS),
-        _method("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
-        _method("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
-        _method(
+        by_name("joint-spring", "semi-implicit-euler", "joint stiffness, integrator Euler", SPRINGS),
+        by_name("joint-spring-implicit", "semi-implicit-euler", "joint stiffness, implicit", SPRINGS),
+        by_name("joint-spring-implicitfast", "semi-implicit-euler", "joint stiffness, implicitfast", SPRINGS),
+        by_name("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
+        by_name("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
+        by_name(
             "joint-damping-implicitfast",
             IMPLICIT_FRICTION,
             "joint damping, implicitfast",
             DAMPED,
             Need.DAMPING,
         ),
-        _method(
+        by_name(
             "joint-damping-explicit",
             "semi-implicit-euler",
             "joint damping, eulerdamp off",
             DAMPED,
             Need.DAMPING,
         ),
-        _method("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
-        _method("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),
-        _method(
+        by_name("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
+        by_name("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),
+        by_name(
             "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE
         ),
     ),

@@ -9,7 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.engines.bonds import far
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import (
+    EVERY_FORCE,
+    SPRINGS,
+    Engine,
+    Label,
+    Method,
+    Simulation,
+    by_name,
+    named,
+)
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
@@ -91,18 +100,12 @@ ENGINE = Engine(
     distribution="pymunk",
     extra="pymunk",
     methods=named(
-        Method(
-            name="force",
-            scheme="explicit-euler",
-            about="Body.force, set before each step",
-            terms=EVERY_FORCE,
-            default=False,
-        ),
-        Method(
-            name="damped-spring",
-            scheme="semi-implicit-euler-drift-kick",
-            about="DampedSpring without damping, its rest length far from 0",
-            default=False,
+        by_name("force", "explicit-euler", "Body.force, set before each step", EVERY_FORCE),
+        by_name(
+            "damped-spring",
+            "semi-implicit-euler-drift-kick",
+            "DampedSpring without damping, its rest length far from 0",
+            SPRINGS,
         ),
     ),
     start=start,

@@ -19,6 +19,7 @@ from springcheck.engines.contract import (
     Method,
     Simulation,
     Stopped,
+    by_name,
     named,
 )
 from springcheck.errors import MethodError
@@ -102,19 +103,12 @@ ENGINE = Engine(
     distribution="rapier3d",
     extra="rapier",
     methods=named(
-        Method(
-            name="force",
-            scheme="force-held-4",
-            about="RigidBody.add_force before each step of 4 substeps",
-            terms=EVERY_FORCE,
-            default=False,
-        ),
-        Method(
-            name="spring-joint",
-            scheme="implicit-euler-4",
-            about="SpringJoint without damping, its length far from 0, in 4 substeps",
-            terms=frozenset({"wall-spring"}),
-            default=False,
+        by_name("force", "force-held-4", "RigidBody.add_force before each step of 4 substeps", EVERY_FORCE),
+        by_name(
+            "spring-joint",
+            "implicit-euler-4",
+            "SpringJoint without damping, its length far from 0, in 4 substeps",
+            frozenset({"wall-spring"}),
         ),
     ),
     start=start,

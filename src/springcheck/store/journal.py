@@ -239,7 +239,6 @@ class Journal:
         comparison: Comparison | None = None,
         verdicts: Sequence[Verdict] = (),
         documents: Mapping[str, str] | None = None,
-        attributes: Mapping[str, Scalar] | None = None,
         final: bool = True,
     ) -> None:
         """Replace the collection by one that holds everything finished; `final` ends the journal.
@@ -252,7 +251,7 @@ class Journal:
             extra.append(tables.of_comparison(comparison))
         if verdicts:
             extra.append(tables.of_verdicts(verdicts))
-        root: dict[str, Scalar] = {"run": self.run, "complete": final, **(attributes or {})}
+        root: dict[str, Scalar] = {"run": self.run, "complete": final}
         if scene is not None:
             root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)

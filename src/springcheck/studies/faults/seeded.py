@@ -135,7 +135,7 @@ def mass_of_drift(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
 
 
 def verlet(
-    scene: Scene, *, first: float = 0.5, drift: float = 1.0, second: float = 0.5
+    scene: Scene, *, first: float = 0.5, second: float = 0.5
 ) -> Callable[[int, Floats, Floats], State]:
     """Velocity Verlet with other coefficients."""
     force = scene.system.force
@@ -143,7 +143,7 @@ def verlet(
 
     def step(i: int, q: Floats, p: Floats) -> State:
         p = p + first * h * force(q, p)
-        q = q + drift * h * (p / m)
+        q = q + h * (p / m)
         return q, np.asarray(p + second * h * force(q, p), np.float64)
 
     return step

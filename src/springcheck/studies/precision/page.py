@@ -25,28 +25,28 @@ def banks(study: PrecisionStudy) -> list[Bank]:
         log=True,
         shown=(least / 2, min(MOST_SHOWN, 2 * max(x.error for x in points))),
     )
-    timed = [x for x in points if x.run_repeats]
-    charts = []
-    if timed:
-        charts.append(
-            Chart(
-                title="Error against the run time of the engine alone, its smallest of several.",
-                x=Scale(name="run time [s]", log=True),
-                y=error,
-                curves=_curves(study, timed, lambda x: x.seconds),
-            )
-        )
-    counted = [x for x in points if x.force_calls]
-    if counted:
-        charts.append(
-            Chart(
-                title="Error against force calls, which any machine counts alike.",
-                x=Scale(name="force calls", log=True),
-                y=error,
-                curves=_curves(study, counted, lambda x: float(x.force_calls or 0)),
-            )
-        )
+    ways: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
+        (
+            "Error against the run time of the engine alone, its smallest of several.",
+            "run time [s]",
+            _run_time,
+        ),
+        ("Error against force calls, which any machine counts alike.", "force calls", _force_calls),
+    )
+    charts = [
+        Chart(title=title, x=Scale(name=name, log=True), y=error, curves=_curves(study, known, cost))
+        for title, name, cost in ways
+        if (known := [x for x in points if cost(x) > 0])
+    ]
     return [Bank(title="Methods drawn", charts=charts)] if charts else []
+
+
+def _run_time(x: Point) -> float:
+    return x.seconds
+
+
+def _force_calls(x: Point) -> float:
+    return float(x.force_calls or 0)
 
 
 def _curves(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
