@@ -19,6 +19,7 @@ from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision import text
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
+from springcheck.text.wording import count
 from test_taking_up import raising
 
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
@@ -98,4 +99,4 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
     )
     said = "\n".join(map(str, text.lines(replace(many, points=tuple(untimed)))))
     assert after == before + 1
-    assert f"{after} points have errors alone: workers measure no times" in said
+    assert f"{count(after, 'point')} of errors alone: workers measure no times" in said

@@ -15,6 +15,7 @@ from springcheck.checks.steps import step_defect
 from springcheck.checks.stretch import JOINED, follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
+from springcheck.text.wording import count
 from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
 
 
@@ -225,7 +226,7 @@ def reversibility(bench: Bench) -> Verdict:
         float(off / size),
         bound,
         "roundings",
-        f"{steps} steps out and {steps} back, each rounded, all of one sign",
+        f"{count(steps, 'step')} out and {steps} back, each rounded, all of one sign",
         _sees(case, steps, bound * size),
     )
 

@@ -11,6 +11,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import check
 from springcheck.checks.steps import STILL, closed_or_not
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
+from springcheck.text.wording import count
 from springcheck.trajectory import Limits, Verdict
 
 
@@ -48,7 +49,7 @@ def closed_form(case: Case) -> Verdict:
         float(distance[worst] / unit[worst]),
         float(bound[worst]),
         "roundings",
-        f"roundings of {case.steps[worst]} steps, carried on by the map: {_how(case)}"
+        f"roundings of {count(int(case.steps[worst]), 'step')}, carried on by the map: {_how(case)}"
         + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
         sight.of_modes(case, part),
     )
@@ -131,7 +132,8 @@ def shadow_energy(case: Case) -> Verdict:
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"roundings of {case.steps[worst]} steps: {_how(case)}" + _untold(case, drowned, "energy"),
+        f"roundings of {count(int(case.steps[worst]), 'step')}: {_how(case)}"
+        + _untold(case, drowned, "energy"),
         sight.of_modes(case, part),
     )
 
@@ -260,6 +262,6 @@ def momentum(case: Case) -> Verdict:
         float(seen[worst]),
         float(limit[worst]),
         "roundings",
-        f"forces cancel in pairs; {steps[worst + 1]} steps, each rounded, all of one sign",
+        f"forces cancel in pairs; {count(int(steps[worst + 1]), 'step')}, each rounded, all of one sign",
         Limits(reaction=float(off_by) if np.isfinite(off_by) else None),
     )

@@ -7,6 +7,7 @@ import numpy as np
 from springcheck.checks.case import REPEATED, Case
 from springcheck.checks.check import check
 from springcheck.physics import exact
+from springcheck.text.wording import count
 from springcheck.trajectory import Verdict
 
 
@@ -39,7 +40,7 @@ def grid(case: Case) -> Verdict:
     if run.step != scene.step:
         wrong.append(f"the step is {run.step:g} instead of {scene.step:g}")
     if run.every != scene.every:
-        wrong.append(f"every {run.every} steps are recorded instead of {scene.every}")
+        wrong.append(f"frames are {count(run.every, 'step')} apart instead of {scene.every}")
     fixed = case.scheme.one_step or case.scheme.flow or case.scheme.unnamed
     if not fixed and run.tolerance != scene.tolerance:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")

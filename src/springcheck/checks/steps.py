@@ -16,6 +16,7 @@ from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.system import MOST_JOINED
+from springcheck.text.wording import count
 from springcheck.trajectory import Limits, Verdict
 
 CONTRACTED = 1e-3
@@ -86,7 +87,8 @@ def _step_defect(case: Case) -> Verdict:
         why = f"roundings of each of {run.every} steps, each carried to the frame by the steps after it"
     if not np.all(told):
         first = case.steps[int(np.argmin(told)) + 1]
-        why += f"; {np.count_nonzero(~told)} frames, from step {first} on, where one may grow to all of it"
+        frames = count(int(np.count_nonzero(~told)), "frame")
+        why += f"; {frames}, from step {first} on, where one may grow to all of it"
     why = _beyond_range(case, off) or why + _where(case, off)
     value, most = float(seen[worst]), float(bound)
     if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
@@ -122,10 +124,10 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
     """Where the first of the frames that are off (f-1,) is, and how many are."""
     if not np.any(off):
         return ""
-    first, count = int(np.argmax(off)) + 1, int(np.count_nonzero(off))
+    first, number = int(np.argmax(off)) + 1, int(np.count_nonzero(off))
     return (
-        f"; the first of {count} frames off is at step {case.steps[first]}"
-        if count > 1
+        f"; the first of {number} frames off is at step {case.steps[first]}"
+        if number > 1
         else (f"; one frame is off, at step {case.steps[first]}")
     )
 

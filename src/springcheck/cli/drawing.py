@@ -14,6 +14,7 @@ from springcheck.cli import inspect
 from springcheck.errors import SpringcheckError, plain
 from springcheck.figures import folder
 from springcheck.studies import STUDIES
+from springcheck.text.wording import count
 
 MOST_COORDINATES = 8
 """Coordinates of a file of other programs that are drawn."""
@@ -75,7 +76,11 @@ def draw_foreign(
     moving = np.flatnonzero(np.ptp(found.q, axis=0) > 0)
     chosen = moving[:MOST_COORDINATES] if particle is None else np.array([particle])
     left = len(moving) - len(chosen)
-    notes = [f"{left} more coordinates move, which --particle draws"] if particle is None and left else []
+    notes = (
+        [f"{count(left, 'moving coordinate')} more, which --particle draws"]
+        if particle is None and left
+        else []
+    )
     with style(), tempfile.TemporaryDirectory() as made:
         figure = Figure(figsize=(9.2, 4.2), layout="constrained")
         portrait, motion = figure.subplots(1, 2)
@@ -87,5 +92,5 @@ def draw_foreign(
         portrait.legend()
         motion.set_xlabel("t")
         motion.set_ylabel("q")
-        figure.suptitle(plain(f"{path.name}: {len(found.t)} frames"))
+        figure.suptitle(plain(f"{path.name}: {count(len(found.t), 'frame')}"))
         return folder.put(save(figure, Path(made), "states"), into, path), notes

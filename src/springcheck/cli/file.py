@@ -18,6 +18,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import count
 from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
 
 
@@ -62,7 +63,8 @@ class Judgement:
             )
             for v in self.verdicts
         ]  # fmt: skip
-        head = f"{self.path}: {self.frames} frames of {self.scene}, judged as {schemes.title(self.scheme)}"
+        frames, scheme = count(self.frames, "frame"), schemes.title(self.scheme)
+        head = f"{self.path}: {frames} of {self.scene}, judged as {scheme}"
         return [
             plain(head, "bold"),
             *(plain(f"  {note}") for note in self.notes),

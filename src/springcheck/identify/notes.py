@@ -12,7 +12,7 @@ from springcheck.identify.maps import table, unit
 from springcheck.identify.record import Record
 from springcheck.identify.search import Joint, coincident, numbers, search, separation
 from springcheck.identify.starts import Terms, solved
-from springcheck.text.wording import either
+from springcheck.text.wording import count, either
 
 APART = 10.0
 """Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
@@ -73,7 +73,7 @@ def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_st
             why, told = f"{pair} are the same, on springs of different {other}{friction}", []
         else:
             why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
-            told = [f"about {digits} more digit{'s' * (digits > 1)}", "a larger step"] if digits > 0 else []
+            told = [f"about {count(digits, 'more digit')}", "a larger step"] if digits > 0 else []
             told += ["more frames"] if digits <= 2 else []
     if record.momenta:
         told.append("the mass")

@@ -7,6 +7,7 @@ from argparse import Namespace
 from springcheck.studies.extremes.result import Atlas
 from springcheck.studies.text import left_out, taken_up
 from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import count
 
 SHORT = {
     "right": "right",
@@ -25,7 +26,7 @@ def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:
         counts = atlas.counts(method)
         rows.append((method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in SHORT)))
     wrong = atlas.wrong
-    verdict = f"{len(wrong)} cells silently wrong" if wrong else "no cell is silently wrong"
+    verdict = f"{count(len(wrong), 'cell')} silently wrong" if wrong else "no cell is silently wrong"
     out: Lines = [
         plain(f"{len(atlas.cells)} extreme cases", "bold"),
         *taken_up(atlas.taken_up, "table"),

@@ -6,6 +6,7 @@ from argparse import Namespace
 
 from springcheck.studies.faults.result import FaultReport
 from springcheck.text.lines import Lines, Row, plain, table
+from springcheck.text.wording import count
 
 
 def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
@@ -34,8 +35,8 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
         ),
         *(plain(f"FALSE ALARM {alarm}", "bold red") for alarm in clean.alarms),
         plain(
-            f"{rejected} of {len(found.results)} faults rejected; {clean.runs} clean runs, "
-            f"{clean.verdicts} verdicts, {len(clean.alarms)} false alarms"
+            f"{rejected} of {len(found.results)} faults rejected; {count(clean.runs, 'clean run')}, "
+            f"{count(clean.verdicts, 'verdict')}, {count(len(clean.alarms), 'false alarm')}"
         ),
     ]
     return [*out, plain(f"Stored in {found.path}")] if found.path else out

@@ -49,6 +49,7 @@ from springcheck.studies.precision.sweeps import (
 from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
+from springcheck.text.wording import count
 
 BUDGET = 75.0
 """Seconds that a study takes unless it is told otherwise."""
@@ -245,7 +246,7 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead
         began = perf_counter()
         points.append(ahead.get(_place(sweep)) or _errors(sweep, known))
         spent.append(perf_counter() - began)
-    tell(f"timing {len(sweeps)} methods in turn")
+    tell(f"timing {count(len(sweeps), 'method')} in turn")
     clocks = [
         Clock(sweep=sweep, scene=to_time(known.scene, sweep))
         for sweep, point in zip(sweeps, points, strict=True)
@@ -273,7 +274,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
     record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
     if outcome.status != "complete":
-        message = f"after {outcome.step} steps: {outcome.message}"
+        message = f"after {count(outcome.step, 'step')}: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
     found = errors.result
     if not (np.isfinite(found.largest) and np.isfinite(found.energy)):

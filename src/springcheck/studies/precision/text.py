@@ -9,7 +9,7 @@ from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, taken_up
 from springcheck.text.lines import Lines, Row, Table, plain, table
-from springcheck.text.wording import duration, seconds
+from springcheck.text.wording import count, duration, seconds
 
 
 def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
@@ -18,7 +18,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     done = sum(point.complete for point in study.points)
     out: Lines = [
         plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
-        plain(f"  {done} points in {study.seconds:.0f} s on {study.machine['processor']}"),
+        plain(f"  {count(done, 'point')} in {study.seconds:.0f} s on {study.machine['processor']}"),
         *taken_up(study.taken_up, "point"),
         plain(),
         _methods(study.methods),
@@ -35,7 +35,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
             )
     untimed = sum(point.complete and not point.run_repeats for point in study.points)
     if untimed:
-        out.append(plain(f"  {untimed} points have errors alone: workers measure no times"))
+        out.append(plain(f"  {count(untimed, 'point')} of errors alone: workers measure no times"))
     rest = [point for point in study.points if not point.complete]
     if rest:
         out += [plain(), plain("Not measured:")]

@@ -13,6 +13,7 @@ from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import plain
+from springcheck.text.wording import count
 from springcheck.trajectory import Comparison, Verdict
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class Report:
         passed = sum(verdict.passed is True for verdict in self.verdicts)
         failed = sum(verdict.passed is False for verdict in self.verdicts)
         rest = len(self.verdicts) - passed - failed
-        return f"{passed} verdicts passed, {failed} failed, {rest} not applicable"
+        return f"{count(passed, 'verdict')} passed, {failed} failed, {rest} not applicable"
 
     @property
     def status(self) -> Literal[0, 1, 2]:

@@ -17,7 +17,7 @@ from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Row, Table, plain, table
-from springcheck.text.wording import seconds
+from springcheck.text.wording import count, seconds
 from springcheck.trajectory import Comparison, Limits, Verdict
 
 
@@ -75,8 +75,7 @@ def _headline(report: Report) -> Text:
     """Title, grid and start of a scene."""
     scene = report.scene
     size = "" if scene.n == 1 else f", {scene.n} particles"
-    steps = "1 step" if scene.steps == 1 else f"{scene.steps} steps"
-    return plain(f"{scene.title}: {steps} of {scene.step:g}{size}", "bold")
+    return plain(f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}", "bold")
 
 
 def _runs(runs: Sequence[MethodRun]) -> Table:

@@ -18,6 +18,7 @@ from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.tables import Record, Rows
+from springcheck.text.wording import count
 
 GROWTH = 1e-6
 """Relative difference allowed between measured and predicted growth in double precision: what is left of
@@ -145,7 +146,11 @@ def failures(study: Stability) -> list[str]:
                 )
         if np.isfinite(x.growth_below) and not x.growth_below <= max(x.growth_below_predicted, 0) + 1e-4:
             out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
-    out += [f"{x.method}: {x.wrong} points of the damped plane disagree" for x in study.regions if x.wrong]
+    out += [
+        f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory"
+        for x in study.regions
+        if x.wrong
+    ]
     for y in study.resonances:
         if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
             out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
