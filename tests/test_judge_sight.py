@@ -19,7 +19,7 @@ from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic, Spring
+from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.store import tables
 from springcheck.studies.faults import clean
 from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
@@ -151,3 +151,18 @@ def test_the_matrix_says_it_of_its_single_steps() -> None:
         limit = getattr(experiments.propagator(bench()).sees, name)
         assert experiments.propagator(bench(name, 3 * limit)).passed is False
         assert experiments.propagator(bench(name, limit / 10)).passed is True
+
+
+def test_of_a_motion_that_explodes_no_limit_is_stated_that_its_first_order_does_not_tell() -> None:
+    """A wall that pushes into a quartic with a step too long for it: the seventh step leaves by 1e5."""
+    at = np.array([-0.247])
+    terms = (
+        WallSpring(i=np.array([0]), k=np.array([-113.0]), at=at),
+        Quartic(i=np.array([0]), b=np.array([54.2]), at=at),
+    )
+    start = np.array([0.1014]), terms, np.array([0.00612]), np.array([-0.0171])
+    scene, scheme = clean.scene(*start, step=0.0323, steps=7), schemes.SCHEMES["position-verlet"]
+    bench = checks.Bench(scene=scene, label="", run=lambda made, label: detection.planted(made, scheme))
+    verdict = experiments.reversibility(bench)
+    assert verdict.passed is True
+    assert verdict.sees == NOT_KNOWN

@@ -231,6 +231,10 @@ def reversibility(bench: Bench) -> Verdict:
     )
 
 
+SMALL_PART = 2.0**-10
+"""Of the initial energy norm, up to which the effect of a change is taken for linear in it."""
+
+
 def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
     """By how much momenta may be off after each step so that what comes back is off by what is allowed."""
     change = np.longdouble(sight.change_of(2 * steps))
@@ -243,8 +247,10 @@ def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
         p = sign * p
         if two_stage:
             q, p = (x.astype(np.longdouble) for x in _shifted(case.judged, case.scheme, (q, p), sign))
-    off = case.norm.size(q - case.scene.q, p + case.scene.p) / change
-    return Limits(area=float(allowed / off)) if np.isfinite(off) and off > allowed else NOT_KNOWN
+    off = case.norm.size(q - case.scene.q, p + case.scene.p)
+    # beyond a small part of the motion the effect is no longer as large as the change
+    told = allowed * change < off <= case.norm.unit * SMALL_PART
+    return Limits(area=float(allowed * change / off)) if told else NOT_KNOWN
 
 
 def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.floating) -> float | None:
