@@ -234,12 +234,18 @@ def described(folder: Path, queue: str = "normal") -> str:
     return str(file)
 
 
-def test_jobs_of_a_queue_measure_and_none_is_left(queue: Path) -> None:
-    found = dict(Cluster(described(queue)).carried_out([partial(slow, i, 0.0) for i in range(20)]))
+def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(queue: Path) -> None:
+    found = {}
+    for i, answer in Cluster(described(queue)).carried_out([partial(slow, i, 0.02) for i in range(20)]):
+        found[i] = answer
+        if len(found) == 3:
+            # its time is up
+            os.killpg(int((queue / "jobs").read_text()), signal.SIGKILL)
     assert sorted(found) == list(range(20))
+    assert all(np.array_equal(found[i][1], np.sqrt(np.arange(5.0) + i)) for i in found)
     assert os.getpid() not in {pid for pid, _ in found.values()}
     jobs = (queue / "jobs").read_text().split()
-    assert jobs
+    assert len(jobs) >= 2
     end = time.monotonic() + 30
     while time.monotonic() < end and any(Path(f"/proc/{job}").is_dir() for job in jobs):
         time.sleep(0.05)

@@ -17,12 +17,17 @@ spring-uneven --vary ... --cluster FILE`, 400 pieces of 50 cells, again and agai
 After each, every part that the journal held is still there, byte for byte, and is not measured again; and in
 the end the store passes `check` and holds the table of the undisturbed study by one process, value for value.
 
+Measured on two cores with a load of 15 to 23: 175 workers and 5 schedulers killed, 8 studies, 3,200 pieces,
+lost 0, wrong 0.  Before that it had found that a result lost with its worker was taken for the end of the
+scheduler (twice in 38 kills), or ended the study as KilledWorker (once in 260).
+
 All processes are forked from one that has imported what they need, so that 100 workers cost minutes and not
 hours; each then runs dask's own command, or springcheck's.
 
     python validation/cluster_kills.py --rate
 
-measures what the scheduler and the parent do in a second with pieces that take no time.
+measures what scheduler and parent take for pieces that take no time: 4.0 and 6.3 ms of processor time a piece
+with a load of 11, 5.3 and 7.5 ms with a load of 17.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -111,7 +112,7 @@ def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
             f"worker {worker.address} has {worker.state.nthreads} threads, and measures one piece at a time: "
             "start it with --nthreads 1, and with --nworkers as many as it has cores"
         )
-    its = provenance.versions()
+    its = _here()
     for name in sorted(wanted.keys() | its.keys()):
         if wanted.get(name) != its.get(name):
             raise SpringcheckError(
@@ -119,6 +120,11 @@ def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
                 f"here it is {wanted.get(name, 'not at all')}; its numbers might differ"
             )
     return part()
+
+
+@cache
+def _here() -> dict[str, str]:
+    return provenance.versions()
 
 
 def _answers(
