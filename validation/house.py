@@ -10,20 +10,20 @@ system), the smallest of interleaved repetitions, with compiled modules in place
 
 Command: python validation/house.py [repeats]        (40 s for 5)
 
-Printed on two cores that some ten other programs kept busy, which lengthens both sides, not alike:
+Printed on two cores that some sixteen other programs kept busy, which lengthens both sides, not alike (on the
+idle machine the two ratios were 2.07 and 1.30 a few steps before):
 
-    lines 35460 in 237 modules, median 133
-    largest identify/explain.py 418, studies/faults/seeded.py 398, store/reading.py 389,
-      identify/report.py 373, checks/case.py 369
-    rooms 31, arrows 157, longest chain 15:
-      __main__ > cli > commands > page > explain > studies > doors > identify > formats > store > trajectory >
-      engines > schemes > physics > arrays
-    imports of numpy and h5py       292 ms
-    the smallest run                838 ms
-    imports of the libraries       1152 ms
-    run spring                     2449 ms
-    its engines alone               249 ms
-    smallest run / imports 2.87; run spring / (imports + engines) 1.75
+    lines 37897 in 252 modules, median 130.5
+    largest studies/faults/seeded.py 397, checks/case.py 387, identify/report.py 385,
+      studies/run/measure.py 384, physics/system.py 380
+    rooms 20, arrows 88, longest chain 10:
+      __main__ > cli > studies > doors > identify > formats > store > trajectory > physics > errors
+    imports of numpy and h5py       133 ms
+    the smallest run                368 ms
+    imports of the libraries        669 ms
+    run spring                     1219 ms
+    its engines alone                80 ms
+    smallest run / imports 2.77; run spring / (imports + engines) 1.63
 
 The speed of the own engine beside C is measured by kernel_speed.py.
 """
