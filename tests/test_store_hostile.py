@@ -72,9 +72,15 @@ def test_a_file_that_nobody_gave_is_seen_by_its_system_call(served: SERVED) -> N
         f'7 openat(AT_FDCWD<{place.work}>, "../../own/secret.txt", O_RDONLY) = 3',
         f'7 openat(AT_FDCWD<{place.work}>, "/etc/passwd", O_RDWR) = 3',
         f'7 openat(AT_FDCWD<{place.work}>, "/etc/fstab", O_RDONLY) = 3',
+        f'8 openat(AT_FDCWD<{place.work}>, "/home/y", O_RDONLY <unfinished ...>',
+        f'7 openat(AT_FDCWD<{place.work}>, "/home/z", O_RDONLY <unfinished ...>',
+        "8 <... openat resumed>) = -1 ENOENT (No such file or directory)",
+        "7 <... openat resumed>) = 5</home/z>",
         f'7 openat(AT_FDCWD<{place.work}>, "/home/x", O_RDONLY) = -1 ENOENT (No such file or directory)',
     ]
     log.write_text("\n".join(lines))
     secret, n = f"{place.own}/secret.txt", place.cases
-    assert campaign.trace(log, place, {n: ()}) == {n: [f"openat {secret}", "openat /etc/passwd"]}
-    assert campaign.trace(log, place, {n: (secret,)}) == {n: ["openat /etc/passwd"]}
+    assert campaign.trace(log, place, {n: ()}) == {
+        n: [f"openat {secret}", "openat /etc/passwd", "openat /home/z"]
+    }
+    assert campaign.trace(log, place, {n: (secret,)}) == {n: ["openat /etc/passwd", "openat /home/z"]}

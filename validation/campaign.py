@@ -274,7 +274,16 @@ def trace(log: Path, place: Place, asked: dict[int, tuple[str, ...]]) -> dict[in
     found: dict[int, list[str]] = {}
     now, mine = -1, ""
     at_work = re.compile(re.escape(f"{place.home}/case-") + r"(\d+)/work$")
-    for line in log.read_text(errors="backslashreplace").splitlines():
+    waiting: dict[str, str] = {}
+    for raw in log.read_text(errors="backslashreplace").splitlines():
+        # a call that another process came between stands in two lines
+        pid, _, rest = raw.partition(" ")
+        if raw.endswith("<unfinished ...>"):
+            waiting[pid] = raw.removesuffix("<unfinished ...>")
+            continue
+        line = raw
+        if rest.lstrip().startswith("<...") and pid in waiting:
+            line = waiting.pop(pid) + rest.partition("resumed>")[2]
         match = _CALL.match(line)
         if not match:
             continue

@@ -65,6 +65,13 @@ class Record:
     origin: dict[str, str]
 
 
+TINY = float(np.finfo(np.float64).smallest_normal)
+SUBNORMAL = (
+    f"it has decayed below {TINY:.1e}: numbers are subnormal there, with fewer and fewer digits, and a "
+    "step takes up to fifty times as long"
+)
+
+
 def play(
     scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None, planned: int = 0
 ) -> Record:
@@ -111,6 +118,8 @@ def play(
         if status != "complete":
             outcome = Outcome(status=status, step=(frame - 1) * scene.every, message=message)
             break
+        if 0 < max(np.max(np.abs(q[f - 1])), np.max(np.abs(p[f - 1]))) < TINY:
+            outcome = Outcome(status="complete", step=scene.steps, message=SUBNORMAL)
     return Record(
         label=label,
         scheme=method.scheme,

@@ -54,7 +54,7 @@ def _report(report: Report) -> Lines:
     out += [
         plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
         for run in report.runs
-        if run.outcome != "complete"
+        if run.outcome != "complete" or run.message
     ]
     out += _same_motions(report)
     out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
