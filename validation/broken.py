@@ -208,7 +208,12 @@ FITTING: dict[str, tuple[str, ...]] = {
     "timeout": ("1", "0", "-1"),
 }  # fmt: skip
 """What fits an option, by the name of its attribute; some does only nearly."""
-FITTING |= {"source": FITTING["file"], "trajectory": FITTING["label"], "integrator": FITTING["stepper"]}
+FITTING |= {
+    "source": FITTING["file"],
+    "files": FITTING["file"],
+    "trajectory": FITTING["label"],
+    "integrator": FITTING["stepper"],
+}
 
 
 def given(folder: Path, store: bytes) -> None:

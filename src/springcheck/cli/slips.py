@@ -64,9 +64,11 @@ def look(options: argparse.Namespace) -> None:
     for attribute, called in NAMES.items():
         if given.get(attribute) == "":
             raise SpringcheckError(f"{called}: a name is needed, not an empty one")
-    for attribute in ("file", "source"):
-        if given.get(attribute) is not None:
-            _is_file(given[attribute])
+    if "" in (given.get("files") or ()):
+        raise SpringcheckError("FILE: a name is needed, not an empty one")
+    for name in (given.get("file"), given.get("source"), *(given.get("files") or ())):
+        if name is not None:
+            _is_file(name)
     if options.name not in ("plot",) and given.get("output"):
         _leads_somewhere(given["output"])
     for attribute, called, unread in UNREAD:
