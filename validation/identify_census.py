@@ -287,7 +287,8 @@ def said_of(number_: int) -> tuple[Draw, str, str, float] | None:
     begun = time.process_time()
     try:
         found = identify(t, written(q, draw.form), v=written(v, draw.form), mass=draw.m, stiffness=stated)
-        said, statement = judged(draw, found, _hides(states, draw.stride)), found.statement
+        hidden = bool(draw.error) and _hides(states, draw.stride)
+        said, statement = judged(draw, found, hidden), found.statement
     except IdentificationError as error:
         said, statement = f"refused: {str(error)[:60]}", ""
     return draw, said, statement, time.process_time() - begun

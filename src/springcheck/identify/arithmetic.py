@@ -21,6 +21,10 @@ REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
 
+UNUSUAL = 2.5
+"""Roundings of a step in units of those that are usual, 4 + 2 sqrt(steps).  Measured on 700 trajectories: 1 at
+most, and 2.1 where the clock is uneven."""
+
 STORED = "double, stored in single"
 EITHER = "single, or double stored in single"
 """Where the states are too few to tell an orbit that was rounded once from one rounded in every step."""
@@ -121,7 +125,13 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     path = stride * [4 if scheme.flow else scheme.path for scheme in schemes]
     ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
-    plain = (ulp <= np.minimum(path, 4 + 2 * np.sqrt(stride))) | ((ulp <= path) & visible)
+    usual = 4 + 2 * np.sqrt(stride)
+    plain = ulp <= np.minimum(path, usual)
+    if visible:
+        # an uneven clock's roundings follow its times; others are irregular, or they are no roundings
+        beyond = (ulp <= np.minimum(path, UNUSUAL * usual)) & ~plain
+        for i in np.flatnonzero(beyond):
+            plain[i] = record.slips is not None or coarse.white(found, matches[i], signed[i])
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

@@ -17,6 +17,7 @@ from springcheck.identify.search import FEW, distinct, search
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import misfit, wrong_map
 from springcheck.physics.arrays import Floats
+from springcheck.schemes import rotation
 
 FEWEST_MISSES = 24.0
 """Pairs that count in what is left over from which its pattern shows."""
@@ -80,8 +81,10 @@ def _alternation(e: Evidence) -> list[Explanation]:
     found = [matched(x, loose) for x in halves]
     names = [m.scheme for m in found[0] if m.scheme in {n.scheme for n in found[1]}]
     what = "two maps take turns"
-    if abs(dets[0] - dets[1]) > 4 * left:
+    if not names and abs(dets[0] - dets[1]) > 4 * left:
         what = f"a friction of changing sign multiplies areas by 1 {dets[0]:+.2e} and 1 {dets[1]:+.2e}"
+        if dets[0] * dets[1] > 0:
+            what = f"one multiplies areas by a share of {abs(dets[0] - dets[1]):.2e} more than the other"
     elif names:
         one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
         share = abs(math.sqrt(one.a / other.a) - 1)
@@ -227,23 +230,38 @@ def _shape(e: Evidence) -> list[Explanation]:
     # of those that explain nearly as much, the one of the fewest numbers
     good = [name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02)]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
+    if good[0] in STATE and _turns(e) < FEW_TURNS:
+        # where states hardly come back, any function of time is one of many powers of the state
+        good = [*good, "stiffness in time"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
     if len(kinds) > 1:
-        # over less than a period position and velocity are functions of time, and of each other
+        # over few periods position and velocity are functions of time, and of each other
         cause = (
-            f"The force depends on {' or on '.join(kinds)}, and the arc is too short to tell which: it "
+            f"The force {' or '.join(kinds)}, and the arc is too short to tell which: it "
             f"moves a frame by {size:.1e} of the state's size"
         )
-        remedy = "record more than a period, where positions come back at other times and velocities"
+        remedy = "record more periods, where positions come back at other times and velocities"
     return [Explanation(cause=cause, remedy=remedy, misfit=left[good[0]])]
 
 
 KIND = {
-    "drag": "the velocity", "quadratic": "powers of the position", "cubic": "powers of the position",
-    "anharmonic": "powers of the position", "position": "powers of the position", "velocity": "the velocity",
-    "stiffness in time": "time", "friction in time": "time", "map in time": "time",
+    "drag": "depends on the velocity", "quadratic": "is anharmonic", "cubic": "is anharmonic",
+    "anharmonic": "is anharmonic", "position": "is anharmonic", "velocity": "depends on the velocity",
+    "stiffness in time": "changes in time", "friction in time": "changes in time",
+    "map in time": "changes in time",
 }  # fmt: skip
 """What the force depends on in each group of columns."""
+
+
+STATE = ("anharmonic", "position", "velocity")
+"""Groups of so many functions of the state that they follow most functions of time."""
+
+FEW_TURNS = 2.0
+"""Turns of the motion from which states come back often enough to tell what goes with them from time."""
+
+
+def _turns(e: Evidence) -> float:
+    return e.pairs * float(rotation(e.found.entries[None]).angle[0]) / (2 * math.pi)
 
 
 def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, size: float) -> tuple[str, str]:
@@ -301,7 +319,9 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
         )
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
-    where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
+    where = (
+        "depends on the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
+    )
     if not irregular(e.misses * e.found.weight[:, None]):
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
