@@ -454,7 +454,6 @@ def test_anharmonic_motion_is_called_so_and_coupled_motion_judged_by_its_modes()
         (lambda c: (c.t, c.q[:-1], c.p), "shape"),
         (lambda c: (c.t, c.t[:, None] * 0.3 + 1, 0 * c.p + 0.3 * c.m), "straight line"),
         (lambda c: (c.t, c.q[0] * (-1.0) ** np.arange(101)[:, None], 0 * c.p), "do not span"),
-        (lambda c: (c.t, c.q, None), "positions alone"),
     ],
 )
 def test_states_that_cannot_show_a_map_are_refused_with_a_reason(change, words: str) -> None:

@@ -33,7 +33,8 @@ ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Eul
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class States:
-    """Recorded states: t (f,), q and p or v (f, n), mass (n,) or None, and how finely they were written."""
+    """Recorded states: t (f,), q and p or v (f, n) or neither, mass (n,) or None, and how finely they were
+    written."""
 
     t: Floats
     q: Floats
@@ -62,8 +63,6 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     for what, why in (("t", "times"), ("q", "positions")):
         if what not in parts:
             raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
-    if "p" not in parts and "v" not in parts:
-        raise StoreError(f"{path}: no column of momenta or velocities among {listed(columns)}; {ALONE}")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
         raise StoreError(f"{path}: {t.shape[1]} columns of times")

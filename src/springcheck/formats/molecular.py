@@ -1,4 +1,4 @@
-"""Trajectories of molecular programs: extended XYZ and ASE's .traj, LAMMPS dumps, GROMACS .gro and .trr.
+"""Trajectories of molecular programs: extended XYZ, ASE's .traj, LAMMPS dumps, DCD, GROMACS .gro, .trr, .xtc.
 
 Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, LAMMPS' in those of its dump.
 """
@@ -6,6 +6,9 @@ Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, LA
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +29,13 @@ def _times(path: Path, steps: Any, step: float | None) -> Floats:
 
 
 def _made(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2.0**-53) -> States:
-    times, positions, velocities = (np.asarray(x, np.float64) for x in (t, q, v))
+    times, positions = (np.asarray(x, np.float64) for x in (t, q))
     frames = len(times)
     if frames < 2:
         raise StoreError(f"{path}: holds {frames} frame; two are needed")
     m = None if mass is None else np.repeat(np.asarray(mass, np.float64), positions.shape[2])
-    return States(
-        t=times, q=positions.reshape(frames, -1), p=None, v=velocities.reshape(frames, -1), mass=m,
-        roundoff=roundoff,
-    )  # fmt: skip
+    velocities = None if v is None else np.asarray(v, np.float64).reshape(frames, -1)
+    return States(t=times, q=positions.reshape(frames, -1), p=None, v=velocities, mass=m, roundoff=roundoff)
 
 
 def read_ase(path: Path, step: float | None) -> States:
@@ -55,18 +56,16 @@ def read_ase(path: Path, step: float | None) -> States:
         raise StoreError(f"{path}: ASE cannot read it: {' '.join(str(error).split())[:200]}") from error
     if len({len(atoms) for atoms in found}) != 1:
         raise StoreError(f"{path}: the number of atoms changes")
-    if not all(
-        atoms.has("momenta") or "velocities" in atoms.arrays or "vel" in atoms.arrays for atoms in found
-    ):
-        raise StoreError(f"{path}: holds no velocities or momenta; {ALONE}")
     v = []
     for atoms in found:
         plain = atoms.arrays.get("velocities", atoms.arrays.get("vel"))
-        v.append(plain if plain is not None else atoms.get_velocities() * units.fs)
+        if plain is not None or atoms.has("momenta"):
+            v.append(plain if plain is not None else atoms.get_velocities() * units.fs)
     named = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
     t = named if all(x is not None for x in named) else _times(path, range(len(found)), step)
     written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
-    return _made(path, t, [atoms.positions for atoms in found], v, found[0].get_masses(), written)
+    moving = v if len(v) == len(found) else None
+    return _made(path, t, [atoms.positions for atoms in found], moving, found[0].get_masses(), written)
 
 
 def _written(lines: list[str]) -> float:
@@ -158,24 +157,51 @@ def read_gro(path: Path, step: float | None) -> States:
 
 def read_trr(path: Path, step: float | None) -> States:
     """A GROMACS .trr file, in single precision, by MDAnalysis."""
+    t, q, v = [], [], []
+    with _opened(path, "lib.formats.libmdaxdr", "TRRFile") as file:
+        for frame in file:
+            if frame.hasx and frame.hasv:
+                t.append(frame.time)
+                q.append(np.array(frame.x))
+                v.append(np.array(frame.v))
+    if not t:
+        raise StoreError(f"{path}: has no frame with both positions and velocities")
+    return _made(path, t, q, v, None, 2.0**-24)
+
+
+def read_xtc(path: Path, step: float | None) -> States:
+    """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
+    t, q = [], []
+    with _opened(path, "lib.formats.libmdaxdr", "XTCFile") as file:
+        for frame in file:
+            t.append(frame.time)
+            q.append(np.array(frame.x))
+    return _made(path, t, q, None, None, 2.0**-24)
+
+
+def read_dcd(path: Path) -> States:
+    """A DCD file by MDAnalysis: positions alone [Angstrom], in single precision, as is its time step [ps]."""
+    with _opened(path, "coordinates.DCD", "DCDReader") as file:
+        found = [(frame.time, np.array(frame.positions)) for frame in file]
+    times = np.array([t for t, _ in found]).astype(np.float32)
+    return _made(path, times, [q for _, q in found], None, None, 2.0**-24)
+
+
+@contextmanager
+def _opened(path: Path, module: str, name: str) -> Iterator[Any]:
+    """A file opened by a class of MDAnalysis.  StoreError where it is not installed or cannot read it."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            from MDAnalysis.lib.formats.libmdaxdr import TRRFile
+            reader = getattr(import_module(f"MDAnalysis.{module}"), name)
     except ModuleNotFoundError as error:
         raise StoreError(
             f"{path}: MDAnalysis reads it, which is not installed: python -m pip install 'springcheck[md]'"
         ) from error
-    t, q, v = [], [], []
     try:
-        with TRRFile(str(path)) as file:
-            for frame in file:
-                if frame.hasx and frame.hasv:
-                    t.append(frame.time)
-                    q.append(np.array(frame.x))
-                    v.append(np.array(frame.v))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with reader(str(path)) as file:
+                yield file
     except Exception as error:
         raise StoreError(f"{path}: cannot be read: {' '.join(str(error).split())[:200]}") from error
-    if not t:
-        raise StoreError(f"{path}: has no frame with both positions and velocities")
-    return _made(path, t, q, v, None, 2.0**-24)

@@ -87,7 +87,9 @@ def _ranges(name: str) -> tuple[tuple[Floats, Floats], ...]:
     top = min(family.limit, 60.0) if family.limit > 0 else 4.0
     # the phase bends like a square root at a limit of stability, so points crowd there
     x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
-    x = np.concatenate([x[x < 0.05 * top], np.geomspace(0.05 * top, x[-1], 2000)]) if top == 60 else x
+    # and areas change with the square of a small step
+    x = np.geomspace(1e-4, x[-1], 4000) if top == 60 else x
+    x = np.concatenate([np.geomspace(1e-4, 0.05 * top, 500), x[x > 0.05 * top]]) if top < 60 else x
     matrices = unit(family, np.square(x), np.zeros(len(x)))
     found = rotation(matrices)
     side = np.where(matrices[:, 0, 1] < 0, -1, 1)

@@ -50,10 +50,10 @@ def read(
 ) -> list[States]:
     """The trajectories of a file, or the one of this label; `columns` and `step` as in `formats.read`.
 
-    Raises StoreError where the file cannot be read, holds no velocities, or has no such trajectory.
+    Raises StoreError where the file cannot be read, or has no such trajectory.
     """
     if path.is_file() and not formats.is_hdf5(path) and not label:
-        return [of_arrays(path.name, formats.read(path, columns, step))]
+        return [of_arrays(path.name, formats.read(path, columns, step, alone=True))]
     try:
         own = () if columns else store.summary(path).runs
     except StoreError:
@@ -62,7 +62,7 @@ def read(
     if own:
         found = list(_ours(path, own, label))
     elif columns or not store.is_h5md(path):
-        plain = formats.read_hdf5(path, columns)
+        plain = formats.read_hdf5(path, columns, alone=True)
         names = list(plain)
         found = [of_arrays(name, states) for name, states in plain.items() if label in (None, name)]
     else:
@@ -76,9 +76,9 @@ def read(
 def of_arrays(name: str, found: formats.States) -> States:
     """A trajectory that stands in arrays of a file."""
     kept = slice(MOST_FRAMES)
-    speed = found.p if found.p is not None else found.v
+    speed = next((x for x in (found.p, found.v) if x is not None), np.zeros_like(found.q))
     notes = [f"the first {MOST_FRAMES} frames were looked at"] if len(found.t) > MOST_FRAMES else []
-    chosen, remarks = _chosen(found.q[kept], np.asarray(speed)[kept], notes)
+    chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
     p, v, mass = found.p, found.v, found.mass
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))

@@ -68,7 +68,7 @@ class Map:
         return np.asarray(z[1:] - z[:-1] @ self.entries.T, np.float64)
 
 
-def _least_squares(columns: Extended, right: Extended) -> Extended:
+def least_squares(columns: Extended, right: Extended) -> Extended:
     """Solution x of columns x = right by normal equations in extended precision, refined twice.
 
     With columns of size 1 the condition of the normal equations is far below 1/eps of extended precision
@@ -123,7 +123,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     weight = _pair_weights(z, quanta, first) * chosen
     w = weight[:, None].astype(np.longdouble)
     before, after = w * z[:-1], w * z[1:]
-    x = _least_squares(before, after)
+    x = least_squares(before, after)
     left = after - before @ x
     centre = np.zeros(2, dtype=np.longdouble)
     floor = float(np.sum((4 * ROUNDING * np.abs(before)) ** 2))
@@ -136,7 +136,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
         return bool(np.any(gain > 50 * unknowns * noise))
 
     if np.any(np.sum(left**2, axis=0) > floor) and pairs > FEWEST_PAIRS:
-        y = _least_squares(np.concatenate([before, w], axis=1), after)
+        y = least_squares(np.concatenate([before, w], axis=1), after)
         free = after - np.concatenate([before, w], axis=1) @ y
         if better(left, free, 1):
             entries, at, resting = _about_rest(before, after, w, y)
@@ -156,7 +156,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     if record.slips is not None and pairs > 2 * FEWEST_PAIRS:
         moved = w * z[:-1]
         wide = np.concatenate([moved, record.slips[:, None] * 1e12 * moved], axis=1)
-        y = _least_squares(wide, w * z[1:])
+        y = least_squares(wide, w * z[1:])
         free = w * z[1:] - wide @ y
         # a clock is known, so that even errors within the rounding of a step show whether steps follow it
         lost, rest = float(np.sum(left**2)), float(np.sum(free**2))
@@ -235,7 +235,7 @@ def _about_rest(
         columns[:n, 4:], columns[n:, 4:] = w * gap[0, 0], w * gap[1, 0]
         # the old equilibrium's own part, which the last column corrects
         right = np.concatenate([after[:, 0] - w[:, 0] * at[0], after[:, 1]])[:, None]
-        u = _least_squares(columns, right)[:, 0]
+        u = least_squares(columns, right)[:, 0]
         x = np.stack([u[:2], u[2:4]], axis=1)
         gap = np.eye(2) - x.T
         at = at + np.array([u[4], 0], dtype=np.longdouble)

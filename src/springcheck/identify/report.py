@@ -25,6 +25,7 @@ from springcheck.identify.families import FAMILIES, HELD, substeps
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
+from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, read
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import (
@@ -85,13 +86,17 @@ def identify_arrays(
     """The scheme that made a trajectory of oscillators, from its states alone.
 
     t (f,) [T]; q (f, n) or (f,) [L]; p [M L/T] or v [L/T] or both, like q.  Where both are given the mass
-    follows from them.  With momenta alone and no mass, symmetric schemes look alike on a spring; the
-    notes say so.  Coupled oscillators are judged by their normal modes.  `mass` [M], `stiffness` [M/T2],
-    `friction` c [M/T] and `step` [T] are what is stated of the trajectory: they are held against it.
+    follows from them; where neither is, `positions` says what is left open.  With momenta alone and no mass,
+    symmetric schemes look alike on a spring; the notes say so.  Coupled oscillators are judged by their
+    normal modes.  `mass` [M], `stiffness` [M/T2], `friction` c [M/T] and `step` [T] are what is stated of the
+    trajectory: they are held against it.
 
     Raises IdentificationError where the states cannot show a map: too few, not finite, at rest, at uneven
     times, or not spanning the plane.
     """
+    if p is None and v is None:
+        alone = read(t, q, None, np.zeros(np.shape(q)), mass)
+        return _of_positions(alone, stiffness, step, friction)
     record = read(t, q, p, v, mass)
     given = record
     record, moving, maps, notes = judged(record)
@@ -147,6 +152,19 @@ def identify_arrays(
             explanations=(*faults, *found.explanations), fits=False,
         )  # fmt: skip
     return found
+
+
+def _of_positions(
+    record: Record, stiffness: ArrayLike | None, step: float | None, friction: float | None
+) -> Identification:
+    notes: list[str] = []
+    stated = None
+    if stiffness is not None:
+        stated = np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
+        if record.mass is None:
+            notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
+    stride = _stated_stride(record, step, notes)
+    return identify_positions(record, stated, stride, friction, notes)
 
 
 def _terms(record: Record, j: int, stated: Floats | None) -> Terms:

@@ -1,0 +1,291 @@
+"""What positions alone say of the scheme: `recurrence` reads them, and this says what they leave open."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from springcheck.errors import IdentificationError
+from springcheck.identify.candidates import candidates_of, common, other_names, rows
+from springcheck.identify.evidence import title
+from springcheck.identify.families import FAMILIES, HELD, Family, substeps
+from springcheck.identify.fit import ROUNDING
+from springcheck.identify.match import Match
+from springcheck.identify.record import Record
+from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
+from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.search import FEW, SINGLE_ROOM, Joint, distinct, numbers
+from springcheck.physics.arrays import Floats
+from springcheck.text.wording import either
+
+CERTAIN = 1e8
+"""Standard errors of a change of areas from which no friction meets that of a scheme by chance."""
+
+ALONE = (
+    "positions alone show a frequency and how areas change, and no velocities: velocity Verlet, leapfrog, "
+    "semi-implicit Euler and position Verlet have the same positions"
+)
+
+
+def identify_positions(
+    record: Record, stated: Floats | None, stride: int | None, friction: float | None, notes: list[str]
+) -> Identification:
+    """The schemes that may have made these positions.  Raises IdentificationError where they show none."""
+    notes = [*notes, ALONE]
+    moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0).tolist()
+    if not moving:
+        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
+    if len(record.q) < FEWEST_FRAMES:
+        raise IdentificationError(
+            f"{len(record.q)} frames of positions alone are too few; give {FEWEST_FRAMES}, or velocities"
+        )
+    strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
+    every = {j: recurrence(record, j, strides.stop - 1) for j in moving}
+    free = [j for j in moving if not _forced(every[j])]
+    moving = [j for j in moving if j not in free]
+    if not moving:
+        raise IdentificationError(
+            "the positions show no force: the arc is too short, or nothing pulls; record more of the motion"
+        )
+    if free:
+        notes.append(f"{len(free)} of {len(free) + len(moving)} coordinates show no force, and are left out")
+    found = [every[j] for j in moving]
+    if any(x.phase <= 0 for x in found):
+        raise IdentificationError(
+            "the motion does not turn: without velocities one that dies or grows alone shows no scheme"
+        )
+    worst = max(found, key=lambda x: x.residual)
+    if any(not x.precision for x in found):
+        return _none(record, moving, found, notes, *_misfit(worst))
+    known = stated is not None and record.mass is not None
+    plain = tuple(x[0] for x in classes())
+    every_stride = known or not _all_preserve(found)
+    joints = _joined(found, plain, strides) if every_stride else _first(found, plain, strides)
+    joints += [x for x in _joined(found, (HELD,), strides) if _may_hold(x)]
+    fitting = _stated(record, moving, joints, stated, notes) if known else joints
+    kept = fitting
+    sure = _all_preserve(found) or _certain(found)
+    if friction or (friction is None and not (fitting and sure)):
+        families = distinct(damped=True)
+        damped = _joined(found, families, strides) if known else _first(found, families, strides)
+        damped = _stated(record, moving, damped, stated, notes) if known else damped
+        kept = damped if friction else kept + damped
+    if friction:
+        kept = [x for x in kept if candidates_of(record, moving, x, friction)]
+    if not kept:
+        return _none(record, moving, found, notes, *_unfitting(record, moving, found, joints, stated))
+    return _known(record, moving, found, kept, stride, known, friction or None, notes)
+
+
+def _forced(x: Recurrence) -> bool:
+    return float(x.alpha) > 6 * math.sqrt(x.covariance[0, 0])
+
+
+def _all_preserve(found: list[Recurrence]) -> bool:
+    return all(x.preserving for x in found)
+
+
+def _certain(found: list[Recurrence]) -> bool:
+    return any(abs(float(x.beta)) > CERTAIN * math.sqrt(x.covariance[1, 1]) for x in found)
+
+
+def _joined(found: list[Recurrence], families: tuple[Family, ...], strides: range) -> list[Joint]:
+    """Families and strides that every oscillator may be of, and each number of unseen turns of it."""
+    parts: list[dict[tuple[str, int], list[Match]]] = []
+    for x in found:
+        own: dict[tuple[str, int], list[Match]] = {}
+        for m in matches(x, families, strides):
+            own.setdefault((m.family, m.stride), []).append(m)
+        parts.append(own)
+    out = []
+    for key in parts[0]:
+        if all(key in own for own in parts):
+            # every way for the first oscillator, and the plainest of the others
+            rest = tuple(min(own[key], key=lambda m: (m.turns, m.chi2)) for own in parts[1:])
+            out += [Joint(family=key[0], stride=key[1], parts=(m, *rest)) for m in parts[0][key]]
+    return sorted(out, key=lambda x: x.plainness)
+
+
+def _first(found: list[Recurrence], families: tuple[Family, ...], strides: range) -> list[Joint]:
+    """The same of the fewest steps of each family: where more would fit as well, they say nothing."""
+    out = _joined(found, families, strides[:1])
+    left = tuple(f for f in families if f.name not in {x.family for x in out})
+    if left and len(strides) > 1:
+        seen: dict[str, Joint] = {}
+        for x in _joined(found, left, strides[1:]):
+            seen.setdefault(x.family, x)
+        out += seen.values()
+    return out
+
+
+def _substeps(joint: Joint) -> int:
+    """Substeps that a force is held over, 0 where no whole number is certain."""
+    each = {substeps(part.g, part.g_error + 1e-13)[0] or 0 for part in joint.parts}
+    return each.pop() if len(each) == 1 else 0
+
+
+def _may_hold(joint: Joint) -> bool:
+    """Whether the force may be held over some whole number of substeps."""
+    for part in joint.parts:
+        off, error = abs(2 * part.g - 1), 6 * (part.g_error + 1e-13)
+        if off > error and not (off < 0.5 + error and abs(off - 1 / max(round(1 / off), 2)) <= error):
+            return False
+    return True
+
+
+def _stated(
+    record: Record, moving: list[int], joints: list[Joint], stated: Floats | None, notes: list[str]
+) -> list[Joint]:
+    """Those of the stated stiffness, or where none is, those of it with a number in single precision."""
+    if stated is None:
+        return []
+    for room in (0.0, SINGLE_ROOM):
+        fitting = [x for x in joints if not _stiffer(record, moving, x, stated, room)]
+        if fitting:
+            notes += ["a stated number was rounded to single precision"] if room else []
+            return fitting
+    return []
+
+
+def _stiffer(
+    record: Record, moving: list[int], joint: Joint, stated: Floats, room: float
+) -> tuple[int, float, float] | None:
+    """The first oscillator whose stiffness is not the stated one, its own and the relative error; None where
+    all agree."""
+    stiffness = numbers(record, moving, joint)[1] or ()
+    for j, part, k in zip(moving, joint.parts, stiffness, strict=True):
+        error = 6 * part.a_error / abs(part.a) + 4 * record.jitter + 64 * ROUNDING + room
+        error += 0.0 if record.fine else SINGLE_ROOM
+        if not abs(k / float(stated[j]) - 1 if stated[j] else math.inf) <= error:
+            return j, k, error
+    return None
+
+
+def _members(joints: list[Joint]) -> list[Joint]:
+    """Every scheme that shares the positions, each number of steps once, of the fewest unseen turns."""
+    shared = {x[0].name: x for x in classes()}
+    out: dict[tuple[str, int], Joint] = {}
+    for joint in joints:
+        for member in shared.get(joint.family, (FAMILIES[joint.family],)):
+            out.setdefault(
+                (member.name, joint.stride), Joint(family=member.name, stride=joint.stride, parts=joint.parts)
+            )
+    return list(out.values())
+
+
+def _known(
+    record: Record,
+    moving: list[int],
+    found: list[Recurrence],
+    kept: list[Joint],
+    stride: int | None,
+    known: bool,
+    friction: float | None,
+    notes: list[str],
+) -> Identification:
+    """One scheme or several, of which the positions are."""
+    joints = _members(kept)
+    candidates = tuple(x for joint in joints for x in candidates_of(record, moving, joint, friction))
+    names = list(dict.fromkeys(x.scheme for x in candidates))
+    damped = any(joint.damped for joint in joints)
+    # the number of steps does not show where areas are kept and the stiffness is not known
+    steps = common([x.stride for x in candidates])
+    if not known and stride is None and _all_preserve(found):
+        steps = None
+    scheme = names[0] if len(names) == 1 and steps is not None and len(candidates) == 1 else None
+    precision = common([x.precision for x in found]) or "cannot tell"
+    frames = (
+        "" if steps == 1 else f", {steps} steps to a frame" if steps else ", in an unknown number of steps"
+    )
+    if scheme:
+        law = f" with {candidates[0].law}" if candidates[0].law else " with friction" if damped else ""
+        whose = title(scheme)
+        if scheme == HELD.scheme:
+            whose = f"Semi-implicit Euler whose force is held over {_substeps(joints[0])} substeps"
+        statement = f"{whose}{law}{frames}, by positions alone: {precision} arithmetic explains them"
+    else:
+        listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])
+        what = f"areas {'shrink' if float(found[0].beta) > 0 else 'grow'}"
+        what = "areas are kept" if _all_preserve(found) else what
+        statement = f"Positions alone: {what}, and they are those of {either(listed)}{frames}"
+    if not known:
+        told = "mass and stiffness" if record.mass is None else "the stiffness"
+        notes = [*notes, f"what would tell more: {told}, where known, the friction, or velocities"]
+    if damped and friction is None:
+        notes = [
+            *notes,
+            "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out",
+        ]
+    elif scheme and float(found[0].beta) > 0 and not known:
+        notes = [*notes, "a damped spring of another stiffness may have the same positions"]
+    first = candidates[0]
+    unknown = tuple(math.nan for _ in moving)
+    share = 1 / (steps or 1)
+    return Identification(
+        verdict="named" if scheme else "not told apart",
+        statement=statement,
+        scheme=scheme,
+        aliases=other_names(scheme, damped=damped) if scheme else (),
+        candidates=candidates,
+        step=float(record.interval) * share if steps else math.nan,
+        stride=steps,
+        omega=rows([x.omega for x in candidates]) or unknown,
+        stiffness=None if first.stiffness is None else rows([x.stiffness or () for x in candidates]),
+        friction=rows([x.friction for x in candidates]) or unknown,
+        velocity_offset=math.nan,
+        determinant=tuple(math.exp(x.log_det * share) for x in found) if steps else unknown,
+        symplectic_defect=max(abs(float(x.beta)) for x in found),
+        defect_ulp=max(x.ulp for x in found),
+        precision=precision,
+        fits=True,
+        undecided=False,
+        nearest=scheme,
+        difference=(math.nan,) * 4,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _misfit(worst: Recurrence) -> tuple[str, str]:
+    return (
+        "The positions are not those of one linear scheme: its recurrence leaves over "
+        f"{worst.residual:.1e} of their size, {worst.ulp:.2g} units in the last place",
+        "look for a force that is not linear, coupled coordinates, a restart or noise; velocities show more",
+    )
+
+
+def _unfitting(
+    record: Record, moving: list[int], found: list[Recurrence], joints: list[Joint], stated: Floats | None
+) -> tuple[str, str]:
+    if joints and stated is not None:
+        x = joints[0]
+        off = _stiffer(record, moving, x, stated, 0.0)
+        shown = f"{off[1]:.9g} instead of {stated[off[0]]:.9g}" if off else "with another friction"
+        return (
+            f"The positions may be those of {title(FAMILIES[x.family].scheme)}, but of another "
+            f"spring: {shown}",
+            "look at the units of the force constant and of the times, and at the mass",
+        )
+    change = math.exp(found[0].log_det) - 1
+    return (
+        f"One linear map explains the positions, but it is none of the known schemes': areas change by "
+        f"{change:+.2e} in each frame",
+        "compare the order of its stages and their coefficients with the scheme's; velocities show more",
+    )
+
+
+def _none(
+    record: Record, moving: list[int], found: list[Recurrence], notes: list[str], cause: str, remedy: str
+) -> Identification:
+    """No scheme, and why."""
+    unknown = tuple(math.nan for _ in moving)
+    worst = max(found, key=lambda x: x.residual)
+    return Identification(
+        verdict="none", statement=cause, scheme=None, aliases=(), candidates=(), step=math.nan, stride=None,
+        omega=unknown, stiffness=None, friction=unknown, velocity_offset=math.nan,
+        determinant=tuple(math.exp(x.log_det) for x in found),
+        symplectic_defect=max(abs(float(x.beta)) for x in found),
+        defect_ulp=max(x.ulp for x in found), precision="unknown", fits=False, undecided=False, nearest=None,
+        difference=(math.nan,) * 4, notes=tuple(dict.fromkeys(notes)),
+        explanations=(Explanation(cause=cause, remedy=remedy, misfit=worst.residual),),
+    )  # fmt: skip

@@ -1,0 +1,331 @@
+"""Positions alone: the recurrence q[n+1] - T q[n] + D q[n-1] = c of one step's trace and determinant.
+
+On a spring every one-step scheme obeys it, and schemes that share trace and determinant share all positions:
+velocity Verlet, leapfrog, semi-implicit Euler and position Verlet do.  The two numbers tell a frequency and a
+change of areas.  A scheme without friction fixes one by the other; with friction every scheme has a spring
+that fits, and only a stated stiffness tells more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from springcheck.identify.coarse import irregular
+from springcheck.identify.curves import curves
+from springcheck.identify.families import Family
+from springcheck.identify.fit import ROUNDING, least_squares
+from springcheck.identify.maps import Table, table, unit
+from springcheck.identify.match import Match, most
+from springcheck.identify.record import Record
+from springcheck.identify.search import distinct
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
+
+FEWEST_FRAMES = 9
+"""Five unknowns of an orbit, and as many frames again that they have to explain."""
+
+UNUSUAL = 2.5
+"""Roundings of a frame in units of those that are usual, 4 + 2 sqrt(steps), if they are irregular."""
+
+FLOW_WAYS = 8
+"""Turns, and half turns back, between two frames that the exact flow is looked for at."""
+
+ERRORS = 5.0
+"""Standard errors within which a number is no other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recurrence:
+    """alpha = 1 + D - T and beta = 1 - D of one oscillator, so that nothing cancels where steps are small."""
+
+    alpha: np.longdouble
+    beta: np.longdouble
+    covariance: Floats
+    residual: float
+    """Root mean square of what it leaves over, as a share of the positions' size."""
+    ulp: float
+    """The largest of it in units of 2**-52 of the terms' sizes."""
+    precision: str
+    """The arithmetic, or the storage, that explains what is left over; "" where none does."""
+
+    @property
+    def phase(self) -> float:
+        """Phase between two frames, 0 where nothing turns."""
+        square = 4 * self.alpha - (self.alpha + self.beta) ** 2
+        return float(np.arctan2(np.sqrt(square), 2 - self.alpha - self.beta)) if square > 0 else 0.0
+
+    @property
+    def log_det(self) -> float:
+        return float(np.log1p(-self.beta))
+
+    @property
+    def preserving(self) -> bool:
+        """Whether areas are kept to within the errors."""
+        return abs(float(self.beta)) <= ERRORS * math.sqrt(self.covariance[1, 1])
+
+
+def recurrence(record: Record, j: int, steps: int) -> Recurrence:
+    """The recurrence of oscillator j, `steps` to a frame at most."""
+    q = record.q[:, j]
+    stored = np.maximum(record.q_quantum[:, j] / np.sqrt(12.0), 0.0)
+    size = np.abs(q).astype(np.float64)
+    size = size[2:] + 2 * size[1:-1] + size[:-2]
+    noise = ROUNDING * size
+    if not record.fine:
+        noise = np.sqrt(noise**2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
+    noise = np.maximum(noise, 1e-30 * np.max(noise))
+    alpha, beta, covariance, left = _neighbours(q, noise, record.slips)
+    scale = float(np.std(q.astype(np.float64)))
+    residual = float(np.sqrt(np.mean(left**2))) / scale
+    ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
+    usual = 4 + 2 * math.sqrt(steps)
+
+    def explained(rounding: float, beside: Floats | float = 0.0) -> bool:
+        off = float(np.max(np.maximum(np.abs(left) - beside, 0) / (rounding * size)))
+        return off <= usual or (off <= UNUSUAL * usual and irregular((left / noise)[:, None]))
+
+    precision = ""
+    if record.fine:
+        precision = "double" if explained(2.0**-52) else ""
+    else:
+        whole = _orbit(q, stored, alpha, beta)
+        if whole is not None:
+            alpha, beta, covariance = whole
+            precision = record.q_storage.name
+        elif record.q_storage.name == "single":
+            precision = "single" if explained(2.0**-23) else ""
+        elif explained(2.0**-23, 2 * np.sqrt(12.0) * (stored[2:] + 2 * stored[1:-1] + stored[:-2]) / 4):
+            precision = record.q_storage.name
+    # a coefficient is rounded once and the same in every step, which no number of frames averages away
+    own = ROUNDING if record.fine or precision == record.q_storage.name != "single" else 2.0**-24
+    coherent = np.array([64 * abs(float(alpha)) + 4, 4.0]) * steps * own
+    return Recurrence(
+        alpha=alpha, beta=beta, covariance=covariance + np.diag(coherent**2), residual=residual, ulp=ulp,
+        precision=precision,
+    )  # fmt: skip
+
+
+def _around(x: Floats) -> Floats:
+    """The largest of each number and its neighbours, three to either side."""
+    wide = np.pad(x, 3, mode="edge")
+    return np.asarray(np.max(np.lib.stride_tricks.sliding_window_view(wide, 7), axis=1))
+
+
+def _neighbours(
+    q: Extended, noise: Floats, slips: Extended | None
+) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
+    """alpha, beta, their covariance (2, 2) and what is left over (f - 2,), from neighbouring frames; where
+    steps follow the clock's `slips` these move frames along their way, which the state tells."""
+    weight = (1 / noise)[:, None]
+    # a motion that grows is not centred by its largest frames
+    share = 1 / np.square(noise / np.min(noise))
+    about = q - np.sum(share * q[1:-1]) / np.sum(share)
+    columns = np.stack([-about[1:-1], about[:-2] - about[1:-1], np.ones(len(q) - 2)], axis=1)
+    second = (about[2:] - about[1:-1]) - (about[1:-1] - about[:-2])
+    right = np.asarray(second[:, None] * weight, np.longdouble)
+    x = least_squares(np.asarray(columns * weight, np.longdouble), right)[:, 0]
+    left = (second - columns @ x).astype(np.float64)
+    if slips is not None and len(left) > 4 * FEWEST_FRAMES:
+        moved = [1e12 * s[:, None] * columns[:, :2] for s in (slips[1:], slips[:-1])]
+        wide = np.concatenate([columns, *moved], axis=1)
+        y = least_squares(np.asarray(wide * weight, np.longdouble), right)[:, 0]
+        rest = (second - wide @ y).astype(np.float64)
+        lost, kept = (float(np.sum((r / noise) ** 2)) for r in (left, rest))
+        if lost - kept > 200 * max(kept, 0.1 * len(left)) / len(left):
+            x, left, columns = y, rest, wide
+    even = (columns * weight).astype(np.float64)
+    scale = np.sqrt(np.sum(even**2, axis=0))
+    inverse = np.linalg.pinv((even / scale).T @ (even / scale)) / scale[:, None] / scale
+    variance = max(float(np.sum((left / noise) ** 2)) / max(len(left) - 3, 1), 0.1)
+    # positions that were rounded once stand on both sides of the recurrence
+    bias = 6 * float(np.mean(noise**2)) / max(float(np.mean(np.diff(about.astype(np.float64)) ** 2)), 1e-300)
+    return x[0], x[1], variance * inverse[:2, :2] + bias**2 * np.eye(2), left
+
+
+def _orbit(
+    q: Extended, unit_: Floats, alpha: np.longdouble, beta: np.longdouble
+) -> tuple[np.longdouble, np.longdouble, Floats] | None:
+    """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase) of which all frames
+    were rounded once; None where that leaves over more than rounding."""
+    frames = len(q)
+    values = (q - q[0]).astype(np.float64)
+    n = np.arange(frames, dtype=np.float64)
+    unit_ = np.maximum(unit_, _around(unit_) / 64)
+    square = float(4 * alpha - (alpha + beta) ** 2)
+    starts = []
+    if square > 0 and beta < 1:
+        starts.append(
+            (0.5 * math.log1p(-float(beta)), math.atan2(math.sqrt(square), float(2 - alpha - beta)))
+        )
+    # the highest peak of the spectrum, where neighbours are too coarse
+    spectrum = np.abs(np.fft.rfft((values - np.mean(values)) * np.hanning(frames), 8 * frames))
+    starts.append((0.0, 2 * np.pi * max(int(np.argmax(spectrum)), 1) / (8 * frames)))
+    best = None
+    for growth, phase in starts:
+        x = np.array([growth, phase])
+        for _ in range(30):
+            wave = np.exp(np.clip(x[0] * n, -60, 60))
+            c, s = wave * np.cos(x[1] * n), wave * np.sin(x[1] * n)
+            basis = np.stack([c, s, np.ones(frames)], axis=1) / unit_[:, None]
+            amplitude = np.linalg.lstsq(basis, values / unit_, rcond=None)[0]
+            u, w = amplitude[0] * c + amplitude[1] * s, amplitude[1] * c - amplitude[0] * s
+            slopes = np.concatenate([np.stack([n * u, n * w], axis=1) / unit_[:, None], basis], axis=1)
+            left = values / unit_ - basis @ amplitude
+            size = np.sqrt(np.sum(slopes**2, axis=0))
+            if not np.all(np.isfinite(slopes)) or not np.all(size > 0):
+                break
+            across, triangle = np.linalg.qr(slopes / size)
+            if np.linalg.cond(triangle) > 1e9:
+                break
+            change = np.linalg.solve(triangle, across.T @ left) / size
+            x = x + np.clip(change[:2], -1 / frames, 1 / frames)
+            if np.sum((across.T @ left) ** 2) <= 1e-12 * max(float(np.sum(left**2)), 1.0):
+                inverse = np.linalg.inv(triangle)
+                covariance = (inverse @ inverse.T / size[:, None] / size)[:2, :2]
+                if best is None or float(left @ left) < best[0]:
+                    best = float(left @ left), x, covariance, float(np.max(np.abs(left)))
+                break
+    # a uniform error has a fourth moment of 9/5 of its variance squared, and ends at sqrt(3) of them
+    if (
+        best is None
+        or best[0] > frames + ERRORS * math.sqrt(0.8 * frames) + 1
+        or best[3] > math.sqrt(3) + 0.5
+    ):
+        return None
+    (growth, phase), covariance = best[1], best[2]
+    r = math.exp(growth)
+    bent = 4 * r * math.sin(phase / 2) ** 2
+    slope = np.array([[bent - 2 * (1 - r) * r, 2 * r * math.sin(phase)], [-2 * r * r, 0.0]])
+    return np.longdouble((1 - r) ** 2 + bent), np.longdouble(1 - r * r), slope @ covariance @ slope.T
+
+
+# families ------------------------------------------------------------------------------------------------
+
+
+@cache
+def classes() -> tuple[tuple[Family, ...], ...]:
+    """Schemes without friction whose positions agree for every step, together."""
+    out: list[list[Family]] = []
+    for family in distinct(damped=False):
+        own = _shape(family)
+        same = next((x for x in out if np.allclose(_shape(x[0]), own, rtol=0, atol=1e-13)), None)
+        out = out if same is not None else [*out, []]
+        (same if same is not None else out[-1]).append(family)
+    return tuple(tuple(x) for x in out)
+
+
+@cache
+def _shape(family: Family) -> Reals:
+    """alpha and beta at three steps."""
+    a = np.array([0.3, 0.7, 1.1])
+    return np.stack(_numbers(unit(family, a, np.zeros(3))))
+
+
+def _numbers(m: Reals) -> tuple[Reals, Reals]:
+    """alpha and beta of maps (c, 2, 2)."""
+    # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation
+    one, other, product = 1 - m[:, 0, 0], 1 - m[:, 1, 1], m[:, 0, 1] * m[:, 1, 0]
+    alpha = one * other - product
+    return alpha, one + other - alpha
+
+
+def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
+    """Families (one of each class without friction; any with it) whose recurrence this may be, each number of
+    steps and of unseen turns."""
+    every = table(families)
+    which, s, turns, a, g = _starts(found, every, strides)
+    if not len(which):
+        return []
+    damped = every.damped
+    free = [0, 1] if damped else [0]
+    weight = np.linalg.cholesky(np.linalg.inv(found.covariance)).T
+    observed = np.array([found.alpha, found.beta])
+    values = np.stack([a, g], axis=1).astype(np.longdouble)
+    one = np.ones(1, dtype=np.longdouble)
+
+    def frames(x: Extended) -> Extended:
+        n = len(which)
+        out = every.frame(which, x[:, 0], x[:, 1], np.zeros(n, np.longdouble), s, np.repeat(one, n))
+        return np.stack(_numbers(out.reshape(-1, 2, 2)), axis=1)
+
+    with np.errstate(all="ignore"):
+        for _ in range(12):
+            now = frames(values)
+            columns = []
+            for i in free:
+                shift = np.zeros_like(values)
+                shift[:, i] = 1e-7 * np.abs(values[:, 0]) if i == 0 else 1e-8
+                columns.append((frames(values + shift) - now) / shift[:, [i]])
+            slopes = np.stack(columns, axis=2)
+            white = (weight @ slopes).astype(np.float64)
+            miss = ((observed - now) @ weight.T).astype(np.float64)
+            inverse = np.linalg.pinv(np.nan_to_num(white))
+            change = (inverse @ np.nan_to_num(miss)[:, :, None])[:, :, 0]
+            limit = 0.5 * np.abs(values[:, 0]).astype(np.float64)
+            change[:, 0] = np.clip(change[:, 0], -limit, limit)
+            values[:, free] += change
+        chi2 = np.sum((((observed - frames(values)) @ weight.T).astype(np.float64)) ** 2, axis=1)
+    errors = np.sqrt(np.sum(inverse**2, axis=2))
+    freedom = 2 - len(free)
+    good = chi2 <= (most(1) if freedom else 1e-4)
+    good &= (values[:, 1] > 0) | (not damped)
+    return [
+        Match(
+            family=families[which[i]].name, stride=int(s[i]), turns=int(turns[i]), a=float(values[i, 0]),
+            a_error=float(errors[i, 0]), g=float(values[i, 1]),
+            g_error=float(errors[i, 1]) if damped else 0.0, log_mass=0.0, mass_error=0.0,
+            chi2=float(chi2[i]), freedom=max(freedom, 1), predicted=(),
+        )
+        for i in np.flatnonzero(good)
+    ]  # fmt: skip
+
+
+def _starts(
+    found: Recurrence, every: Table, strides: range
+) -> tuple[Integers, Floats, Floats, Floats, Floats]:
+    """Guesses (c,) of family, steps, unseen turns, a and g, which have the phase and the change of areas."""
+    s, side, turns = _ways(strides)
+    phase = (side * found.phase + 2 * np.pi * turns) / s
+    keep = (phase > 0) & (phase <= np.pi)
+    s, turns, phase = s[keep], turns[keep], phase[keep]
+    parts = []
+    for k, family in enumerate(every.families):
+        if family.flow:
+            _, sides, whole = _ways(range(FLOW_WAYS, FLOW_WAYS + 1))
+            angle = sides * found.phase + 2 * np.pi * whole
+            g = np.full(len(angle), -found.log_det if family.damped else 0.0)
+            good = (g > 0) | (not family.damped)
+            n = int(np.count_nonzero(good))
+            parts.append((np.full(n, k), np.ones(n), whole[good], (angle**2 + g**2 / 4)[good], g[good]))
+        elif family.held:
+            # a kick of the whole force moves the velocity, and the share g of it the position
+            root = np.exp(found.log_det / (2 * s))
+            a = (1 - root) ** 2 + 4 * root * np.sin(phase / 2) ** 2
+            parts.append((np.full(len(s), k), s, turns, a, 1 + (1 - root**2) / a))
+        else:
+            curve = curves((family.scheme,))
+            at, index = np.nonzero((phase > curve.low) & (phase < curve.high))
+            x, loss = curve.at(at, phase[index])
+            g = loss - found.log_det / s[index] if family.damped else np.zeros(len(x))
+            # the area of a frame is known, and that of a scheme without friction beside it
+            room = 0.02 * np.abs(loss) * s[index] + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
+            good = (g > 0) if family.damped else np.abs(loss * s[index] - found.log_det) <= room
+            parts.append(
+                (
+                    np.full(np.count_nonzero(good), k), s[index][good], turns[index][good],
+                    (np.square(x) + np.square(g / 2))[good], g[good],
+                )
+            )  # fmt: skip
+    which, s, turns, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return which, s, turns, a, g
+
+
+def _ways(strides: range) -> tuple[Floats, Floats, Floats]:
+    """Steps, side and unseen turns: without velocities a turn to the left and one to the right look alike."""
+    each = [np.arange(r + 1) for r in strides]
+    s = np.repeat(np.array(strides, np.float64), [len(x) for x in each])
+    i = np.concatenate(each)
+    return s, np.where(i % 2, -1.0, 1.0), ((i + 1) // 2).astype(np.float64)

@@ -1,0 +1,150 @@
+"""Positions alone tell trace and determinant of a step: schemes that share these are said together."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import MDAnalysis
+import numpy as np
+import pytest
+
+from springcheck.cli import main
+from springcheck.errors import IdentificationError
+from springcheck.identify import identify
+from springcheck.physics.arrays import Floats
+
+K, M, H = 2.9, 1.3, 0.31
+STOERMER = {"velocity-verlet", "semi-implicit-euler", "semi-implicit-euler-drift-kick", "position-verlet"}
+
+
+def positions(name: str, frames: int = 200, every: int = 1, noise: float = 0.0) -> tuple[Floats, Floats]:
+    """Times and positions of a scheme in plain floats."""
+    q, v = 1.1, 0.4
+    x = K / M * H * H
+    kept = [q]
+    rng = np.random.default_rng(3)
+    for i in range(frames * every):
+        if name == "velocity-verlet":
+            v = v - H / 2 * K / M * q
+            q = q + H * v
+            v = v - H / 2 * K / M * q
+        elif name == "explicit-euler":
+            q, v = q + H * v, v - H * K / M * q
+        elif name == "implicit-euler":
+            v = (v - H * K / M * q) / (1 + x)
+            q = q + H * v
+        elif name == "damped":
+            v = (v - H * K / M * q) * 0.97
+            q = q + H * v
+        elif name == "implicit-midpoint":
+            old = v
+            v = (v * (1 - x / 4) - H * K / M * q) / (1 + x / 4)
+            q = q + H * (old + v) / 2
+        q += noise * rng.standard_normal()
+        if (i + 1) % every == 0:
+            kept.append(q)
+    return H * every * np.arange(frames + 1), np.array(kept)
+
+
+@pytest.mark.parametrize(
+    ("name", "every"), [("explicit-euler", 1), ("explicit-euler", 3), ("implicit-euler", 2)]
+)
+def test_a_scheme_that_changes_areas_is_named(name: str, every: int) -> None:
+    t, q = positions(name, every=every)
+    found = identify(t, q, mass=M, friction=0.0)
+    assert (found.scheme, found.stride, found.fits) == (name, every, True)
+    assert found.stiffness == pytest.approx((K,), rel=1e-9)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_schemes_of_the_same_positions_are_said_together_where_the_stiffness_is_known(every: int) -> None:
+    t, q = positions("velocity-verlet", every=every)
+    found = identify(t, q, mass=M, stiffness=K)
+    assert (found.verdict, found.fits, found.stride) == ("not told apart", True, every)
+    assert {x.scheme for x in found.candidates} == STOERMER
+    midpoint = identify(*positions("implicit-midpoint"), mass=M, stiffness=K)
+    assert (midpoint.scheme, midpoint.aliases) == ("implicit-midpoint", ("trapezoidal",))
+
+
+def test_without_the_stiffness_all_that_keep_areas_are_left() -> None:
+    found = identify(*positions("velocity-verlet"), mass=M)
+    schemes = {x.scheme for x in found.candidates}
+    assert schemes >= STOERMER | {"implicit-midpoint", "exact"}
+    assert not schemes & {"explicit-euler", "implicit-euler"}
+    assert found.fits
+    assert "unknown number of steps" in found.statement
+
+
+def test_a_spring_of_another_stiffness_does_not_fit() -> None:
+    found = identify(*positions("velocity-verlet"), mass=M, stiffness=1.01 * K)
+    assert (found.verdict, found.fits) == ("none", False)
+    assert "another spring" in found.statement
+
+
+def test_damped_motion_names_no_scheme() -> None:
+    found = identify(*positions("damped"), mass=M)
+    assert found.verdict == "not told apart"
+    assert "areas shrink" in found.statement
+    assert not identify(*positions("damped"), mass=M, friction=0.0).fits
+
+
+@pytest.mark.parametrize("noise", [1e-13, 1e-6])
+def test_noise_is_no_scheme(noise: float) -> None:
+    found = identify(*positions("velocity-verlet", noise=noise), mass=M)
+    assert (found.verdict, found.fits) == ("none", False)
+
+
+def test_positions_that_show_nothing_are_refused() -> None:
+    t, q = positions("velocity-verlet")
+    for bad, said in (
+        (t, "no force"),
+        (0 * q + 1, "nothing moves"),
+        (np.exp(-t) + np.exp(-t / 9), "does not turn"),
+    ):
+        with pytest.raises(IdentificationError, match=said):
+            identify(t, bad)
+    with pytest.raises(IdentificationError, match="too few"):
+        identify(t[:7], q[:7])
+
+
+def test_a_table_of_two_columns_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("x.txt", np.stack(positions("velocity-verlet"), axis=1), fmt="%.17g", header="t q")
+    stated = ["--mass", str(M), "--stiffness", str(K)]
+    assert main(["identify", "x.txt", *stated]) == 0
+    assert "positions alone" in capsys.readouterr().out
+    assert main(["identify", "x.txt", "--mass", str(M), "--stiffness", str(2 * K)]) == 1
+    # what needs velocities still says so
+    assert main(["judge", "x.txt", "--scene", "spring", "--scheme", "rk4"]) == 2
+    assert "holds no momenta or velocities" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("ending", ["xtc", "dcd"])
+@pytest.mark.parametrize("name", ["velocity-verlet", "explicit-euler"])
+def test_files_of_positions_are_read_to_their_precision(
+    ending: str,
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    t, q = positions(name, 60)
+    universe = MDAnalysis.Universe.empty(1, trajectory=True)
+    universe.dimensions = [90, 90, 90, 90, 90, 90]
+    with MDAnalysis.Writer(f"x.{ending}", 1, **({"dt": H} if ending == "dcd" else {})) as writer:
+        for time, x in zip(t, q, strict=True):
+            # in nm, whose thousandths XTC keeps
+            universe.atoms.positions = 10 * x * np.array([[0.6, 0.0, 0.8]])
+            universe.trajectory.ts.time = time
+            writer.write(universe.atoms)
+    stated = ["--mass", str(M), "--stiffness", str(K), "--friction", "0", "--json"]
+    assert main(["identify", f"x.{ending}", *stated]) == 0
+    found = json.loads(capsys.readouterr().out)
+    schemes = {one["scheme"] for one in found["candidates"]}
+    assert schemes == (STOERMER if name == "velocity-verlet" else {name})
+    assert main(["identify", f"x.{ending}", "--mass", str(M), "--stiffness", str(1.1 * K)]) == 1
