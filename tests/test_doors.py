@@ -213,7 +213,7 @@ ROWS = "0,0,1"
         ("echo hello > $2", "holds no row of numbers"),
         ("printf 't,q,p\\n0,0,1\\n1,x,2\\n' > $2", "line 3: 'x' is no number"),
         ("printf 't,q,p\\n0,0,1\\n0.1,1\\n' > $2", "line 3: 2 numbers where there were 3"),
-        ("printf 't,q\\n0,0\\n' > $2", "no column of momenta or velocities"),
+        ("printf 't,q\\n0,0\\n' > $2", "no momenta or velocities"),
         ("printf '0,0,1\\n' > $2", "have no names"),
         ("printf 't,q,p\\n0,0,1\\n' > $2", "1 rows, too few"),
         ("printf 't,q,p\\n0,0,1\\n0.2,0,1\\n' > $2", "row 2 is at t = 0.2, not 0.1"),

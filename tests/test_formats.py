@@ -304,14 +304,14 @@ BAD = [
     ("hello\n", "holds no row of numbers"),
     ("1,2,3\n", "have no names"),
     ("t,q,p\n0,1\n", "2 columns and 3 names"),
-    ("t,q\n0,1\n", "no column of momenta or velocities"),
+    ("t,q\n0,1\n", "no momenta or velocities"),
     ("q,p\n0,1\n", "no column of times"),
     ("t,q,p\n0,1,2\n1,2\n", "line 3"),
     ("t,q,p\n0,1,2\n1,x,2\n", "'x' is no number"),
     ("t,q,p\n0,0.3,0.7\n0.1,inf,1\n", "row 2 of q is not finite"),
     ("t,q,p\n0,5,7\n0.1,5,7\n", "frames lie whole steps of|off the start"),
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
-    ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "no velocities"),
+    ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),
     ("PK\x03\x04zip", "NumPy cannot read it"),
 ]
 

@@ -61,6 +61,11 @@ _spec.loader.exec_module(census)
         # steps of an uneven clock, too even to show by itself
         (3049, "named"),
         (9948, "not told apart"),
+        # on a motion that dies in four frames the excuse of one scheme is that of another's equal map
+        (5803, "not told apart"),
+        (21445, "not told apart"),
+        # a cubic force that the first frames of a dying motion alone show
+        (13070, "cause named"),
         # a wobble over two turns, which powers of the state follow as well
         (2678, "cause named"),
         (4092, "cause named"),

@@ -246,3 +246,21 @@ def test_what_cannot_be_judged_is_exit_status_2(
     text = " ".join(capsys.readouterr().out.split())
     assert "but whether it fits cannot be judged" in text
     assert "noise or a systematic error of that size cannot be excluded" in text
+
+
+@pytest.mark.parametrize(("stated", "status"), [(0.4, 0), (0.41, 1)])
+def test_the_friction_of_the_command_line_is_held_against_the_states(
+    stated: float, status: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    m, k, c, h = 1.3, 2.9, 0.4, 0.11
+    q, v, rows = 1.1, 0.4, [(0.0, 1.1, 0.4)]
+    for i in range(120):
+        v = (v - h * k / m * q) * np.exp(-h * c / m)
+        q = q + h * v
+        rows.append((h * (i + 1), q, v))
+    path = tmp_path / "x.txt"
+    np.savetxt(path, rows, fmt="%.17g", header="t q v")
+    assert main(["identify", str(path), "--mass", str(m), "--friction", str(stated)]) == status
+    said = capsys.readouterr().out
+    assert ("the stated friction does not fit" in said) == bool(status)
+    assert "semi-implicit-euler" in said

@@ -25,6 +25,8 @@ UNUSUAL = 2.5
 """Roundings of a step in units of those that are usual, 4 + 2 sqrt(steps), that are taken for roundings where
 nothing makes them larger.  Measured on 700 trajectories: 1 at most."""
 
+REBUILT_NOTE = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
+
 STORED = "double, stored in single"
 EITHER = "single, or double stored in single"
 """Where the states are too few to tell an orbit that was rounded once from one rounded in every step."""
@@ -158,7 +160,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
             precision, note = "double", _written(record)
         elif _is_rebuilt(match, missing[i], size[i], difference[i]):
             precision = "double"
-            note = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
+            note = REBUILT_NOTE
         elif record.fine:
             if visible and not schemes[i].flow:
                 # forces may lie beyond the range of single precision

@@ -169,6 +169,28 @@ def _hats(x: Floats, count: int) -> Floats:
     return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
 
 
+def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[Floats]:
+    """q, v and q times the sine and cosine in time that explain most of what is missing (f, 2)."""
+    n = np.arange(len(q))
+    across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
+
+    def apart(x: Floats) -> Floats:
+        return np.asarray(x - across @ (across.T @ x))
+
+    wanted = apart(missing * weight[:, None])
+    low, high, best = 0.5 * np.pi / len(q), np.pi, 0.0
+    for count in (4 * len(q), 41):
+        w = np.linspace(low, high, count)
+        c, s = (apart((weight * q)[:, None] * wave(np.outer(n, w))) for wave in (np.cos, np.sin))
+        cc, ss, cs = (np.sum(x * y, axis=0) for x, y in ((c, c), (s, s), (c, s)))
+        det = np.maximum(cc * ss - cs * cs, 1e-9 * cc * ss + 1e-300)
+        x, y = wanted.T @ c, wanted.T @ s
+        gain = np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0)
+        best = float(w[int(np.argmax(gain))])
+        low, high = best - (w[1] - w[0]), best + (w[1] - w[0])
+    return [q, v, q * np.cos(best * n), q * np.sin(best * n)]
+
+
 def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
     def look(e: Evidence) -> list[Explanation]:
         if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
@@ -203,6 +225,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "drag": [*linear, np.abs(v) * v],
         "quadratic": [*linear, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
+        "oscillation": _oscillation(q, v, missing, weight[:, 0]),
         "anharmonic": [
             *linear,
             np.ones_like(q),
@@ -247,14 +270,14 @@ def _shape(e: Evidence) -> list[Explanation]:
 KIND = {
     "drag": "depends on the velocity", "quadratic": "is anharmonic", "cubic": "is anharmonic",
     "anharmonic": "is anharmonic", "position": "is anharmonic", "velocity": "depends on the velocity",
-    "stiffness in time": "changes in time", "friction in time": "changes in time",
-    "map in time": "changes in time",
+    "oscillation": "changes in time", "stiffness in time": "changes in time",
+    "friction in time": "changes in time", "map in time": "changes in time",
 }  # fmt: skip
 """What the force depends on in each group of columns."""
 
 
-STATE = ("anharmonic", "position", "velocity")
-"""Groups of so many functions of the state that they follow most functions of time."""
+STATE = ("quadratic", "anharmonic", "position", "velocity")
+"""Groups of functions of the state that follow most functions of time where states hardly come back."""
 
 FEW_TURNS = 2.0
 """Turns of the motion from which states come back often enough to tell what goes with them from time."""
@@ -294,11 +317,13 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         "position": "The force is not linear in the position, as one that is clipped or anharmonic, which",
         "velocity": "The friction is not linear in the velocity, which",
         "stiffness in time": "The stiffness changes in time, which",
+        "oscillation": "The stiffness changes in time, up and down, which",
         "friction in time": "The friction changes in time, which",
         "map in time": "The step or the stiffness changes in time, which",
     }
     remedies = {
         "stiffness in time": "look for a parameter or a clock that moves during the run",
+        "oscillation": "look for a parameter or a clock that moves during the run",
         "friction in time": "look for a thermostat or a damping that is switched during the run",
         "map in time": "look for a step that is adapted, or give a part of the trajectory",
     }

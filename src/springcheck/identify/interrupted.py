@@ -16,6 +16,10 @@ FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""
 
 
+LARGER = 10.0
+"""Size of the first frames, of the median, from which a force that is not linear shows in them alone."""
+
+
 def few_bad_frames(e: Evidence) -> list[Explanation]:
     """A motion that a few pairs of frames interrupt."""
     kept = np.ones(e.pairs, dtype=bool)
@@ -48,6 +52,9 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     elif len(runs) > 1:
         at = ", ".join(str(run[0] + 1) for run in runs[1:5])
         cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
+    size = np.sqrt(np.sum(np.square(found.z.astype(np.float64)), axis=1))
+    if bad[0] == 0 and len(bad) > 1 and float(np.max(size[bad])) > LARGER * float(np.median(size)):
+        cause = f"{cause}, where the motion is largest and an anharmonic force would show"
     return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
 
 

@@ -260,7 +260,10 @@ def _unfitting(
     if joints and stated is not None:
         x = joints[0]
         off = _stiffer(record, moving, x, stated, 0.0)
-        shown = f"{off[1]:.9g} instead of {stated[off[0]]:.9g}" if off else "with another friction"
+        shown = "with another friction"
+        if off:
+            k = float(stated[off[0]])
+            shown = f"{off[1]:.9g} instead of {k:.9g}" + (f", {off[1] / k - 1:+.1e} of it" if k else "")
         return (
             f"The positions may be those of {title(FAMILIES[x.family].scheme)}, but of another "
             f"spring: {shown}",

@@ -74,6 +74,8 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     size = np.abs(q).astype(np.float64)
     size = size[2:] + 2 * size[1:-1] + size[:-2]
     noise = ROUNDING * size
+    # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
+    amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
     if not record.fine:
         noise = np.sqrt(noise**2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
     noise = np.maximum(noise, 1e-30 * np.max(noise))
@@ -82,10 +84,12 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     residual = float(np.sqrt(np.mean(left**2))) / scale
     ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
     usual = 4 + 2 * math.sqrt(steps)
+    clock = record.clock * 2 * np.pi * amplitude if record.slips is not None else 0.0 * amplitude
 
     def explained(rounding: float, beside: Floats | float = 0.0) -> bool:
         off = float(np.max(np.maximum(np.abs(left) - beside, 0) / (rounding * size)))
-        return off <= usual or (off <= UNUSUAL * usual and irregular((left / noise)[:, None]))
+        late = float(np.max(np.maximum(np.abs(left) - beside - clock, 0) / (rounding * size)))
+        return off <= usual or (late <= UNUSUAL * usual and irregular((left / noise)[:, None]))
 
     precision = ""
     if record.fine:

@@ -187,6 +187,9 @@ def _explained(
             break
         seen = alone and visible(found, what, damped=left[0].damped)
         new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], visible=seen)
+        excuse = next((x for x in new if x.note == arithmetic.REBUILT_NOTE), None)
+        # what excuses one scheme's misses does not exclude the others whose maps are as near
+        new = [x if x.precision or excuse is None else excuse for x in new]
         explained = [k for k, x in enumerate(new) if x.precision]
         defects = [[*defects[k], new[k]] for k in explained]
         left = [left[k] for k in explained]
