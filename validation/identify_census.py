@@ -1,7 +1,7 @@
 """Claim: `identify` names scheme and steps from states alone, never names another scheme, and never takes a
 systematic error for an arithmetic.
 
-    python validation/identify_census.py [FIRST COUNT [FILE]]
+    python validation/identify_census.py [FIRST COUNT [FILE [ALONE]]]
 
 Each trajectory is drawn at random: a scheme of the catalogue, or one with friction by any law and at any
 place in its step, or a force held over substeps; a spring that is stated or not, about an equilibrium at 0 or
@@ -18,7 +18,13 @@ says: the scheme is known, and whether its arithmetic explains the rest cannot b
 
 Steps are carried out in plain floats from the stages, without the matrices that `identify` matches.  With
 FILE every block of 100 trajectories is kept in it, a line of JSON each: blocks that are there are not run
-again, and what is printed is the sum of all blocks of the file.
+again, and what is printed is the sum of all blocks of the file.  With ALONE = 1 it is given positions
+alone, and for one in three without friction that there is none.
+
+Printed for 30000 to 36099 (6,047 trajectories): 4318 named; 744 not told apart; 645 cause named; 253 error
+seen; 31 error within rounding; 26 undecided; 11 refused; 8 FALSE FIT; 8 none; 3 WRONG CAUSE; no wrong name.
+Milliseconds a call: half within 13, 90 % 34, 99 % 109, all 482, with a load of 17 on two cores.
+For 0 to 299 alone: 208 among several; 45 named; 32 error seen; 7 error, and a fit; 5 none.
 """
 
 from __future__ import annotations
@@ -37,6 +43,7 @@ from arguments import arguments
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import DAMPED, UNDAMPED, Family
+from springcheck.identify.recurrence import classes
 from springcheck.identify.search import aliases, frictionless
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
@@ -272,7 +279,27 @@ def _hides(states: tuple[Floats, ...], stride: int) -> bool:
     return bool(np.max(np.abs(left)) <= 128 * 2.0**-52 * stride)
 
 
-def said_of(number_: int) -> tuple[Draw, str, str, float] | None:
+def _alone(draw: Draw, found: Identification) -> str:
+    """The same of positions alone: right where the scheme is named, or one of those that share positions."""
+    same = next((x for x in classes() if draw.scheme in _names(x)), None)
+    right = _names(same) if same else {draw.scheme}
+    schemes = {found.scheme} if found.scheme else {x.scheme for x in found.candidates}
+    if draw.error:
+        # what a constant, or another stiffness and friction, takes up does not show in positions
+        return "error, and a fit" if found.fits else "error seen"
+    if not found.fits:
+        return "none"
+    if found.scheme:
+        return "named" if found.scheme in right else "WRONG NAME"
+    return "among several" if schemes & right else "NOT AMONG SEVERAL"
+
+
+def _names(families: tuple[Family, ...]) -> set[str]:
+    each = {family.scheme for family in families}
+    return each | {y for x in each if x in SCHEMES for y in (*aliases(x), *frictionless(x))}
+
+
+def said_of(number_: int, alone: bool = False) -> tuple[Draw, str, str, float] | None:
     """What is said of one trajectory, its statement and the seconds of the call; None where it overflows."""
     draw = Draw(np.random.default_rng([4, number_]))
     try:
@@ -286,21 +313,24 @@ def said_of(number_: int) -> tuple[Draw, str, str, float] | None:
     stated = draw.k if draw.stated else None
     begun = time.process_time()
     try:
-        found = identify(t, written(q, draw.form), v=written(v, draw.form), mass=draw.m, stiffness=stated)
+        speed = None if alone else written(v, draw.form)
+        still = 0.0 if alone and not draw.g and number_ % 3 == 0 else None
+        found = identify(t, written(q, draw.form), v=speed, mass=draw.m, stiffness=stated, friction=still)
         hidden = bool(draw.error) and _hides(states, draw.stride)
-        said, statement = judged(draw, found, hidden), found.statement
+        said = _alone(draw, found) if alone else judged(draw, found, hidden)
+        statement = found.statement
     except IdentificationError as error:
         said, statement = f"refused: {str(error)[:60]}", ""
     return draw, said, statement, time.process_time() - begun
 
 
-def block(first: int) -> dict[str, Any]:
+def block(first: int, alone: bool = False) -> dict[str, Any]:
     """One block of trajectories: what was said of each class, what is wrong, and the seconds a call takes."""
     counts: Counter[str] = Counter()
     wrong: list[str] = []
     seconds: list[float] = []
     for at in range(first, first + BLOCK):
-        one = said_of(at)
+        one = said_of(at, alone)
         if one is None:
             continue
         draw, said, statement, spent = one
@@ -314,14 +344,14 @@ def block(first: int) -> dict[str, Any]:
 
 def main() -> None:
     """Print what was said, class by class, and everything that is wrong."""
-    given = arguments(__doc__, first=0, count=1000, file="")
+    given = arguments(__doc__, first=0, count=1000, file="", alone=0)
     path = Path(given.file) if given.file else None
     kept = [json.loads(line) for line in path.read_text().splitlines()] if path and path.exists() else []
     have = {one["first"] for one in kept}
     for first in range(given.first - given.first % BLOCK, given.first + given.count, BLOCK):
         if first in have:
             continue
-        kept.append(block(first))
+        kept.append(block(first, bool(given.alone)))
         if path:
             with path.open("a") as out:
                 out.write(json.dumps(kept[-1]) + "\n")

@@ -14,6 +14,7 @@ from springcheck.identify.maps import table
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.schemes import SCHEMES
 
 __all__ = ["QUANTUM", "Defect", "defects", "misses"]
 
@@ -24,6 +25,9 @@ REBUILT = 1 / 32, 1.0
 UNUSUAL = 2.5
 """Roundings of a step in units of those that are usual, 4 + 2 sqrt(steps), that are taken for roundings where
 nothing makes them larger.  Measured on 700 trajectories: 1 at most."""
+
+UNLIKE = 1 / 4
+"""Share of a clock's rounding, over the steps of a frame, by which unlike steps differ from even ones."""
 
 REBUILT_NOTE = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
 
@@ -130,12 +134,17 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     if record.slips is not None and found.slips is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
         other = _misses(matches, found, record.slips).astype(np.float64)
-        follows = _largest(np.abs(other), 2.0**-52 * size) < ulp / 2
-        signed = np.where(follows[:, None, None], other, signed)
+        late = _largest(np.abs(other), 2.0**-52 * size)
+        follows = late < 0.7 * ulp
+        signed = np.where((late < ulp)[:, None, None], other, signed)
         missing = np.abs(signed)
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
     usual = 4 + 2 * np.sqrt(stride)
+    # the clock shows a frame's steps together: of unlike ones a scheme of order p makes x**(p + 1) more
+    order = np.array([SCHEMES[x.scheme].order if x.scheme in SCHEMES else 1 for x in schemes])
+    unlike = np.where(stride > 1, UNLIKE * stride * record.clock / 2.0**-52, 0.0)
+    usual += unlike * np.abs([match.a for match in matches]) ** ((order + 1) / 2)
     plain = ulp <= np.minimum(path, usual)
     if visible:
         # an equilibrium away from 0, a decay within a frame and an uneven clock make roundings larger
