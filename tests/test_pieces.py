@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import store
+from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.store import access
 from springcheck.store.parts import parts_folder
@@ -155,3 +155,15 @@ def test_processors_that_differ_are_named_and_whether_their_bits_do() -> None:
     assert "agree bit for bit" in same
     (_, differ) = provenance.sentences([("a", who("x")), ("b", who("y", "P", "1")), ("c", who("z"))])
     assert "differ in a bit: sums round otherwise on y than on x, z" in differ
+
+
+def test_report_inspect_and_page_say_who_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(keeper, "who", lambda path: [f"Measured on two kinds, says {Path(path).name}."])
+    path = str(tmp_path / "limits.h5")
+    assert cli.main(["stability", "spring", "--method", "own:euler", "-o", path]) == 0
+    assert cli.main(["inspect", path]) == 0
+    assert capsys.readouterr().out.count("Measured on two kinds, says limits.h5.") == 2
+    assert cli.main(["report", path, "-o", str(tmp_path / "page.html")]) == 0
+    assert "Measured on two kinds, says limits.h5." in (tmp_path / "page.html").read_text()

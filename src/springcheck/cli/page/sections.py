@@ -59,7 +59,7 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
             Section(
                 name=study.name,
                 title=study.about[:1].upper() + study.about[1:],
-                blocks=tuple(_blocks(study.lines(result))),
+                blocks=tuple(_blocks(study.lines(result, path=summary.path))),
                 banks=tuple(mine),
             )
         )
