@@ -48,7 +48,7 @@ def closed_or_not(case: Case) -> str | None:
             f"or more than {MOST_JOINED} particles are joined"
         )
     if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
-        return "a mode under a constant pull has no closed form here"
+        return "a mode under a constant force has no closed form here"
     determinant = schemes.rotation(case.matrices).determinant
     if not np.all(np.isfinite(determinant)):
         return "the equation of an implicit step has no solution here"

@@ -45,7 +45,7 @@ def energy(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
     unit = float(scene.system.norm.unit) ** 2 or 1.0
     whole = abs(start - unit) <= 1e-12 * unit
     unit = start if whole else unit
-    of = "initial energy" if whole else "(T + |V|) of the start"
+    of = "initial energy" if whole else "initial T + |V|"
     damped = scene.system.is_damped and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:

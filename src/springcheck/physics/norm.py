@@ -1,4 +1,4 @@
-"""The size of an error: the square root of an energy, relative to that of the start."""
+"""The size of an error: the square root of an energy, relative to the initial one."""
 
 from __future__ import annotations
 

@@ -293,7 +293,7 @@ class System:
 
     @cached_property
     def initial_energy(self) -> float:
-        """Total energy of the start [M L2/T2]."""
+        """Initial total energy [M L2/T2]."""
         return float(self.energy(self.scene.q, self.scene.p))
 
     @cached_property

@@ -170,7 +170,7 @@ _ALL = (
               _mirrored(("kick", _HALF_X1), ("drift", _X1), ("kick", _HALF_X0_X1), ("drift", _X0)),
               "Yoshida 1990"),
     splitting("langevin-middle",
-              "Langevin middle scheme at T = 0: half pull, half drift, friction, half drift, half pull",
+              "Langevin middle (BAOAB) at T = 0: half kick, half drift, friction, half drift, half kick",
               2, 2.0, _mirrored(("pull", HALF), ("drift", HALF), ("friction", ONE)),
               f"Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; {_ZHANG}"),
     splitting("respa8", "r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones", 2, 16.0,
@@ -178,7 +178,7 @@ _ALL = (
               f"{_TUCKERMAN}; the limit is that of a fast spring alone, in company it resonates from "
               "h w = 16 sin(pi/16) on"),
     splitting("langevin-middle-early",
-              "Langevin middle at T = 0, momenta half a step early: pull, half drift, friction, half drift",
+              "Langevin middle at T = 0, momenta half a step early: kick, half drift, friction, half drift",
               1, 2.0, (("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
               f"{_ZHANG}; as OpenMM's integrator stores it"),
     Scheme(name="exact", title="exact flow", order=0, limit=np.inf, symplectic=True, flow=True,

@@ -23,4 +23,4 @@ def taken_up(pieces: int, what: str) -> Lines:
     if not pieces:
         return []
     were = "was" if pieces == 1 else "were"
-    return [plain(f"  {count(pieces, what)} {were} finished by an interrupted call and taken up")]
+    return [plain(f"  {count(pieces, what)} {were} finished by an interrupted call and resumed")]

@@ -10,7 +10,7 @@ v0 - (h/2) F/m, with half a kick added to what is read, it is velocity Verlet ("
 
 `LangevinMiddleIntegrator` kicks, drifts half a step, lets friction and noise act on the velocity,
 and drifts the other half.  At T = 0 there is no noise, and read like "verlet" it is the symmetric
-scheme pull-drift-friction-drift-pull.  Its friction is one rate c/m for all particles.  `LangevinIntegrator`
+scheme kick-drift-friction-drift-kick.  Its friction is one rate c/m for all particles.  `LangevinIntegrator`
 is the same by now, bit for bit.
 
 OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every

@@ -21,7 +21,7 @@ def banks(study: PrecisionStudy) -> list[Bank]:
         return []
     least = min(x.error for x in points)
     error = Scale(
-        name="largest error, of the start",
+        name="largest error / initial energy norm",
         log=True,
         shown=(least / 2, min(MOST_SHOWN, 2 * max(x.error for x in points))),
     )

@@ -260,7 +260,7 @@ def _next(report: Report) -> Text:
 def _summary(report: Report) -> Lines:
     """How many verdicts passed, where the store is, and what to do with it."""
     failed = any(v.passed is False for v in report.verdicts)
-    taken = f"; taken up from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
+    taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
     look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
     return [
         plain(f"{report.counts}{taken}", look),
