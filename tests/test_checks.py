@@ -151,7 +151,7 @@ def test_a_trajectory_of_one_frame_is_judged_without_an_exception() -> None:
     for name in ("spring", "chain"):
         scene = scenes.load_scene(name)
         run = plain(scene, "velocity-verlet")
-        verdicts = checks.judge(scene, part_of(run, slice(1)))
+        verdicts = checks.judge(scene, part_of(run, slice(1)), piece=True)
         assert alarms(verdicts) == []
         assert next(v for v in verdicts if v.check == "step-defect").passed is None
 
