@@ -21,9 +21,9 @@ FILE every block of 100 trajectories is kept in it, a line of JSON each: blocks 
 again, and what is printed is the sum of all blocks of the file.  With ALONE = 1 it is given positions
 alone, and for one in three without friction that there is none.
 
-Printed for 30000 to 36099 (6,047 trajectories): 4318 named; 744 not told apart; 645 cause named; 253 error
-seen; 31 error within rounding; 26 undecided; 11 refused; 8 FALSE FIT; 8 none; 3 WRONG CAUSE; no wrong name.
-Milliseconds a call: half within 13, 90 % 34, 99 % 109, all 482, with a load of 17 on two cores.
+Printed for 30000 to 38699 (8,627 trajectories): 6162 named; 1074 not told apart; 917 cause named; 361 error
+seen; 38 error within rounding; 35 undecided; 13 refused; 9 FALSE FIT; 14 none; 4 WRONG CAUSE; no wrong name.
+Milliseconds a call: half within 13, 90 % 34, 99 % 109, all 513, with a load of 10 to 17 on two cores.
 For 0 to 299 alone: 208 among several; 45 named; 32 error seen; 7 error, and a fit; 5 none.
 """
 

@@ -109,7 +109,9 @@ def _scales(e: Evidence) -> list[Explanation]:
         return []
     x = fitting[0]
     scale = {str(y): math.exp(-y.parts[0].log_mass) for y in fitting}
-    cause = f"{x} would fit if velocities were {scale[str(x)]:.6g} times as large"
+    one = scale[str(x)]
+    larger = f"{one:.6g} times as large" if abs(one - 1) > 1e-5 else f"larger by {one - 1:+.1e} of their size"
+    cause = f"{x} would fit if velocities were {larger}"
     if len(fitting) > 1:
         # symmetric schemes have the same map but for the scale, so each has one of its own
         each = "; ".join(f"{name}: {value:.6g}" for name, value in list(scale.items())[:SHOWN])
