@@ -330,3 +330,23 @@ def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path) -> Non
             LIMITED[name], tmp_path, rng.uniform(0.3, 2.0), number=signal.SIGINT, again=again
         )
         assert [what for what in trial.wrong if not what.endswith(" s")] == []
+
+
+@posix
+def test_ctrl_c_works_after_rebound_has_run() -> None:
+    """`integrate` leaves a handler in C behind that counts signals and forgets them."""
+    pytest.importorskip("rebound")
+    code = (
+        "import os, signal, springcheck\n"
+        "springcheck.simulate(springcheck.load_scene('spring'), 'rebound:ias15')\n"
+        "try:\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    sum(range(1000))\n"
+        "except KeyboardInterrupt:\n"
+        "    print('heard')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", "import signal; signal.signal(2, signal.default_int_handler)\n" + code],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout == "heard\n", done.stderr

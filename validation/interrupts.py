@@ -72,6 +72,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "--workers",
         "2",
     ),
+    "census": ("census",),
     "inspect": ("inspect", "input.h5", "--verdicts"),
     "plot": ("plot", "input.h5", "-o", "figures"),
     "identify": ("identify", "input.h5"),

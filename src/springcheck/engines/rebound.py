@@ -11,6 +11,10 @@ phase, as long as there is no friction.  Steps end at every frame.
 from __future__ import annotations
 
 import ctypes
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -31,6 +35,18 @@ def version() -> dict[str, str]:
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
     """A simulation at the scene's start."""
     return _Simulation(scene, method.name, step)
+
+
+@contextmanager
+def _signals() -> Iterator[None]:
+    """Ctrl-C as it was before: `integrate` hands it to a function of its own, for good, which forgets it."""
+    kept = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    finally:
+        # None: it was not set by Python; elsewhere than in the main thread it cannot be set
+        if kept is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, kept)
 
 
 class _Simulation:
@@ -65,7 +81,7 @@ class _Simulation:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         steps, q_now, v_now = self._simulation.steps, self._q, self._v
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"), _signals():
             for row in range(len(q)):
                 self._done += every
                 if self._adaptive:
