@@ -267,13 +267,15 @@ def wrongs(result: Result, *, signalled: bool, whole: tuple[str, ...]) -> Iterat
         yield f"a damaged file is shown as if nothing were: {out[:300]!r}"
 
 
-SYSTEM = ("/usr/", "/lib/", "/lib64/", "/etc/", "/proc/", "/sys/", f"{sys.prefix}/", f"{sys.base_prefix}/",
+SYSTEM = ("/usr/", "/lib/", "/lib64/", "/etc/", "/proc/", "/sys/",
+          f"{Path.home()}/.config/", f"{sys.prefix}/", f"{sys.base_prefix}/",
           *{f"{Path(name).parents[2]}/" for name in sys.path if name.endswith("site-packages")},
           *filter(None, sys.path), str(Path(__file__).parent.parent))  # fmt: skip
 """Where the programs are."""
 
-CACHES = (f"{Path.home()}/.cache/",)
-"""Where compilers of OpenCL and Matplotlib keep what they have made; Numba's are beside its functions."""
+CACHES = (f"{Path.home()}/.cache/", "/dev/shm/mpich_", "/dev/shm/ucx_", "/proc/")
+"""Where compilers of OpenCL and Matplotlib keep what they make, and MPI its memory; Numba's lie beside its
+functions."""
 
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/full", "/dev/zero", "/dev/tty")
 CALLS = "openat,open,creat,mkdir,mkdirat,unlink,unlinkat,rename,renameat,renameat2,link,linkat,symlink"
