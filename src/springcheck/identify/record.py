@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -246,3 +247,19 @@ def read(
         mass=masses,
         momenta=v is None and masses is None,
     )
+
+
+def stated_stride(record: Record, step: float | None, notes: list[str]) -> int | None:
+    """Steps to a frame of a stated step; -1, and a note, where it does not divide the interval."""
+    if step is None:
+        return None
+    if not math.isfinite(step) or step == 0:
+        raise IdentificationError(f"step must be a finite number other than 0; found {step!r}")
+    ratio = float(record.interval / np.longdouble(step))
+    stride = round(ratio)
+    if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
+        notes.append(
+            f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"
+        )
+        return -1
+    return stride

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
     candidates_of,
@@ -22,11 +21,11 @@ from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD, substeps
-from springcheck.identify.fit import ROUNDING, Map
+from springcheck.identify.fit import Map
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.positions import identify_positions
-from springcheck.identify.record import Record, read
+from springcheck.identify.record import Record, read, stated_stride
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import (
     FEW,
@@ -55,21 +54,6 @@ VELOCITY_OFFSET = {
 
 UNTOLD = "cannot tell"
 """Arithmetic where the candidates' are several."""
-
-
-def _stated_stride(record: Record, step: float | None, notes: list[str]) -> int | None:
-    if step is None:
-        return None
-    if not math.isfinite(step) or step == 0:
-        raise IdentificationError(f"step must be a finite number other than 0; found {step!r}")
-    ratio = float(record.interval / np.longdouble(step))
-    stride = round(ratio)
-    if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
-        notes.append(
-            f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"
-        )
-        return -1
-    return stride
 
 
 def identify_arrays(
@@ -103,7 +87,7 @@ def identify_arrays(
     stated = None
     if stiffness is not None and record is given:
         stated = np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
-    stride = _stated_stride(record, step, notes)
+    stride = stated_stride(record, step, notes)
     base = [_terms(record, j, stated) for j in moving]
     if record.momenta and stated is None:
         notes.append(
@@ -163,7 +147,7 @@ def _of_positions(
         stated = np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
         if record.mass is None:
             notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
-    stride = _stated_stride(record, step, notes)
+    stride = stated_stride(record, step, notes)
     return identify_positions(record, stated, stride, friction, notes)
 
 
