@@ -62,9 +62,14 @@ def started(place: str, queue: str, options: Mapping[str, Any], workers: int) ->
     # whole jobs
     workers = -(-workers // given["processes"]) * given["processes"]
     refused: list[str] = []
+    from distributed import Status
+
+    cluster: Any = object.__new__(kind)
     try:
-        cluster = kind(job_cls=_patient(kind.job_cls, refused), **given)
+        kind.__init__(cluster, job_cls=_patient(kind.job_cls, refused), **given)
     except (ValueError, TypeError, OSError) as error:
+        # or what is half made warns as it goes that it was never closed, and cannot say its name
+        cluster.status = Status.closed
         raise SpringcheckError(f"--cluster {place}: {told(error)}") from error
     try:
         # jobs end at their time limit; then they are submitted again
