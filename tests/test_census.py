@@ -56,7 +56,8 @@ def test_a_census_by_workers_is_that_of_one_but_for_the_times_which_they_do_not_
     for many, alone in zip(two.entries, one.entries, strict=True):
         assert min(many.seconds, alone.seconds) > 0
         assert np.array_equal(many.q, alone.q)
-        same = [{**vars_of(x), "seconds": 0.0, "q": None, "p": None} for x in (many, alone)]
+        # an engine names the compiler once it has needed it
+        same = [{**vars_of(x), "version": "", "seconds": 0, "q": None, "p": None} for x in (many, alone)]
         assert repr(same[0]) == repr(same[1])
     assert [x.seconds for x in census.stored("2.h5").entries] == [x.seconds for x in two.entries]
 

@@ -228,7 +228,8 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     assert truth is not None
     t, q, _ = truth
     assert (t[0], t[-1]) == pytest.approx((followed.t[0], followed.t[-1]))
-    assert 1400 < len(t) <= 1501
+    # 1,500 parts of one length, and closer ones at the start, where a stiff motion may decay
+    assert 1400 < len(t) <= 1501 + 200
     np.testing.assert_allclose(q, exact.true_motion(scene, t / step, step)[0], atol=1e-12)
     assert trajectories.draw_runs(scene, found.runs, tmp_path, followed=found.followed)
 

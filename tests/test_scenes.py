@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, simulate
+from springcheck.checks.steps import fastest
 from springcheck.cli import listing, main
 from springcheck.engines.own import simulation as own
 from springcheck.errors import MethodError, SceneError
@@ -328,7 +329,7 @@ def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: 
     scene = scenes.load_scene(name)
     one, other = simulate.run(scene, "openmm:verlet"), simulate.run(scene, "ase:velocity-verlet")
     case = checks.Case(trajectory=other, scene=scene)
-    hw = scene.step * checks.fastest(case)
+    hw = scene.step * fastest(case)
     allowed = 2 * case.roundings * case.rounding * scene.steps * (1 + scene.steps * hw)
     assert np.max(scene.system.norm(one.q - other.q, one.p - other.p)) <= allowed
     assert allowed < 1e-6
