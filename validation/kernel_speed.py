@@ -14,16 +14,16 @@ Command: python validation/kernel_speed.py        (2 min; without a C compiler `
 Processor time of the thread is taken, not the clock on the wall, so that what else runs counts little; the
 rounds go through all jobs in turn, and a ratio is that of the least times.
 
-Expected (Intel Xeon, Sapphire Rapids, shared with other work; gcc 12, numba 0.68; nanoseconds a mass and
-step, least of 9 rounds, and in brackets the ratio to C):
+Expected (Intel Xeon, two idle cores; gcc 12, numba 0.68; nanoseconds a mass and step, least of 9 rounds, and
+in brackets the ratio to C):
 
                                      explicit        semi-implicit   implicit Euler
-    one spring                       6.4 (0.71)      12.8 (0.99)     14.5 (1.02)
-    4096 springs                     0.82 (0.97)     0.88 (1.09)     0.87 (0.99)
-    chain of 1,000 masses            1.0 (0.99)      1.1 (1.00)      7.7 (1.04)
-    chain of 10,000 masses           1.7 (1.43)      1.7 (1.34)      8.0 (1.14)
-    chain of 100,000 masses          1.8 (0.95)      1.7 (0.79)      9.0 (1.20)
-    chain of 1,000,000 masses        2.9 (0.84)      2.8 (0.79)      10.9 (1.25)
+    one spring                       3.9 (0.66)      7.9 (1.00)      8.6 (0.99)
+    4096 springs                     0.56 (0.96)     0.56 (1.02)     0.56 (1.01)
+    chain of 1,000 masses            0.71 (1.02)     0.71 (1.03)     4.6 (1.06)
+    chain of 10,000 masses           1.1 (1.26)      1.0 (1.22)      4.7 (1.06)
+    chain of 100,000 masses          1.2 (0.82)      1.1 (0.80)      5.4 (1.26)
+    chain of 1,000,000 masses        1.8 (1.01)      1.8 (1.10)      6.9 (1.24)
 
 Exit status 0 when every ratio holds, 1 otherwise.
 """
