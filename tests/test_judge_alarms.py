@@ -183,3 +183,16 @@ def test_an_implicit_step_without_a_solution_is_no_crash() -> None:
     assert len(run.t) == 1
     assert run.outcome.status == "diverged"
     assert alarms(found) == []
+
+
+def test_joined_masses_that_decay_below_every_double_are_followed() -> None:
+    """Two stiff masses of 1e28 end at one unit of a subnormal; the reference's solver lost digits there."""
+    walls = WallSpring(i=np.arange(2), k=np.array([1.4277e27, 4.2022e27]), at=np.zeros(2))
+    join = Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.6962e29]), rest=np.zeros(1))
+    scene = clean.scene(
+        np.array([3.3896e27, 2.8768e27]), (walls, join), np.array([-0.357, -0.799]),
+        np.array([2.734e25, -5.3823e26]), step=3.2934, steps=3 * 406, every=406,
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "own:implicit-euler")
+    assert np.max(np.abs(run.q[-1])) < 1e-320
+    assert alarms(checks.judge(scene, run)) == []

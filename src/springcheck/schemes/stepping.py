@@ -172,15 +172,19 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
     """The residual (..., n) over 1 + factor K, with K (..., n, n) if joined, else its diagonal (..., n)."""
     if not joined:
         return np.asarray(residual / (1 + np.asarray(stiffness, residual.dtype) * factor))
-    # it only steers: what counts is the residual
+    # it only steers: what counts is the residual, which may be of any size that no double has
+    size = np.max(np.abs(residual), axis=-1, keepdims=True)
+    size = np.where((size > 0) & np.isfinite(size), size, 1)
+    residual = residual / size
     if not isinstance(stiffness, np.ndarray):
         solve = sparse_solver(stiffness, factor)
-        return np.asarray(solve(residual))
+        return np.asarray(solve(residual) * size)
     matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[:, None], np.float64)
     right = residual.astype(np.float64)
     try:
         if matrix.ndim == 2:
-            return np.asarray(right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T)
-        return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+            found = right @ _inverse(np.ascontiguousarray(matrix).tobytes(), len(matrix)).T
+            return np.asarray(found * size)
+        return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0] * size)
     except np.linalg.LinAlgError:
         return np.full_like(residual, np.nan)
