@@ -10,20 +10,19 @@ system), the smallest of interleaved repetitions, with compiled modules in place
 
 Command: python validation/house.py [repeats]        (40 s for 5)
 
-Printed on two cores that some sixteen other programs kept busy, which lengthens both sides, not alike (on the
-idle machine the two ratios were 2.07 and 1.30 a few steps before):
+Printed on two idle cores:
 
-    lines 37897 in 252 modules, median 130.5
-    largest studies/faults/seeded.py 397, checks/case.py 387, identify/report.py 385,
+    lines 38756 in 254 modules, median 132.5
+    largest studies/faults/seeded.py 397, identify/report.py 390, checks/case.py 387,
       studies/run/measure.py 384, physics/system.py 380
     rooms 20, arrows 88, longest chain 10:
       __main__ > cli > studies > doors > identify > formats > store > trajectory > physics > errors
-    imports of numpy and h5py       133 ms
-    the smallest run                368 ms
-    imports of the libraries        669 ms
-    run spring                     1219 ms
-    its engines alone                80 ms
-    smallest run / imports 2.77; run spring / (imports + engines) 1.63
+    imports of numpy and h5py       176 ms
+    the smallest run                375 ms
+    imports of the libraries        780 ms
+    run spring                     1185 ms
+    its engines alone               145 ms
+    smallest run / imports 2.13; run spring / (imports + engines) 1.28
 
 The speed of the own engine beside C is measured by kernel_speed.py.
 """
