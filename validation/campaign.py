@@ -270,7 +270,7 @@ def wrongs(result: Result, *, signalled: bool, whole: tuple[str, ...]) -> Iterat
 SYSTEM = ("/usr/", "/lib/", "/lib64/", "/etc/", "/proc/", "/sys/",
           f"{Path.home()}/.config/", f"{sys.prefix}/", f"{sys.base_prefix}/",
           *{f"{Path(name).parents[2]}/" for name in sys.path if name.endswith("site-packages")},
-          *filter(None, sys.path), str(Path(__file__).parent.parent))  # fmt: skip
+          *filter(None, sys.path), str(Path(__file__).resolve().parent.parent))  # fmt: skip
 """Where the programs are."""
 
 CACHES = (f"{Path.home()}/.cache/", "/dev/shm/mpich_", "/dev/shm/ucx_", "/proc/")
