@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
+from springcheck.engines.bodies import Bodies
 from springcheck.engines.bonds import far, walls
 from springcheck.engines.contract import (
     EVERY_FORCE,
@@ -23,7 +22,7 @@ from springcheck.engines.contract import (
     named,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 FURTHEST = 2.0
@@ -50,33 +49,30 @@ def arithmetic(label: Label) -> Arithmetic:
     return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
 
 
-class _World:
+class _World(Bodies):
     """Box2D's world in motion."""
 
     def __init__(self, scene: Scene, step: float, *, joints: bool) -> None:
         import Box2D
 
-        self.force_calls = 0
-        self.off_axis = 0.0
-        self._h, self._m = step, scene.m
+        super().__init__(scene, springs=joints)
+        self._h = step
         self._world = world = Box2D.b2World(gravity=(0, 0), doSleep=False)
-        self._bodies = []
         for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
             body = world.CreateDynamicBody(position=(q, 0), linearVelocity=(p / m, 0), fixedRotation=True)
             body.massData = Box2D.b2MassData(mass=m, center=(0, 0), I=1.0)
-            self._bodies.append(body)
-        self._force = None if joints else scene.system.force
+            self.bodies.append(body)
         if joints:
             self._add_joints(Box2D, scene)
 
     def _add_joints(self, library: Any, scene: Scene) -> None:
         length, ground = far(scene), self._world.CreateStaticBody(position=(0, 0))
         for i, k, at in walls(scene, "box2d:distance-joint"):
-            frequency = math.sqrt(k / self._m[i]) / (2 * math.pi)
+            frequency = math.sqrt(k / self.m[i]) / (2 * math.pi)
             self._world.CreateJoint(
                 library.b2DistanceJointDef(
                     bodyA=ground,
-                    bodyB=self._bodies[i],
+                    bodyB=self.bodies[i],
                     localAnchorA=(at - length, 0),
                     localAnchorB=(0, 0),
                     length=length,
@@ -85,25 +81,20 @@ class _World:
                 )
             )
 
-    def advance(self, every: int, q: Floats, p: Floats) -> None:
-        world, bodies, force = self._world, self._bodies, self._force
-        here, there = np.empty(len(bodies)), np.empty(len(bodies))
-        with np.errstate(over="ignore", invalid="ignore"):
-            for row in range(len(q)):
-                for _ in range(every):
-                    if force is not None:
-                        for i, body in enumerate(bodies):
-                            here[i], there[i] = body.position.x, body.linearVelocity.x
-                        for body, f in zip(bodies, force(here, there * self._m).tolist(), strict=True):
-                            body.ApplyForceToCenter((f, 0), True)
-                    world.Step(self._h, 1, 0)
-                    world.ClearForces()
-                    if any(abs(body.linearVelocity.x * self._h) > 0.999 * FURTHEST for body in bodies):
-                        raise Stopped(row, f"Box2D moves no body by more than {FURTHEST:g} in a step")
-                for i, body in enumerate(bodies):
-                    q[row, i], p[row, i] = body.position.x, body.linearVelocity.x * self._m[i]
-            self.off_axis = max(self.off_axis, *(abs(body.position.y) for body in bodies))
-        self.force_calls += every * len(q)
+    def position(self, body: Any) -> Any:
+        return body.position
+
+    def velocity(self, body: Any) -> Any:
+        return body.linearVelocity
+
+    def push(self, body: Any, force: float) -> None:
+        body.ApplyForceToCenter((force, 0), True)
+
+    def step(self, row: int) -> None:
+        self._world.Step(self._h, 1, 0)
+        self._world.ClearForces()
+        if any(abs(body.linearVelocity.x * self._h) > 0.999 * FURTHEST for body in self.bodies):
+            raise Stopped(row, f"Box2D moves no body by more than {FURTHEST:g} in a step")
 
 
 ENGINE = Engine(

@@ -6,8 +6,9 @@ the old positions, and a spring that it evaluates itself is that of the new ones
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
+from springcheck.engines.bodies import Bodies
 from springcheck.engines.bonds import far
 from springcheck.engines.contract import (
     EVERY_FORCE,
@@ -19,7 +20,7 @@ from springcheck.engines.contract import (
     by_name,
     named,
 )
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
@@ -41,29 +42,26 @@ def arithmetic(label: Label) -> Arithmetic:
     return Arithmetic(force=16 * 2.0**-53) if label.method == "damped-spring" else Arithmetic()
 
 
-class _Space:
+class _Space(Bodies):
     """Chipmunk's space in motion."""
 
     def __init__(self, scene: Scene, step: float, *, springs: bool) -> None:
         import pymunk
 
-        self.force_calls = 0
-        self.off_axis = 0.0
-        self._h, self._m = step, scene.m
+        super().__init__(scene, springs=springs)
+        self._h = step
         self._space = space = pymunk.Space()
-        self._bodies = []
         for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
             # without a moment of inertia that is finite nothing turns
             body = pymunk.Body(m, float("inf"))
             body.position, body.velocity = (q, 0.0), (p / m, 0.0)
             space.add(body)
-            self._bodies.append(body)
-        self._force = None if springs else scene.system.force
+            self.bodies.append(body)
         if springs:
             self._add_springs(pymunk, scene)
 
     def _add_springs(self, pymunk: object, scene: Scene) -> None:
-        length, bodies, wall = far(scene), self._bodies, self._space.static_body
+        length, bodies, wall = far(scene), self.bodies, self._space.static_body
         spring = pymunk.DampedSpring  # type: ignore[attr-defined]
         for term in scene.terms:
             if isinstance(term, WallSpring):
@@ -75,23 +73,17 @@ class _Space:
                     # from a, moved back by the length, to b
                     self._space.add(spring(bodies[a], bodies[b], (rest - length, 0), (0, 0), length, k, 0.0))
 
-    def advance(self, every: int, q: Floats, p: Floats) -> None:
-        step, h, bodies, force = self._space.step, self._h, self._bodies, self._force
-        here, there = np.empty(len(bodies)), np.empty(len(bodies))
-        with np.errstate(over="ignore", invalid="ignore"):
-            for row in range(len(q)):
-                for _ in range(every):
-                    if force is not None:
-                        for i, body in enumerate(bodies):
-                            here[i], there[i] = body.position.x, body.velocity.x
-                        for body, f in zip(bodies, force(here, there * self._m).tolist(), strict=True):
-                            body.force = (f, 0.0)
-                    step(h)
-                for i, body in enumerate(bodies):
-                    q[row, i], p[row, i] = body.position.x, body.velocity.x
-            self.off_axis = max(self.off_axis, *(abs(body.position.y) for body in bodies))
-            p *= self._m
-        self.force_calls += every * len(q)
+    def position(self, body: Any) -> Any:
+        return body.position
+
+    def velocity(self, body: Any) -> Any:
+        return body.velocity
+
+    def push(self, body: Any, force: float) -> None:
+        body.force = (force, 0.0)
+
+    def step(self, row: int) -> None:
+        self._space.step(self._h)
 
 
 ENGINE = Engine(

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
+from springcheck.engines.bodies import Bodies
 from springcheck.engines.bonds import far, walls
 from springcheck.engines.contract import (
     EVERY_FORCE,
@@ -23,7 +22,7 @@ from springcheck.engines.contract import (
     named,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 
@@ -47,54 +46,46 @@ def arithmetic(label: Label) -> Arithmetic:
     return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
 
 
-class _World:
+class _World(Bodies):
     """Rapier's world in motion."""
 
     def __init__(self, scene: Scene, step: float, *, joints: bool) -> None:
         import rapier3d
 
-        self.force_calls = 0
-        self.off_axis = 0.0
-        self._m = scene.m
+        super().__init__(scene, springs=joints)
         self._world = world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
         world.integration_parameters.dt = step
         self._fastest = world.integration_parameters.normalized_max_linear_velocity
-        self._bodies = []
+        handles = []
         for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
             body = rapier3d.RigidBody.dynamic(
                 translation=(q, 0, 0), linvel=(p / m, 0, 0), additional_mass=m, can_sleep=False
             )
-            self._bodies.append(world.add_body(body))
-        self._force = None if joints else scene.system.force
+            handles.append(world.add_body(body))
+        self.bodies = [world.rigid_bodies[handle] for handle in handles]
         if joints:
-            self._add_joints(rapier3d, scene)
+            self._add_joints(rapier3d, scene, handles)
 
-    def _add_joints(self, library: Any, scene: Scene) -> None:
+    def _add_joints(self, library: Any, scene: Scene, handles: list[Any]) -> None:
         length, ground = far(scene), self._world.add_body(library.RigidBody.fixed())
         for i, k, at in walls(scene, "rapier:spring-joint"):
             joint = library.SpringJointBuilder(length, k, 0.0).local_anchor1((at - length, 0, 0)).build()
-            self._world.impulse_joints.insert(ground, self._bodies[i], joint, True)
+            self._world.impulse_joints.insert(ground, handles[i], joint, True)
 
-    def advance(self, every: int, q: Floats, p: Floats) -> None:
-        world, force = self._world, self._force
-        bodies = [world.rigid_bodies[handle] for handle in self._bodies]
-        here, there = np.empty(len(bodies)), np.empty(len(bodies))
-        with np.errstate(over="ignore", invalid="ignore"):
-            for row in range(len(q)):
-                for _ in range(every):
-                    if force is not None:
-                        for i, body in enumerate(bodies):
-                            here[i], there[i] = body.translation.x, body.linvel.x
-                        for body, f in zip(bodies, force(here, there * self._m).tolist(), strict=True):
-                            body.reset_forces(True)
-                            body.add_force((f, 0, 0), True)
-                    world.step()
-                    if any(abs(body.linvel.x) > 0.999 * self._fastest for body in bodies):
-                        raise Stopped(row, f"Rapier moves no body faster than {self._fastest:g}")
-                for i, body in enumerate(bodies):
-                    q[row, i], p[row, i] = body.translation.x, body.linvel.x * self._m[i]
-            self.off_axis = max(self.off_axis, *(abs(body.translation.y) for body in bodies))
-        self.force_calls += every * len(q)
+    def position(self, body: Any) -> Any:
+        return body.translation
+
+    def velocity(self, body: Any) -> Any:
+        return body.linvel
+
+    def push(self, body: Any, force: float) -> None:
+        body.reset_forces(True)
+        body.add_force((force, 0, 0), True)
+
+    def step(self, row: int) -> None:
+        self._world.step()
+        if any(abs(body.linvel.x) > 0.999 * self._fastest for body in self.bodies):
+            raise Stopped(row, f"Rapier moves no body faster than {self._fastest:g}")
 
 
 ENGINE = Engine(
