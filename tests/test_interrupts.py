@@ -332,6 +332,40 @@ def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path) -> Non
         assert [what for what in trial.wrong if not what.endswith(" s")] == []
 
 
+HALF_MADE = """
+import os, signal
+from springcheck import interrupts
+
+class Half:
+    def __init__(self):
+        {fails}
+        self.made = True
+
+    def __del__(self):
+        self.made
+
+interrupts.install()
+try:
+    Half()
+except (KeyboardInterrupt, ValueError):
+    pass
+interrupts.leave()
+"""
+
+
+@posix
+def test_an_object_that_an_interrupt_left_half_made_is_not_mentioned() -> None:
+    """A library's destructor then misses what its constructor had not set yet."""
+
+    def said(fails: str) -> str:
+        code = HALF_MADE.format(fails=fails)
+        return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr
+
+    assert said("os.kill(os.getpid(), signal.SIGINT)") == "springcheck: interrupted\n"
+    # its own mistakes are
+    assert "AttributeError" in said("raise ValueError")
+
+
 @posix
 def test_ctrl_c_works_after_rebound_has_run() -> None:
     """`integrate` leaves a handler in C behind that counts signals and forgets them."""

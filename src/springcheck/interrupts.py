@@ -143,15 +143,18 @@ def _uncaught(kind: type[BaseException], error: BaseException, trace: object) ->
     """Cython reports here what it had to swallow in a callback."""
     if issubclass(kind, KeyboardInterrupt):
         _again()
-    else:
+    elif not _State.seen:
         sys.__excepthook__(kind, error, trace)  # type: ignore[arg-type]
 
 
 def _unraisable(found: sys.UnraisableHookArgs) -> None:
-    """Where no exception can be raised (callbacks from C, destructors) the interrupt would be lost."""
+    """Where no exception can be raised (callbacks from C, destructors) the interrupt would be lost.
+
+    Once it has come, destructors meet objects that it has left half made: their errors are nobody's.
+    """
     if issubclass(found.exc_type, KeyboardInterrupt):
         _again()
-    else:
+    elif not _State.seen:
         sys.__unraisablehook__(found)
 
 
