@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import ase.io
@@ -299,6 +300,14 @@ def test_one_bad_frame_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert not found["step-defect"]
 
 
+def test_times_that_were_replaced_are_not_called_exact(capsys: pytest.CaptureFixture[str]) -> None:
+    run = made()
+    _, found = judged(capsys, csv(run), "semi-implicit-euler")
+    assert found["times"]
+    _, found = judged(capsys, csv(replace(run, t=run.t * (1 + 1e-12))), "semi-implicit-euler")
+    assert found["times"] is None
+
+
 BAD = [
     ("", "is empty"),
     ("hello\n", "holds no row of numbers"),
@@ -309,6 +318,8 @@ BAD = [
     ("t,q,p\n0,1,2\n1,2\n", "line 3"),
     ("t,q,p\n0,1,2\n1,x,2\n", "'x' is no number"),
     ("t,q,p\n0,0.3,0.7\n0.1,inf,1\n", "row 2 of q is not finite"),
+    ("t,q,p\n0,0.3,0.7\n0.1,0.3,0.7\nnan,0.3,0.7\n", "row 3 of t is not finite"),
+    ("t,q,p\n0,0.3,0.7\ninf,0.3,0.7\n", "row 2 of t is not finite"),
     ("t,q,p\n0,5,7\n0.1,5,7\n", "frames lie whole steps of|off the start"),
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
     ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),

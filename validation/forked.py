@@ -79,17 +79,21 @@ class Warm:
     def ended(self) -> bool:
         """Whether the job has ended: a zombie until it is waited for."""
         with contextlib.suppress(OSError):
-            return self._stat()[0] == "Z"
+            return self._stat(self.pid)[0] == "Z"
         return True
 
     def seconds(self) -> float:
-        """Of the processor, so far; a busy machine is no fault of a job."""
-        with contextlib.suppress(OSError):
-            return sum(map(int, self._stat()[11:15])) / os.sysconf("SC_CLK_TCK")
-        return 0.0
+        """Of the processor, so far, by the job and its workers; a busy machine is no fault of a job."""
+        found, pids = 0, [self.pid]
+        while pids:
+            pid = pids.pop()
+            with contextlib.suppress(OSError):
+                found += sum(map(int, self._stat(pid)[11:15]))
+                pids += map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+        return found / os.sysconf("SC_CLK_TCK")
 
-    def _stat(self) -> list[str]:
-        return Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+    def _stat(self, pid: int) -> list[str]:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
     def results(self) -> list[Result]:
         """Wait for the job -> what its commands did, up to the one with which it ended."""

@@ -22,6 +22,10 @@ from springcheck.text.wording import count
 from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
 
 
+TIMES = "times were taken as whole numbers of steps from the first frame on"
+NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
     """The verdicts on a file."""
@@ -35,15 +39,22 @@ class Judgement:
 
     @property
     def status(self) -> int:
-        """0 where every verdict that applies passed, 1 where one failed, 2 where none applies."""
-        judged = [verdict.passed for verdict in self.verdicts if verdict.passed is not None]
-        return 2 if not judged else 0 if all(judged) else 1
+        """0 where every verdict that applies passed, 1 where one failed, 2 where none could tell the scheme."""
+        if any(verdict.passed is False for verdict in self.verdicts):
+            return 1
+        return 2 if self.not_judged else 0
+
+    @property
+    def not_judged(self) -> bool:
+        """Whether nothing that applied could tell the scheme from another."""
+        as_a_whole = any(v.passed and v.check == "identified" for v in self.verdicts)
+        return bool(checks.not_judged(self.verdicts)) and not as_a_whole
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
             "file": str(self.path), "scene": self.scene, "scheme": self.scheme, "frames": self.frames,
-            "notes": list(self.notes),
+            "notes": list(self.notes), "not_judged": self.not_judged,
             "verdicts": [
                 {
                     "check": v.check, "value": _finite(v.value), "bound": _finite(v.bound), "unit": v.unit,
@@ -72,6 +83,7 @@ class Judgement:
             table(
                 ("check", "verdict", "value", "why"), rows, left=("check", "verdict", "value"), prose="why"
             ),
+            *([plain(NOT_JUDGED, "bold yellow")] if self.not_judged else ()),
         ]
 
 
@@ -96,7 +108,11 @@ def judge(
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
     judged, run, notes = as_trajectory(path, states, found, known.name)
-    verdicts = list(checks.judge(judged, run))
+    verdicts = [
+        # the run has the scene's times, not the file's
+        replace(v, passed=None, why=TIMES) if v.check == "times" and TIMES in notes else v
+        for v in checks.judge(judged, run)
+    ]
     if states.roundoff > 2.0**-53:
         verdicts.append(_shown(judged, run, states))
     return Judgement(
@@ -193,18 +209,20 @@ def as_trajectory(
     p = other if states.p is not None else other * scene.m
     if len(q) < 2:
         raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
+    if not np.isfinite(states.t).all():
+        raise StoreError(f"{path}: row {int(np.argmin(np.isfinite(states.t))) + 1} of t is not finite")
     every = round(float(states.t[1] - states.t[0]) / scene.step)
     t = np.arange(len(q), dtype=np.float64) * max(every, 1) * scene.step
     off = np.abs(states.t - states.t[0] - t)
-    allowed = 1e-9 * (t + abs(scene.step)) + 2 * states.roundoff * np.abs(states.t)
-    if every < 1 or np.any(off > np.abs(allowed)):
-        row = int(np.argmax(off > np.abs(allowed)))
+    allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
+    if every < 1 or np.any(off > allowed):
+        row = int(np.argmax(off > allowed))
         raise StoreError(
             f"{path}: row {row + 1} is at t = {states.t[row]:.8g}; frames lie whole steps of "
             f"{scene.step:g} apart in scene {scene.name}"
         )
     if np.any(states.t != t):
-        notes.append("times were taken as whole numbers of steps from the first frame on")
+        notes.append(TIMES)
     size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
     if not size <= max(1e-9, 10 * states.roundoff):
         raise StoreError(

@@ -44,6 +44,11 @@ class Passed:
         """How many passed, failed, or did not apply."""
         return sum(1 for verdict in self.verdicts if verdict.passed is passed)
 
+    @property
+    def judged(self) -> bool:
+        """Whether something that applied could tell the scheme, or failed."""
+        return bool(self.count(False) or (self.verdicts and not checks.not_judged(self.verdicts)))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
