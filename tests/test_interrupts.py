@@ -359,7 +359,9 @@ def test_an_object_that_an_interrupt_left_half_made_is_not_mentioned() -> None:
 
     def said(fails: str) -> str:
         code = HALF_MADE.format(fails=fails)
-        return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stderr
+        return subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=False
+        ).stderr
 
     assert said("os.kill(os.getpid(), signal.SIGINT)") == "springcheck: interrupted\n"
     # its own mistakes are

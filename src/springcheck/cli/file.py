@@ -21,7 +21,6 @@ from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
 
-
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
