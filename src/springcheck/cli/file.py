@@ -38,7 +38,7 @@ class Judgement:
 
     @property
     def status(self) -> int:
-        """0 where every verdict that applies passed, 1 where one failed, 2 where none could tell the scheme."""
+        """0 where every verdict that applies passed, 1 where one failed, 2 where none could tell."""
         if any(verdict.passed is False for verdict in self.verdicts):
             return 1
         return 2 if self.not_judged else 0
