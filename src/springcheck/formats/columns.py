@@ -66,9 +66,9 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
         raise StoreError(f"{path}: {t.shape[1]} columns of times")
-    found = {what: np.hstack(parts[what]) for what in ("q", "p", "v") if what in parts}
+    found = {what: np.hstack(parts[what]) for what in parts if what != "m"}
     n = found["q"].shape[1]
-    for what, values in {"t": t, **found}.items():
+    for what, values in found.items():
         if what != "t" and values.shape != (len(t), n):
             raise StoreError(f"{path}: {values.shape[1]} columns of {what} and {n} of q")
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
