@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from springcheck.physics.scenefile import load_scene
     from springcheck.trajectory import Trajectory, Verdict
 
-    __version__: str
+__version__ = "0.1.0"
 
 __all__ = [
     "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",
@@ -75,10 +75,6 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
-    if name == "__version__":
-        from importlib.metadata import version
-
-        return version("springcheck")
     if name in _MODULES or name == "plot":
         return import_module(f"{__name__}.{name}")
     if name not in _HOMES:

@@ -1,5 +1,6 @@
 """``springcheck`` and ``python -m springcheck``."""
 
+import gc
 import os
 import sys
 import warnings
@@ -20,6 +21,8 @@ def main() -> int:
             warnings.simplefilter("ignore")
         status = cli.main()
         interrupts.finish()
+        # what a command has made ends with it: the interpreter need not search it for cycles at its exit
+        gc.freeze()
     except BaseException as error:
         # an import that was interrupted may raise an error of its own
         if interrupts.seen():

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+import springcheck
 from springcheck import interrupts
 from springcheck.cli import output, slips
 from springcheck.cli.commands import COMMANDS, Command
@@ -102,7 +103,12 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    parser.add_argument(
+        "--version",
+        action="version",
+        version=f"springcheck {springcheck.__version__}",
+        help="print the version and exit",
+    )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
     known: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
@@ -115,16 +121,6 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         else:
             parser_of.set_defaults(command=one.perform)
     return parser
-
-
-class _Version(argparse.Action):
-    """Reads the version only when it is asked for: importlib.metadata takes longer than the rest."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from importlib.metadata import version
-
-        print(f"springcheck {version('springcheck')}", flush=True)
-        parser.exit()
 
 
 def _study(study: Study, options: argparse.Namespace) -> int:

@@ -1,13 +1,12 @@
 """The engines: ours, those of installed packages, and those that a call brings.  Libraries are left alone.
 
-An engine is one object, an `Engine`, that an entry point of the group `springcheck.engines` names.  Ours are
-found the same way.  README.md beside this file shows how to write one.  An engine that cannot be loaded is
+An engine is one object, an `Engine`, that an entry point of the group `springcheck.engines` names; ours stand
+in modules here.  README.md beside this file shows how to write one.  An engine that cannot be loaded is
 named in one line where engines are listed or asked for, and takes no other down.
 """
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 from collections.abc import Callable
 from fnmatch import fnmatchcase
@@ -64,10 +63,11 @@ def absence(name: str) -> str | None:
 
 def installed_version(name: str) -> str:
     """Version of an engine's library, from its installed metadata; of its package where it needs none."""
-    found = engine(name)
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
-        return importlib.metadata.version(found.distribution or origin(name).package)
-    except (importlib.metadata.PackageNotFoundError, ValueError):
+        return version(engine(name).distribution or origin(name).package)
+    except (PackageNotFoundError, ValueError):
         return "" if is_brought(name) else "unknown"
 
 

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-import importlib.metadata
+import importlib
 import importlib.util
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 
+import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Engine, Method
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
 
 GROUP = "springcheck.engines"
-"""The group of entry points by which engines are found."""
+"""The group of entry points by which the engines of other packages are found."""
 
 OURS = "springcheck"
+MODULES = (
+    "own", "ase", "box2d", "dart", "drake", "heyoka", "lammps", "mujoco", "openmm", "pymunk", "rapier",
+    "rebound", "scipy", "sundials",
+)  # fmt: skip
+"""Our engines, each the ENGINE of the module beside this one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +41,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Found:
-    """An engine that is known by name: loaded where `engine` is there, unusable where `reason` is."""
+    """An engine that is known by name: `load` imports it from `place`; unusable where `reason` is."""
 
     origin: Origin
-    point: importlib.metadata.EntryPoint | None = None
+    place: str = ""
+    load: Callable[[], object] | None = None
     engine: Engine | None = None
     reason: str = ""
 
@@ -48,23 +56,30 @@ _brought: dict[str, _Found] = {}
 
 
 @cache
+def _ours() -> dict[str, _Found]:
+    origin = Origin(package=OURS, version=springcheck.__version__)
+    return {
+        name: _Found(origin=origin, place=f"{GROUP}.{name}", load=partial(_ours_of, name)) for name in MODULES
+    }
+
+
+def _ours_of(name: str) -> object:
+    return importlib.import_module(f"{GROUP}.{name}").ENGINE
+
+
+@cache
 def _points() -> dict[str, _Found]:
-    """Entry points by name, ours first; of two with one name the first counts."""
-    origins: dict[int, Origin] = {}
-    points: list[tuple[bool, bool, str, importlib.metadata.EntryPoint, Origin]] = []
-    for point in importlib.metadata.entry_points(group=GROUP):
-        dist = point.dist
-        # a package's metadata are parsed anew at every look, its README with them
-        if id(dist) not in origins:
-            about = dist.metadata if dist else {"Name": "?", "Version": ""}
-            origins[id(dist)] = Origin(package=about["Name"], version=about["Version"])
-        origin = origins[id(dist)]
-        points.append((origin.package != OURS, point.name != "own", point.name, point, origin))
-    found: dict[str, _Found] = {}
-    for *_, point, origin in sorted(points, key=lambda one: one[:3]):
+    """Entry points by name, after ours; of two with one name the first counts."""
+    # slow to import and to run, so that a call which names only ours does without
+    import importlib.metadata
+
+    found = dict(_ours())
+    for point in sorted(importlib.metadata.entry_points(group=GROUP), key=lambda point: point.name):
+        about = point.dist.metadata if point.dist else {"Name": "?", "Version": ""}
+        origin = Origin(package=about["Name"], version=about["Version"])
         if point.name not in found:
-            found[point.name] = _Found(origin=origin, point=point)
-        elif found[point.name].origin != origin:
+            found[point.name] = _Found(origin=origin, place=point.value, load=point.load)
+        elif found[point.name].origin.package != origin.package:
             reason = f"its name is taken by the engine of {found[point.name].origin}"
             found[f"{point.name} ({origin.package})"] = _Found(origin=origin, reason=reason)
     return found
@@ -74,16 +89,19 @@ def _known() -> dict[str, _Found]:
     return _points() | _brought
 
 
+def _look(name: str) -> _Found | None:
+    return _ours().get(name) or _known().get(name)
+
+
 @cache
-def _loaded(point: importlib.metadata.EntryPoint) -> Engine | str:
-    """The engine behind an entry point, or why there is none, whatever the code of others raises."""
+def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
+    """The engine that `load` imports, or why there is none, whatever the code of others raises."""
     try:
-        found = point.load()
-        return _checked(found, point.name)
+        return _checked(load(), name)
     except SpringcheckError as error:
         return str(error)
     except (Exception, SystemExit) as error:
-        return f"{point.value} cannot be loaded: {told(error)}"
+        return f"{place} cannot be loaded: {told(error)}"
 
 
 def _checked(found: object, name: str = "") -> Engine:
@@ -127,12 +145,10 @@ def unusable() -> dict[str, str]:
 
 def _find(name: str) -> Engine | str | None:
     """An engine, why it cannot be used, or None where there is none of this name."""
-    found = _known().get(name)
+    found = _look(name)
     if found is None:
         return None
-    if found.point is not None:
-        return _loaded(found.point)
-    return found.engine or found.reason
+    return _loaded(name, found.place, found.load) if found.load else found.engine or found.reason
 
 
 def engine(name: str) -> Engine:
@@ -142,28 +158,28 @@ def engine(name: str) -> Engine:
         return found
     if isinstance(found, str):
         raise MethodError(f"engine {name} of {origin(name)} cannot be used: {found}")
-    if not _known():
-        raise MethodError("no engine is registered, not even ours: install springcheck again, by pip install")
     known = names()
     raise MethodError(f"unknown engine {name!r}{nearest(name, known)}; known are {', '.join(known)}")
 
 
 def origin(name: str) -> Origin:
     """The package or file that an engine comes from."""
-    return _known()[name].origin
+    found = _look(name)
+    assert found is not None, f"{name} is no engine"
+    return found.origin
 
 
 def module_name(name: str) -> str:
-    """The module that an engine's entry point names; "" where a call or a test has brought it."""
-    point = _known()[name].point
-    return point.module if point else ""
+    """The module that an engine is imported from; "" where a call or a test has brought it."""
+    found = _look(name)
+    return found.place.partition(":")[0] if found else ""
 
 
 def bring(found: Engine, where: str, version: str = "") -> Engine:
     """Make an engine known for the rest of this process.  MethodError where it does not keep the contract."""
     found = _checked(found)
-    taken = _points().get(found.name)
-    if taken is not None:
+    taken = _look(found.name)
+    if taken is not None and found.name not in _brought:
         raise MethodError(f"{where}: the name {found.name!r} is taken by the engine of {taken.origin}")
     _brought[found.name] = _Found(origin=Origin(package=where, version=version), engine=found)
     return found

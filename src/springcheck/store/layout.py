@@ -22,14 +22,14 @@ import os
 import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
 import numpy as np
 
+import springcheck
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.store import access, files
@@ -137,11 +137,13 @@ def begin(file: Any) -> None:
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
-    write_attributes(head.create_group("creator"), {"name": "springcheck", "version": _ours()})
+    write_attributes(
+        head.create_group("creator"), {"name": "springcheck", "version": springcheck.__version__}
+    )
     head.create_group("modules/units").attrs["version"] = np.array([1, 0], dtype=np.int32)
 
 
-@lru_cache(maxsize=1)
+@cache
 def _empty() -> bytes:
     """A file that holds nothing but its format, which so stands at the beginning of every file of ours."""
     with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
@@ -257,18 +259,10 @@ def write_box(group: Any) -> None:
 
 
 @cache
-def _ours() -> str:
-    try:
-        return version("springcheck")
-    except PackageNotFoundError:
-        return "unknown"
-
-
-@cache
 def machine() -> dict[str, Scalar]:
     """What ran, and on what."""
     return {
-        "springcheck": _ours(),
+        "springcheck": springcheck.__version__,
         "machine": platform.machine(),
         "processor": _processor(),
         "cores": os.cpu_count() or 0,

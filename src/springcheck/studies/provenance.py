@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -25,6 +24,8 @@ BITS = ("elementary functions", "sums", "linear algebra")
 
 def versions() -> dict[str, str]:
     """Versions of what numbers depend on, engines and plug-ins among it; what is not here is left out."""
+    from importlib.metadata import PackageNotFoundError, version
+
     # a call's own files have versions, too; they are part of the command
     known = [name for name in engines.names() if not engines.is_brought(name)]
     engines_ = [engines.engine(name).distribution for name in known]

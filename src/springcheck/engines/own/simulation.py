@@ -11,14 +11,13 @@ calculate up to a hundred times as slowly.  The numbers stay right.
 
 from __future__ import annotations
 
-import importlib.metadata
 import platform
 import sys
-from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
+import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Label, Method
 from springcheck.engines.own import kernels, layout, solver, tiles, vectors
@@ -62,12 +61,11 @@ class Own:
 def version() -> dict[str, str]:
     """Of this package, the interpreter and NumPy, and of numba where it has compiled something."""
     found = {
-        "springcheck": _installed("springcheck"),
+        "springcheck": springcheck.__version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "numba": _installed("numba") if "numba" in sys.modules else "",
     }
-    return {name: text for name, text in found.items() if text}
+    return found | ({"numba": sys.modules["numba"].__version__} if "numba" in sys.modules else {})
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Own:
@@ -184,11 +182,3 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
         work=work * len(code),
         tile=tile,
     )
-
-
-@cache
-def _installed(distribution: str) -> str:
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return ""
