@@ -308,6 +308,26 @@ def test_times_that_were_replaced_are_not_called_exact(capsys: pytest.CaptureFix
     assert found["times"] is None
 
 
+def test_velocities_beside_the_line_are_not_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = in_space(made())
+    path = Path(arguments[0])
+    rows = path.read_text().splitlines()
+    numbers = rows[-1].split(";")
+    # LINE has no part along y
+    numbers[5] = "0.3"
+    path.write_text("\n".join([*rows[:-1], ";".join(numbers), ""]))
+    assert main(["judge", *arguments, "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"]) == 2
+    assert "not along one line" in capsys.readouterr().err
+
+
+def test_a_file_that_ends_before_its_scene_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    run = made()
+    short = replace(run, t=run.t[:-3], q=run.q[:-3], p=run.p[:-3])
+    assert main(["judge", *csv(short), "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"]) == 0
+    steps = SCENE.steps - 3 * SCENE.every
+    assert f"ends after {steps:,} of the scene's {SCENE.steps:,} steps" in capsys.readouterr().out
+
+
 BAD = [
     ("", "is empty"),
     ("hello\n", "holds no row of numbers"),

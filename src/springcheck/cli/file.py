@@ -232,6 +232,8 @@ def as_trajectory(
     if states.roundoff > 2.0**-53:
         notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
     steps = (len(q) - 1) * every
+    if steps < scene.steps:
+        notes.append(f"ends after {steps:,} of the scene's {scene.steps:,} steps")
     judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
@@ -246,17 +248,21 @@ def _along(
     path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
 ) -> tuple[Floats, Floats]:
     """Motions in space (f, 3n) along the one line that they keep to (f, n), but for `off` of their size."""
-    r = q.reshape(len(q), -1, 3)
+    r, rates = q.reshape(len(q), -1, 3), other.reshape(len(q), -1, 3)
     moved = (r - r[0]).reshape(-1, 3)
     _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
     if sizes[0] == 0:
         raise StoreError(f"{path}: nothing moves")
-    if sizes[1] > off * sizes[0]:
-        raise StoreError(f"{path}: the motion is not along one line")
     line = axes[0]
-    positions, rest = r @ line, other.reshape(len(q), -1, 3) @ line
+    positions, rest = r @ line, rates @ line
+    beside = max(
+        float(np.abs(x - np.multiply.outer(x @ line, line)).max() / (np.abs(x @ line).max() or 1.0))
+        for x in (r - r[0], rates)
+    )
+    if not beside <= off:
+        raise StoreError(f"{path}: the motion is not along one line, but {beside:.2g} of its size off it")
     if np.max(np.abs(positions[0] + scene.q)) < np.max(np.abs(positions[0] - scene.q)):
         line, positions, rest = -line, -positions, -rest
     where = ", ".join(f"{x:.4g}" for x in line)
-    notes.append(f"motion along ({where})")
+    notes.append(f"motion along ({where}), at most {beside:.1g} of its size beside it")
     return positions, rest
