@@ -314,7 +314,7 @@ def test_velocities_beside_the_line_are_not_left_out(capsys: pytest.CaptureFixtu
     rows = path.read_text().splitlines()
     numbers = rows[-1].split(";")
     # LINE has no part along y
-    numbers[5] = "0.3"
+    numbers[5] = "0.31234567890123457"
     path.write_text("\n".join([*rows[:-1], ";".join(numbers), ""]))
     assert main(["judge", *arguments, "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"]) == 2
     assert "not along one line" in capsys.readouterr().err
