@@ -11,6 +11,8 @@ from springcheck import interrupts
 def main() -> int:
     """The command line as a program of its own, which can be interrupted from its first line on."""
     interrupts.install()
+    # what is imported stays: until a command begins its work nothing is searched for cycles
+    gc.disable()
     try:
         from springcheck import cli
         from springcheck.cli import slips

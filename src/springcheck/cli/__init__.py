@@ -7,6 +7,7 @@ HDF5 and no NumPy that they do not use.
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import sys
 import warnings
@@ -45,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 from springcheck import doors
 
                 doors.bring(options)
+            if "keeps" not in options:
+                gc.enable()
             status = command(options)
             # while a full disk can still be said
             sys.stdout.flush()

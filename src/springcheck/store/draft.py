@@ -10,11 +10,11 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from springcheck.physics.scene import Scene
 from springcheck.store import digests, files, layout, seal
 from springcheck.store.access import Scalar
 from springcheck.store.layout import Column
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 BUFFER = 1 << 22
 """Bytes that one array collects before they are written."""
@@ -121,6 +124,8 @@ class Draft:
                 self._create(self.scene.frames)
             filled = {name: buffer[: self._held] for name, buffer in self._buffer.items()}
             if self._held == self._length < self.scene.frames:
+                from concurrent.futures import ThreadPoolExecutor
+
                 self._threads = self._threads or ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1))
                 self._running = [
                     self._threads.submit(self._write, name, values) for name, values in filled.items()

@@ -8,7 +8,6 @@ import json
 import os
 import platform
 import re
-import secrets
 import shutil
 import stat
 import sys
@@ -177,7 +176,7 @@ def sync_folder(folder: Path) -> None:
 
 def temporary(path: Path) -> Path:
     """A name beside `path` for a file that takes its place when it is complete."""
-    return path.with_name(f"springcheck-{secrets.token_hex(8)}.new")
+    return path.with_name(f"springcheck-{os.urandom(8).hex()}.new")
 
 
 def put(complete: Path, path: Path) -> None:
@@ -238,7 +237,7 @@ class Lock:
         if not who and not _is_torn(content):
             raise StoreError(f"{self.path} stands where the lock of a store goes; move it away")
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        mine = {"pid": os.getpid(), "host": platform.node(), "since": now, "token": secrets.token_hex(4)}
+        mine = {"pid": os.getpid(), "host": platform.node(), "since": now, "token": os.urandom(4).hex()}
         self._write(json.dumps(mine).encode())
         if not self._system:
             time.sleep(0.05)

@@ -12,7 +12,6 @@ import contextlib
 import json
 import os
 import re
-import uuid
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -129,7 +128,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     _remove(parts, lambda name: name not in {"lock", "command"})
-    run = uuid.uuid4().hex
+    run = os.urandom(16).hex()
     content = {"format": files.JOURNAL_FORMAT, "run": run, "command": command, "forced": force}
     files.put_bytes(json.dumps(content).encode(), parts / "command")
     files.sync_folder(path.absolute().parent)

@@ -63,9 +63,7 @@ def collection(
             )
         _plots(file)
         extents = _extents(file)
-        _check_tables(file, path)
-        found_digests = digests.contents(file, tables.all_names(file))
-        layout.write_attributes(file, {digests.KEY: json.dumps(found_digests, separators=(",", ":"))})
+        layout.write_attributes(file, {digests.KEY: json.dumps(_digests(file, path), separators=(",", ":"))})
     there = {(extent.offset, extent.sha256) for extent in kept}
     with path.open("rb") as raw:
         for extent in extents:
@@ -83,6 +81,7 @@ def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
         layout.write_attributes(file, {"format": layout.FORMAT, **root})
         for table in content:
             tables.write(file, table)
+            layout.write_attributes(file[table.name], {"sha256": digests.of_table(file[table.name])})
         file.flush()
         body: bytes = file.id.get_file_image()
     return seal.sealed(body, str(root["run"]))
@@ -130,10 +129,17 @@ def _extents(file: Any) -> list[seal.Extent]:
     return list(found.values())
 
 
-def _check_tables(file: Any, path: Path) -> None:
-    for name in tables.names(file):
-        if digests.of_table(file[name]) != file[name].attrs["sha256"]:
+def _digests(file: Any, path: Path) -> dict[str, str]:
+    """What the file holds, under sha256; the tables that were copied have theirs, the others are given it."""
+    names = tables.all_names(file)
+    found = digests.contents(file, names)
+    for name in names:
+        known, digest = file[name].attrs, found[f"/{name}"]
+        if known.get("sha256", digest) != digest:
             raise StoreError(f"table {name} was damaged on its way into {path}: check disk and memory")
+        if "sha256" not in known:
+            layout.write_attributes(file[name], {"sha256": digest})
+    return found
 
 
 def _plots(file: Any) -> None:

@@ -143,7 +143,6 @@ def _join(file: Any, name: str, parts: Sequence[Path], provenance: Provenance) -
             back.update(_bytes(values))
         if back.digest() != sums[column].digest():
             raise StoreError(f"{name}/{column} was damaged on its way: check disk and memory")
-    tables.end(group)
 
 
 def _length(group: Any) -> int:

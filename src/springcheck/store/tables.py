@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import access, digests
+from springcheck.store import access
 from springcheck.store.access import Scalar
 from springcheck.store.layout import RESERVED, write_attributes, write_unit
 from springcheck.trajectory import Comparison, Limits, Verdict
@@ -44,11 +44,10 @@ class Table:
 
 
 def write(file: Any, table: Table) -> None:
-    """Write a table into an open file."""
+    """Write a table into an open file, still without its digest."""
     group = begin(file, table)
     for name, values in table.columns.items():
         column(group, table, name, np.shape(values))[...] = _written(values)
-    end(group)
 
 
 def begin(file: Any, table: Table) -> Any:
@@ -84,11 +83,6 @@ def column(group: Any, table: Table, name: str, shape: tuple[int, ...]) -> Any:
     if name in table.units:
         write_unit(dataset, table.units[name])
     return dataset
-
-
-def end(group: Any) -> None:
-    """Put the digest of a table whose columns are complete beside them."""
-    write_attributes(group, {"sha256": digests.of_table(group)})
 
 
 def _written(values: Any) -> np.ndarray:
