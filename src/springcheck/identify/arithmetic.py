@@ -12,9 +12,9 @@ from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import table
 from springcheck.identify.match import Match
+from springcheck.identify.orbit import powers
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.schemes import SCHEMES
 
 __all__ = ["QUANTUM", "Defect", "defects", "misses"]
 
@@ -25,9 +25,6 @@ REBUILT = 1 / 32, 1.0
 UNUSUAL = 2.5
 """Roundings of a step in units of those that are usual, 4 + 2 sqrt(steps), that are taken for roundings where
 nothing makes them larger.  Measured on 700 trajectories: 1 at most."""
-
-UNLIKE = 1 / 4
-"""Share of a clock's rounding, over the steps of a frame, by which unlike steps differ from even ones."""
 
 REBUILT_NOTE = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
 
@@ -63,24 +60,45 @@ def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extende
     return np.asarray(out)
 
 
-def _slipped(matches: list[Match], found: Map, slip: np.longdouble) -> Extended:
-    """The maps (c, 2, 2) between frames that matches predict for steps longer by the share `slip`."""
+def _slipped(
+    matches: list[Match], found: Map, slip: np.longdouble | float, *, between: bool = True
+) -> Extended:
+    """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps longer by the
+    share `slip`."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
     which = np.array([families.index(FAMILIES[match.family]) for match in matches])
     held = np.array([family.held for family in families])[which]
-    a, g, log_mass = (
+    a, g, log_mass, stride = (
         np.array([getattr(match, name) for match in matches], np.longdouble)
-        for name in ("a", "g", "log_mass")
+        for name in ("a", "g", "log_mass", "stride")
     )
     out = table(families).frame(
         which,
         a * (1 + slip) ** 2,
         np.where(held, g, g * (1 + slip)),
-        log_mass - np.log1p(slip),
-        np.array([float(match.stride) for match in matches]),
+        log_mass - np.log1p(slip) + (0 if between else np.log(stride)),
+        stride.astype(np.float64) if between else np.ones(len(matches)),
         found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
     )
     return np.asarray(out.reshape(-1, 2, 2))
+
+
+def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
+    """Most that unlike steps within a frame, of which the clock shows the sum alone, do to it (c, f - 1, 2).
+
+    A step that is longer by the share d does d M**(s - 1 - i) M' M**i to the map of s steps; what the steps'
+    sum does is known, so the departures of these from their mean are left, times the rounding of a step.
+    """
+    d = 1e-6
+    one = _slipped(matches, found, 0.0, between=False).astype(np.float64)
+    change = _slipped(matches, found, d, between=False) - _slipped(matches, found, -d, between=False)
+    out = np.zeros((len(matches), len(found.z) - 1, 2))
+    for i, match in enumerate(matches):
+        ways = powers(one[i], match.stride)
+        each = ways[::-1] @ (change[i] / (2 * d)).astype(np.float64) @ ways
+        apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=0)
+        out[i] = match.stride * record.clock * np.abs(found.z[:-1].astype(np.float64)) @ apart.T
+    return out
 
 
 TOGETHER = 128
@@ -115,9 +133,6 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
     flow = np.array([scheme.flow for scheme in schemes])
     size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
-    if record.slips is not None:
-        # of steps that may be differences of rounded times only the sum over a frame shows
-        size += np.where(stride > 1, turned, 0.0)[:, None, None] * lengths[:-1, None]
     if record.parts is not None:
         summed = np.stack(
             [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1
@@ -141,16 +156,15 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
     usual = 4 + 2 * np.sqrt(stride)
-    # the clock shows a frame's steps together: of unlike ones a scheme of order p makes x**(p + 1) more
-    order = np.array([SCHEMES[x.scheme].order if x.scheme in SCHEMES else 1 for x in schemes])
-    unlike = np.where(stride > 1, UNLIKE * stride * record.clock / 2.0**-52, 0.0)
-    usual += unlike * np.abs([match.a for match in matches]) ** ((order + 1) / 2)
-    plain = ulp <= np.minimum(path, usual)
+    rounded = ulp
+    if record.slips is not None and np.any(stride > 1):
+        rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
+    plain = rounded <= np.minimum(path, usual)
     if visible:
         # an equilibrium away from 0, a decay within a frame and an uneven clock make roundings larger
         damped = np.array([abs(match.friction) > 0 for match in matches]) | bool(np.any(centre > 0))
         most = np.where(damped | follows, path, np.minimum(path, UNUSUAL * usual))
-        for i in np.flatnonzero((ulp <= most) & ~plain).tolist():
+        for i in np.flatnonzero((rounded <= most) & ~plain).tolist():
             # an uneven clock's roundings follow its times; others are irregular, or they are no roundings
             plain[i] = follows[i] or coarse.irregular(signed[i] / size[i])
     stored = coarse_file = np.zeros(len(matches), dtype=bool)

@@ -42,7 +42,7 @@ def explain(
     if evidence.found.drifts:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (few_bad_frames, _alternation, _solver, _neighbours(maps), _shape):
+        for look in (few_bad_frames, _solver, _neighbours(maps), _shape):
             out += look(evidence)
             if out:
                 break
@@ -51,58 +51,13 @@ def explain(
     return (*out, *([] if out else [misfit(evidence)]))
 
 
-# two maps in turn ---------------------------------------------------------------------------------------
-
-
-PARTS = 3.0
-"""Factor by which two maps in turn must bring the misses down in each half of the time."""
-
-
-def _alternation(e: Evidence) -> list[Explanation]:
-    """Two kinds of step in turn."""
-    if e.pairs < 24:
-        return []
-    odd = np.arange(e.pairs) % 2 == 1
-    halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
-    left = max(float(np.max(x.residual)) for x in halves)
-    before = float(np.max(e.found.residual))
-    # a smooth residual is no parity: two maps must do much better than one
-    if before < FALLS * left:
-        return []
-    # and in the beginning as at the end
-    own = np.where(odd[:, None], *(x.misses(e.found) * x.size / e.found.size for x in (halves[1], halves[0])))
-    both = np.abs(e.misses) * e.found.weight[:, None], np.abs(own) * e.found.weight[:, None]
-    for part in np.array_split(np.arange(e.pairs), 2):
-        joint, apart = (float(np.sqrt(np.mean(x[part] ** 2))) for x in both)
-        if joint < PARTS * apart:
-            return []
-    dets = [float(np.linalg.det(x.entries.astype(np.float64))) - 1 for x in halves]
-    loose = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
-    found = [matched(x, loose) for x in halves]
-    names = [m.scheme for m in found[0] if m.scheme in {n.scheme for n in found[1]}]
-    what = "two maps take turns"
-    if not names and abs(dets[0] - dets[1]) > 4 * left:
-        what = f"a friction of changing sign multiplies areas by 1 {dets[0]:+.2e} and 1 {dets[1]:+.2e}"
-        if dets[0] * dets[1] > 0:
-            what = f"one multiplies areas by a share of {abs(dets[0] - dets[1]):.2e} more than the other"
-    elif names:
-        one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
-        share = abs(math.sqrt(one.a / other.a) - 1)
-        what = f"the steps of {title(names[0])} alternate by {share:.2g} of their length"
-    return [
-        Explanation(
-            cause=f"Even and odd steps differ and alternate: {what}",
-            remedy="look for a buffer or a sign that is switched in every step",
-            misfit=left / before,
-        )
-    ]
-
-
 # no fixed step ------------------------------------------------------------------------------------------
 
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
+    if _left(_alternating(e), e.misses) < 1 / FALLS:
+        return []
     joints = search([e.found], [e.terms], FEW, far=True)
     joints += search([e.found], [e.terms], FEW, distinct(damped=True), far=True)
     distances = {x: distance(e.found, x.parts[0]) for x in joints}
@@ -136,10 +91,10 @@ def _solver(e: Evidence) -> list[Explanation]:
 
 def _drift(e: Evidence) -> list[Explanation]:
     back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
-    fitting = matched(e.found, e.terms)
-    if not fitting and np.any(np.max(np.abs(e.misses), axis=1) > DRIFTING * e.unit):
+    if np.any(np.max(np.abs(e.misses), axis=1) > DRIFTING * e.unit):
         # what one map and a constant leave over is more than rounding: the constant may be of something else
         return []
+    fitting = matched(e.found, e.terms)
     whose = title(fitting[0].scheme) if fitting else "The scheme"
     return [
         Explanation(
@@ -223,6 +178,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     linear = [q, v]
     groups: dict[str, list[Floats]] = {
         "drag": [*linear, np.abs(v) * v],
+        "parity": [*_alternating(e).T],
         "quadratic": [*linear, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
         "oscillation": _oscillation(q, v, missing, weight[:, 0]),
@@ -249,29 +205,34 @@ def _shape(e: Evidence) -> list[Explanation]:
     fitting = [name for name, share in left.items() if share < 0.35]
     if not fitting:
         return [_noise(e, size, counted)]
-    best = min(left[name] for name in fitting)
-    # of those that explain nearly as much, the one of the fewest numbers
-    good = [name for name in groups if name in fitting and left[name] <= max(3 * best, 0.02)]
+    # of those that explain nearly as much, each number counted, the one of the fewest numbers
+    best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
+    room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
+    good = [name for name in groups if name in fitting and left[name] <= room[name]]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
-    if good[0] in STATE and _turns(e) < FEW_TURNS:
+    few = _turns(e) < FEW_TURNS
+    if few and good[0] in (*STATE, *TIME):
         # where states hardly come back, any function of time is one of many powers of the state
-        good = [*good, "stiffness in time"]
+        good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
     if len(kinds) > 1:
-        # over few periods position and velocity are functions of time, and of each other
+        # over few periods position and velocity are functions of time, and of each other; states that
+        # come back after a few frames show little else
+        why = "the arc is too short" if few else "the states come back too much alike"
         cause = (
-            f"The force {' or '.join(kinds)}, and the arc is too short to tell which: it "
-            f"moves a frame by {size:.1e} of the state's size"
+            f"The force {' or '.join(kinds)}, and {why} to tell which: it moves a frame by {size:.1e} of the "
+            "state's size"
         )
         remedy = "record more periods, where positions come back at other times and velocities"
     return [Explanation(cause=cause, remedy=remedy, misfit=left[good[0]])]
 
 
 KIND = {
-    "drag": "depends on the velocity", "quadratic": "is anharmonic", "cubic": "is anharmonic",
-    "anharmonic": "is anharmonic", "position": "is anharmonic", "velocity": "depends on the velocity",
-    "oscillation": "changes in time", "stiffness in time": "changes in time",
-    "friction in time": "changes in time", "map in time": "changes in time",
+    "drag": "depends on the velocity", "velocity": "depends on the velocity",
+    "quadratic": "is anharmonic", "cubic": "is anharmonic", "anharmonic": "is anharmonic",
+    "position": "is anharmonic", "parity": "or the step alternates", "oscillation": "changes in time",
+    "stiffness in time": "changes in time", "friction in time": "changes in time",
+    "map in time": "changes in time",
 }  # fmt: skip
 """What the force depends on in each group of columns."""
 
@@ -279,8 +240,41 @@ KIND = {
 STATE = ("quadratic", "anharmonic", "position", "velocity")
 """Groups of functions of the state that follow most functions of time where states hardly come back."""
 
+TIME = ("oscillation", "stiffness in time", "friction in time", "map in time")
+"""Groups of functions of time, which the state follows there as well."""
+
 FEW_TURNS = 2.0
 """Turns of the motion from which states come back often enough to tell what goes with them from time."""
+
+
+def _alternating(e: Evidence) -> Floats:
+    """Columns (f - 1, 4) of two maps in turn."""
+    z = e.found.z[:-1].astype(np.float64)
+    return np.concatenate([z, z * (-1.0) ** np.arange(len(z))[:, None]], axis=1)
+
+
+def _two_maps(e: Evidence) -> tuple[str, str]:
+    """What the maps of even and odd frames differ in."""
+    odd = np.arange(e.pairs) % 2 == 1
+    halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
+    left = max(float(np.max(x.residual)) for x in halves)
+    dets = [float(np.linalg.det(x.entries.astype(np.float64))) - 1 for x in halves]
+    loose = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
+    found = [matched(x, loose) for x in halves]
+    names = [m.scheme for m in found[0] if m.scheme in {n.scheme for n in found[1]}]
+    what = "two maps take turns"
+    if not names and abs(dets[0] - dets[1]) > 4 * left:
+        what = f"a friction of changing sign multiplies areas by 1 {dets[0]:+.2e} and 1 {dets[1]:+.2e}"
+        if dets[0] * dets[1] > 0:
+            what = f"one multiplies areas by a share of {abs(dets[0] - dets[1]):.2e} more than the other"
+    elif names:
+        one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
+        share = abs(math.sqrt(one.a / other.a) - 1)
+        what = f"the steps of {title(names[0])} alternate by {share:.2g} of their length"
+    return (
+        f"Even and odd steps differ and alternate: {what}",
+        "look for a buffer or a sign that is switched in every step",
+    )
 
 
 def _turns(e: Evidence) -> float:
@@ -289,6 +283,8 @@ def _turns(e: Evidence) -> float:
 
 def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, size: float) -> tuple[str, str]:
     record, found = e.record, e.found
+    if name == "parity":
+        return _two_maps(e)
     if name == "drag":
         columns = np.stack([q, v, np.abs(v) * v], axis=1)
         z = found.z.astype(np.float64)

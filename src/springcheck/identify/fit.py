@@ -139,7 +139,8 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
         y = least_squares(np.concatenate([before, w], axis=1), after)
         free = after - np.concatenate([before, w], axis=1) @ y
         if better(left, free, 1):
-            entries, at, resting = _about_rest(before, after, w, y)
+            noise = np.sqrt(np.maximum(np.sum(free**2, axis=0), floor))
+            entries, at, resting = _about_rest(before, after, w, y, noise)
             # at rest the roundings are the same in every step, and add up to a constant of their own
             off = y[2] - (np.eye(2) - y[:2].T) @ at
             room = 64 * ROUNDING * float(np.max(np.abs(z)))
@@ -219,23 +220,24 @@ def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
 
 
 def _about_rest(
-    before: Extended, after: Extended, w: Extended, y: Extended
+    before: Extended, after: Extended, w: Extended, y: Extended, noise: Extended
 ) -> tuple[Extended, Extended, Extended]:
     """The map (transposed), equilibrium and residuals where the velocity of the equilibrium is 0: five
-    unknowns, found from y, the three of each row by itself."""
+    unknowns, found from y, the three of each row by itself, whose rows have this `noise` (2,)."""
     n = len(before)
     x = y[:2]
     gap = np.eye(2) - x.T
     scale = float(np.sum(gap[:, 0] ** 2))
     at = np.array([gap[:, 0] @ y[2] / scale if scale else 0.0, 0.0], dtype=np.longdouble)
     for _ in range(3):
-        columns = np.zeros((2 * n, 5), dtype=np.longdouble)
-        moved = before - w * at
-        columns[:n, :2], columns[n:, 2:4] = moved, moved
-        columns[:n, 4:], columns[n:, 4:] = w * gap[0, 0], w * gap[1, 0]
+        columns = np.zeros((2, n, 5), dtype=np.longdouble)
+        columns[0, :, :2] = columns[1, :, 2:4] = before - w * at
+        columns[:, :, 4] = w[:, 0] * gap[:, :1]
         # the old equilibrium's own part, which the last column corrects
-        right = np.concatenate([after[:, 0] - w[:, 0] * at[0], after[:, 1]])[:, None]
-        u = least_squares(columns, right)[:, 0]
+        right = (after - w * at).T
+        u = least_squares(
+            (columns / noise[:, None, None]).reshape(-1, 5), (right / noise[:, None]).reshape(-1, 1)
+        )[:, 0]
         x = np.stack([u[:2], u[2:4]], axis=1)
         gap = np.eye(2) - x.T
         at = at + np.array([u[4], 0], dtype=np.longdouble)

@@ -15,6 +15,8 @@ from springcheck.physics.arrays import Extended, Floats
 FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""
 
+APART = 2.0
+"""Factor by which every bad pair must miss more than all others, in units of rounding."""
 
 LARGER = 10.0
 """Size of the first frames, of the median, from which a force that is not linear shows in them alone."""
@@ -35,12 +37,17 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     bad = np.flatnonzero(~kept)
     if not len(bad) or np.count_nonzero(kept) < 8:
         return []
-    before = float(np.max(np.abs(e.misses)))
-    after = float(np.sqrt(np.mean(found.misses()[kept] ** 2)))
+    if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
+        # what falls off from frame to frame has no few bad ones
+        return []
+    # of a motion that dies or grows every frame counts by its size
+    weight = e.found.weight[:, None] / np.max(e.found.weight)
+    before = float(np.max(weight * np.abs(e.misses)))
+    after = float(np.sqrt(np.mean((weight * found.misses(e.found))[kept] ** 2)))
     if before < FALLS * after:
         return []
     fitting = matched(found, e.terms)
-    if not fitting and after > 8 * float(np.median(e.unit)):
+    if not fitting and after > 8 * float(np.median(weight[:, 0] * e.unit)):
         # the rest is no single motion either, as a solver's that begins with small steps
         return []
     whose = f" of {title(fitting[0].scheme)}" if fitting else ""
@@ -54,7 +61,10 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
         cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
     size = np.sqrt(np.sum(np.square(found.z.astype(np.float64)), axis=1))
     if bad[0] == 0 and len(bad) > 1 and float(np.max(size[bad])) > LARGER * float(np.median(size)):
-        cause = f"{cause}, where the motion is largest and an anharmonic force would show"
+        cause = (
+            f"The motion is one{whose}, but not in frames 0 to {bad[-1] + 1}, where it is largest: too "
+            "few to tell whether the force is anharmonic or changes in time"
+        )
     return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
 
 
@@ -66,7 +76,7 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
     def near(x: Extended, y: Extended) -> bool:
         # as near as the other pairs, or a thousandth of what is missing
         missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
-        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit)), 1e-3 * missing)
+        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit[run])), 1e-3 * missing)
 
     if len(run) == 1:
         from_, to = z[first], z[first + 1]

@@ -26,6 +26,9 @@ EXPLAINED = 0.3
 """Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
 unlike forces more than all is left, 1.4 of it."""
 
+CHANCE = 1e-9
+"""Chance that forces which are cut off otherwise leave so little where few numbers count in the misses."""
+
 REFINED = 30
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
 
@@ -103,13 +106,26 @@ def reproduced(
     rows = missed(start, None).reshape(2, -1)
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
-    before = float(np.sqrt(np.mean((rows.ravel() * scale) ** 2)))
     slopes = []
     for i in free:
         shift = np.zeros(2)
         shift[i] = 1e-6 * match.a if i == 0 else 1e-6
         slopes.append((missed(start + shift, None) - missed(start - shift, None)) / (2 * shift[i]))
     columns = np.stack(slopes, axis=1) * scale[:, None]
+
+    def change(left: Floats, weight: Floats | float = 1.0) -> Floats:
+        weights = weight * np.ones(len(left))
+        return np.asarray(np.linalg.lstsq(columns * weights[:, None], left * weights, rcond=None)[0])
+
+    # what another stiffness takes away is explained without any quantum
+    plain = start.copy()
+    plain[free] -= change(missed(start, None) * scale)
+    without = missed(plain, None) * scale
+    before = float(np.sqrt(np.mean(without**2)))
+    counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - len(free)
+    if counted <= 0:
+        return False
+    most = min(EXPLAINED, CHANCE ** (1 / counted))
     single = float(over_single(mass))
     factors = [x * y for x in (1.0, 1.0 + excess) for y in dict.fromkeys((1.0, single))]
     ways = (False, True) if family.name == "velocity-verlet" else (False,)
@@ -118,15 +134,13 @@ def reproduced(
         for turn in range(REFINED):
             left = missed(values, cut, factor, leaps=leaps) * scale
             share = float(np.sqrt(np.mean(left**2))) / before
-            if share <= EXPLAINED:
+            if share <= most:
                 return True
             if not np.isfinite(share):
                 break
-            weight = np.ones(len(left))
-            if 2 * turn > REFINED:
-                # few are left that are cut to the wrong side, and those are outliers
-                weight = 1 / (1 + (left / (np.median(np.abs(left)) + 0.1 * before)) ** 2)
-            values[free] -= np.linalg.lstsq(columns * weight[:, None], left * weight, rcond=None)[0]
+            # few are left that are cut to the wrong side, and those are outliers
+            off = 1 + (left / (np.median(np.abs(left)) + 0.1 * before)) ** 2
+            values[free] -= change(left, 1 / off if 2 * turn > REFINED else 1.0)
     return False
 
 
