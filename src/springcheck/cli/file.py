@@ -217,7 +217,7 @@ def as_trajectory(
     if every < 1 or np.any(off > allowed):
         row = int(np.argmax(off > allowed))
         raise StoreError(
-            f"{path}: row {row + 1} is at t = {states.t[row]:.8g}; frames lie whole steps of "
+            f"{path}: row {row + 1} is at t = {states.t[row]:.12g}; frames lie whole steps of "
             f"{scene.step:g} apart in scene {scene.name}"
         )
     if np.any(states.t != t):

@@ -174,7 +174,7 @@ class _Command:
         if np.any(off):
             row = int(np.argmax(off))
             raise MethodError(
-                f"command {self._name}: row {row + 1} is at t = {states.t[row]:.6g}, not {t[row]:.6g}; the "
+                f"command {self._name}: row {row + 1} is at t = {states.t[row]:.12g}, not {t[row]:.12g}; the "
                 f"first row is the start, the next {every} steps of {self._h:g} later"
             )
         if not (np.array_equal(states.q[0], scene.q) and np.array_equal(p[0], scene.p)):
