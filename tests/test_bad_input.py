@@ -232,3 +232,11 @@ def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
         done.stderr == "springcheck: cannot write here.h5: the file would be larger than this system allows\n"
     )
     assert not Path("here.h5").exists()
+
+
+@pytest.mark.parametrize("study", ["stability", "precision"])
+def test_forces_beyond_all_numbers_are_refused(study: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (folder() / "morse-bond.toml").read_text()
+    lines = ["rest = 1e6" if line.startswith("rest") else line for line in text.splitlines()]
+    Path("far.toml").write_text("\n".join(lines))
+    refused(capsys, [study, "far.toml", "--method", "own:euler"], "beyond the range of numbers")

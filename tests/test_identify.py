@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from springcheck.doors.function import load
 from springcheck.errors import IdentificationError, MethodError
-from springcheck.identify import Identification, identify, identify_stepper, load_stepper
+from springcheck.identify import Identification, identify, identify_stepper
 from springcheck.identify.search import aliases
 from springcheck.physics.arrays import Floats, Force
 from springcheck.schemes import SCHEMES, matrix, step
@@ -541,16 +542,19 @@ def test_a_stepper_that_is_not_there_or_fails_is_one_clear_line(tmp_path, monkey
         "import math\ndef good(q, p, h, force, mass):\n    return q, p\nx = 3\n"
     )
     monkeypatch.chdir(tmp_path)
-    assert callable(load_stepper("mine_7f3:good"))
+    assert callable(load("mine_7f3:good"))
+    assert callable(load("mine_7f3.py:good"))
     for spec, words in (
         ("mine_7f3", "module:function"),
         ("nowhere_7f3:f", "no module"),
         ("mine_7f3:bad", "it has good"),
+        ("mine_7f3.py:bad", "it has good"),
+        ("nowhere_7f3.py:f", "no such file"),
         ("mine_7f3:x", "not a function"),
     ):
         with pytest.raises(MethodError, match=words):
-            load_stepper(spec)
+            load(spec)
     with pytest.raises(MethodError, match="returns"):
         identify_stepper(lambda q, p, h, force, mass: 3.0)
     with pytest.raises(MethodError, match="nothing moves"):
-        identify_stepper(load_stepper("mine_7f3:good"))
+        identify_stepper(load("mine_7f3:good"))

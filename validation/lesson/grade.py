@@ -12,7 +12,7 @@ from io import StringIO
 from pathlib import Path
 
 from springcheck.cli import main as springcheck
-from springcheck.identify import load_stepper
+from springcheck.doors.function import load
 
 
 def document(module: str, name: str) -> dict[str, object]:
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     """Print a line for each stepper."""
     path = Path(arguments[0] if arguments else "exercises.py").resolve()
     os.chdir(path.parent)
-    aims = load_stepper(f"{path.stem}:AIMS.copy")()
+    aims = load(f"{path.stem}:AIMS.copy")()
     mended = 0
     for name, aim in aims.items():
         found = document(path.stem, name)

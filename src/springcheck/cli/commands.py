@@ -123,14 +123,14 @@ def _columns(options: Namespace) -> list[str]:
 
 def _identify(options: Namespace) -> int:
     from springcheck import identify
+    from springcheck.doors import function
 
     if bool(options.files) == (options.integrator is not None):
-        raise SpringcheckError("identify needs a FILE, or --stepper MODULE:FUNCTION, and not both")
+        raise SpringcheckError("identify needs a FILE, or --stepper FILE.py:FUNCTION, and not both")
     if options.integrator is not None:
         # what it prints is not ours to show
         with redirect_stdout(sys.stderr):
-            integrator = identify.load_stepper(options.integrator)
-            found = {options.integrator: identify.identify_stepper(integrator)}
+            found = {options.integrator: identify.identify_stepper(function.load(options.integrator))}
         return _identified(options.integrator, found, [], options)
     stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}
     parts = [
@@ -315,7 +315,7 @@ COMMANDS = (
         _argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
         _NAMES,
         _argument("--step", type=float, metavar="H", help="is this the time step?"),
-        _argument("--stepper", dest="integrator", metavar="MODULE:FUNCTION",
+        _argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
         _argument("--workers", type=processes, default=1, metavar="N",
                   help="processes that look at many files (default 1)"),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import re
+import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,7 @@ import numpy as np
 from springcheck import engines, schemes
 from springcheck.engines import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
-from springcheck.identify import identify_stepper, load_stepper
+from springcheck.identify import identify_stepper
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
@@ -31,20 +34,38 @@ UNKNOWN = Scheme(
 
 
 def load(spec: str) -> Callable[..., Any]:
-    """The function of ``module:function`` or ``file.py:function``."""
-    name, _, function = spec.rpartition(":")
-    if not name.endswith(".py"):
-        return load_stepper(spec)
-    module = engines.module_of(Path(name))
-    found = getattr(module, function, None)
+    """The function of ``module:function`` or ``file.py:function``; modules of the current folder are found.
+
+    MethodError, in one line, where there is none.
+    """
+    where, _, name = spec.rpartition(":")
+    if not (where and name):
+        raise MethodError(f"stepper {spec!r} is not of the form module:function, or file.py:function")
+    found: Any = engines.module_of(Path(where)) if where.endswith(".py") else _module(where)
+    known = [key for key, x in vars(found).items() if inspect.isfunction(x) and not key.startswith("_")]
+    for part in name.split("."):
+        if not hasattr(found, part):
+            raise MethodError(f"{where} has no {name!r}; it has {', '.join(known) or 'no functions'}")
+        found = getattr(found, part)
     if not callable(found):
-        known = [
-            key
-            for key, value in vars(module).items()
-            if inspect.isfunction(value) and not key.startswith("_")
-        ]
-        raise MethodError(f"{name} has no function {function!r}; it has {', '.join(known) or 'none'}")
+        raise MethodError(f"{spec!r} is a {type(found).__name__}, not a function")
     return found  # type: ignore[no-any-return]
+
+
+def _module(name: str) -> ModuleType:
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        missing = error.name or name
+        if missing == name.split(".", maxsplit=1)[0] or name.startswith(f"{missing}."):
+            raise MethodError(f"no module {name!r} in {here} or among the installed ones") from error
+        raise MethodError(f"module {name!r} needs {missing!r}, which is not installed") from error
+    except (Exception, SystemExit) as error:
+        raise MethodError(f"module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
+    finally:
+        sys.path.remove(here)
 
 
 def file_of(spec: str) -> str:

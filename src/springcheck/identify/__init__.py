@@ -11,6 +11,6 @@ with what would tell them apart.
 
 from springcheck.identify.report import identify_arrays as identify
 from springcheck.identify.result import Identification
-from springcheck.identify.stepper import identify_stepper, load_stepper
+from springcheck.identify.stepper import identify_stepper
 
-__all__ = ["Identification", "identify", "identify_stepper", "load_stepper"]
+__all__ = ["Identification", "identify", "identify_stepper"]

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -31,39 +28,6 @@ RUNAWAY = 1e5
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
-
-
-def load_stepper(spec: str) -> Stepper:
-    """The callable that ``module:function`` names; the current folder is searched as well."""
-    module_name, colon, name = spec.partition(":")
-    if not (colon and module_name and name):
-        raise MethodError(f"stepper {spec!r} is not of the form module:function")
-    here = str(Path.cwd())
-    sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        missing = error.name or module_name
-        if missing == module_name.split(".", maxsplit=1)[0] or module_name.startswith(f"{missing}."):
-            raise MethodError(f"no module {module_name!r} in {here} or among the installed ones") from error
-        raise MethodError(f"module {module_name!r} needs {missing!r}, which is not installed") from error
-    except (Exception, SystemExit) as error:
-        raise MethodError(
-            f"module {module_name!r} cannot be imported: {type(error).__name__}: {error}"
-        ) from error
-    finally:
-        sys.path.remove(here)
-    found: Any = module
-    for part in name.split("."):
-        if not hasattr(found, part):
-            known = [x for x in vars(module) if callable(getattr(module, x)) and not x.startswith("_")]
-            raise MethodError(
-                f"module {module_name!r} has no {name!r}; it has {', '.join(known) or 'no functions'}"
-            )
-        found = getattr(found, part)
-    if not callable(found):
-        raise MethodError(f"{spec!r} is a {type(found).__name__}, not a function")
-    return found  # type: ignore[no-any-return]
 
 
 def _one(

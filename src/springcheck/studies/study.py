@@ -144,8 +144,8 @@ def door_options(parser: ArgumentParser) -> None:
         "--stepper",
         action="append",
         default=[],
-        metavar="MODULE:FUNCTION",
-        help="your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION; repeatable",
+        metavar="FILE.py:FUNCTION",
+        help="your function step(q, p, h, force, mass) -> (q, p), also as MODULE:FUNCTION; repeatable",
     )
     parser.add_argument(
         "--command",

@@ -86,6 +86,9 @@ def truth(scene: Scene) -> Truth:
     if not norm.unit > 0:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
     known = exact.modes(scene) if scene.system.has_modes else None
+    w = _frequency(scene, known)
+    if not np.isfinite(w):
+        raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
     springs = (WallSpring, Spring)
     turning = exact.modes(
         replace(scene, terms=tuple(term for term in scene.terms if isinstance(term, springs)))
@@ -95,7 +98,7 @@ def truth(scene: Scene) -> Truth:
         norm=norm,
         modes=known,
         turning=turning,
-        w=_frequency(scene, known),
+        w=w,
         duration=scene.step * scene.steps,
     )
 

@@ -25,7 +25,7 @@ from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Keeper, each
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
-from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability
+from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability, fastest
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
 from springcheck.studies.team import ALONE, Team
@@ -43,7 +43,9 @@ def measure(
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
+        SceneError: forces of the scene overflow at its start.
     """
+    fastest(scene)
     chosen = engines.match(tuple(methods) or ("*",))
     left_out = []
     usable: list[Label] = []

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from springcheck.errors import SceneError
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.studies.choose import LeftOut
@@ -105,7 +106,7 @@ def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
     That of small oscillations about the start; of more particles than a matrix is kept for the bound of
-    Gershgorin.
+    Gershgorin.  SceneError where forces overflow there.
     """
     system = scene.system
     if system.has_modes:
@@ -118,6 +119,8 @@ def fastest(scene: Scene) -> float:
         largest = float(np.linalg.eigvalsh(scaled)[-1])
     else:
         largest = float(np.max(system.gershgorin(scene.q) / scene.m))
+    if not np.isfinite(largest):
+        raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
     return float(np.sqrt(max(largest, 0.0)))
 
 
