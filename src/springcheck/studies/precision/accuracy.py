@@ -71,6 +71,7 @@ class Truth:
         return exact.true_motion(self.scene, steps, h)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def truth(scene: Scene) -> Truth:
     """Prepare the exact solution of a scene.
 

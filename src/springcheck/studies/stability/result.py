@@ -102,6 +102,7 @@ def _limit(x: Limit) -> dict[str, Any]:
     }
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
