@@ -300,7 +300,7 @@ class System:
     def norm(self) -> Norm:
         """The measure of errors of this scene (see `Norm`)."""
         q, p = self.scene.q.astype(np.longdouble), self.scene.p.astype(np.longdouble)
-        with np.errstate(all="warn" if WIDE else "ignore"):
+        with np.errstate(all="ignore"):
             unit = self.kinetic_energy(p)
             for term in self.terms:
                 unit = unit + np.abs(term.energy(q))
