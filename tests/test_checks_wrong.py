@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from springcheck import checks, schemes
-from springcheck.checks import compare, experiments, laws, verdicts
+from springcheck.checks import compare, experiments, laws
+from springcheck.checks.check import Finding, verdict
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE, Arithmetic, Floats
@@ -131,14 +132,18 @@ def test_a_first_time_that_is_no_number_is_judged(value: float) -> None:
     assert {v.check for v in found if v.passed is False} == {"times"}
 
 
+def within(value: float, bound: float) -> Verdict:
+    return verdict("m", "c", Finding(value, bound, "", ""))
+
+
 def test_an_infinite_bound_passes_nothing_and_what_is_no_number_still_fails() -> None:
-    assert verdicts.within("m", "c", 1.0, np.inf, "", "").passed is None
-    assert verdicts.within("m", "c", np.inf, np.inf, "", "").passed is None
-    assert verdicts.within("m", "c", NAN, np.inf, "", "").passed is False
-    assert verdicts.within("m", "c", 1.0, NAN, "", "").passed is False
+    assert within(1.0, np.inf).passed is None
+    assert within(np.inf, np.inf).passed is None
+    assert within(NAN, np.inf).passed is False
+    assert within(1.0, NAN).passed is False
     for value in (0.0, 1.0, 1e-320, 1e300, np.inf, -np.inf, NAN):
         for bound in (0.0, 1e-320, 1.0, 1e300, NAN, -np.inf, -1.0):
-            found = verdicts.within("m", "c", value, bound, "", "")
+            found = within(value, bound)
             assert np.isfinite([found.value, found.bound]).all()
             assert found.passed is (found.value <= found.bound)
             assert found.passed is bool(bound >= 0 and -np.inf < value <= bound)

@@ -106,7 +106,7 @@ def judge_thoroughly(
         try:
             verdicts.append(experiment(bench))
         except MethodError as error:
-            verdicts.append(bench.not_applicable(experiment.name, str(error)))
+            verdicts.append(check.verdict(label, experiment.name, str(error)))
         if progress:
             progress(1)
     return verdicts

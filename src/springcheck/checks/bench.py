@@ -10,12 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.checks import verdicts
 from springcheck.checks.case import Case
 from springcheck.physics import exact
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
+from springcheck.trajectory import Trajectory
 
 Run: TypeAlias = Callable[[Scene, str], Trajectory]
 """(scene, label) -> trajectory.  May raise MethodError: the experiment does not apply then."""
@@ -72,13 +71,3 @@ class Bench:
         return Case(trajectory=self.run(start, self.label), scene=start), state[
             np.arange(1, 2 * n + 1), np.arange(2 * n)
         ] - state[0]
-
-    def verdict(
-        self, check: str, value: float, bound: float, unit: str, why: str, sees: Limits = NOT_KNOWN
-    ) -> Verdict:
-        """Passed only if the value is a number within the bound."""
-        return verdicts.within(self.label, check, value, bound, unit, why, sees)
-
-    def not_applicable(self, check: str, why: str) -> Verdict:
-        """Reported as what it is, never as passed."""
-        return verdicts.not_applicable(self.label, check, why)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from springcheck import schemes
-from springcheck.checks import rounding, verdicts
+from springcheck.checks import rounding
 from springcheck.checks.stretch import JOINED, Stretch, follow
 from springcheck.physics import exact
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
@@ -18,7 +18,7 @@ from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.stepping import Slope
-from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
+from springcheck.trajectory import Trajectory
 
 T = TypeVar("T")
 
@@ -41,6 +41,11 @@ class Case:
         if work not in self._made:
             self._made[work] = work(self)
         return self._made[work]  # type: ignore[no-any-return]
+
+    @property
+    def label(self) -> str:
+        """The label of the method."""
+        return self.trajectory.label
 
     @property
     def scheme(self) -> schemes.Scheme:
@@ -321,18 +326,6 @@ class Case:
     def roundings(self) -> int:
         """Roundings along one step."""
         return schemes.roundings(self.scheme)
-
-    def verdict(
-        self, check: str, value: float, bound: float, unit: str, why: str, sees: Limits = NOT_KNOWN
-    ) -> Verdict:
-        """Passed only if the value is a number within the bound."""
-        if unit == "roundings" and not WIDE:
-            why += "; the reference rounds like the engine here, which a rounding of both allows for"
-        return verdicts.within(self.trajectory.label, check, value, bound, unit, why, sees)
-
-    def not_applicable(self, check: str, why: str) -> Verdict:
-        """Reported as what it is, never as passed."""
-        return verdicts.not_applicable(self.trajectory.label, check, why)
 
 
 def overflows(how: Arithmetic) -> str:

@@ -10,13 +10,13 @@ from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
-from springcheck.checks.check import check
+from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import step_defect
 from springcheck.checks.stretch import JOINED, follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.text.wording import count
-from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
+from springcheck.trajectory import NOT_KNOWN, Limits
 
 
 def _no_matrix(bench: Bench) -> str | None:
@@ -33,11 +33,11 @@ def _no_matrix(bench: Bench) -> str | None:
 
 
 @check("matrix", family="map", needs="a linear scene of few particles", unless=_no_matrix)
-def propagator(bench: Bench) -> Verdict:
+def propagator(bench: Bench) -> Finding | str:
     """The one-step matrix, recovered from single steps, is the scheme's."""
     case, _ = bench.copies
     if why_no_step := _no_step(case):
-        return bench.verdict("propagator", float("inf"), float(case.roundings), "roundings", why_no_step)
+        return Finding(np.inf, case.roundings, "roundings", why_no_step)
     q, p = case.next_states
     of_q, of_p = case.allowance
     off = np.maximum(np.abs(q - case.trajectory.q[1:]) / of_q, np.abs(p - case.trajectory.p[1:]) / of_p)
@@ -46,10 +46,9 @@ def propagator(bench: Bench) -> Verdict:
         most = np.maximum(np.abs(change[0]) / of_q[at], np.abs(change[1]) / of_p[at])
         return np.asarray(most / case.roundings)
 
-    return bench.verdict(
-        "propagator",
-        float(np.max(off)),
-        float(case.roundings),
+    return Finding(
+        np.max(off),
+        case.roundings,
         "roundings",
         f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each",
         sight.of_steps(case, np.ones(1, dtype=bool), part),
@@ -97,10 +96,10 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 @check("det", family="map", needs="a linear scene of few particles", unless=_no_matrix)
-def determinant(bench: Bench) -> Verdict:
+def determinant(bench: Bench) -> Finding | str:
     """The one-step matrix changes area by the scheme's factor, to rounding."""
     if why_no_step := _no_step(bench.copies[0]):
-        return bench.verdict("determinant", float("inf"), 0.0, "relative", why_no_step)
+        return Finding(np.inf, 0.0, "relative", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
     inverse = np.linalg.inv(ideal)
     relative = inverse @ departure
@@ -110,11 +109,8 @@ def determinant(bench: Bench) -> Verdict:
         change = float(np.linalg.det(np.eye(len(relative)) + relative)) - 1
     limit = float(np.sum(np.abs(inverse).T * allowed))
     if abs(change) <= limit and limit >= 1:
-        return bench.not_applicable(
-            "determinant", "rounding of the entries may be as large as all of the area"
-        )
-    return bench.verdict(
-        "determinant",
+        return "rounding of the entries may be as large as all of the area"
+    return Finding(
         abs(change),
         limit,
         "relative",
@@ -125,14 +121,14 @@ def determinant(bench: Bench) -> Verdict:
 
 
 @check("sympl", family="map", needs="a symplectic scheme and no friction", unless=_no_matrix)
-def symplecticity(bench: Bench) -> Verdict:
+def symplecticity(bench: Bench) -> Finding | str:
     """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
     if not bench.scheme.symplectic:
-        return bench.not_applicable("symplecticity", f"{bench.scheme.title} does not claim it")
+        return f"{bench.scheme.title} does not claim it"
     if bench.scene.system.is_damped:
-        return bench.not_applicable("symplecticity", "friction contracts area")
+        return "friction contracts area"
     if why_no_step := _no_step(bench.copies[0]):
-        return bench.verdict("symplecticity", float("inf"), 0.0, "of an action", why_no_step)
+        return Finding(np.inf, 0.0, "of an action", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
     n = bench.scene.n
     form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
@@ -143,11 +139,10 @@ def symplecticity(bench: Bench) -> Verdict:
     ratio = off / np.where(limit > 0, limit, 1)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
     if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
-        return bench.not_applicable("symplecticity", "rounding of the entries may be as large as the form")
-    return bench.verdict(
-        "symplecticity",
-        float(off[worst]),
-        float(limit[worst]),
+        return "rounding of the entries may be as large as the form"
+    return Finding(
+        off[worst],
+        limit[worst],
         "of an action",
         "roundings of every entry, each of the sign that hurts",
         Limits(area=float(np.min(limit[form != 0]))),
@@ -179,26 +174,24 @@ def _shifted(
 
 
 @check("reverse", family="map", needs="a scheme that undoes its steps, and no friction")
-def reversibility(bench: Bench) -> Verdict:
+def reversibility(bench: Bench) -> Finding | str:
     """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
     scheme = bench.scheme
     two_stage = len(scheme.stages) == 2
     if not scheme.one_step:
-        return bench.not_applicable("reversibility", "an adaptive solver chooses other steps on its way back")
+        return "an adaptive solver chooses other steps on its way back"
     if bench.scene.system.is_damped:
-        return bench.not_applicable("reversibility", "friction is not undone by going back")
+        return "friction is not undone by going back"
     if not symmetric(scheme) and not two_stage:
-        return bench.not_applicable(
-            "reversibility", f"{scheme.title} is not its own adjoint: only another scheme undoes its steps"
-        )
+        return f"{scheme.title} is not its own adjoint: only another scheme undoes its steps"
     out = bench.forwards
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
     if out.outcome.status != "complete" or not steps:
-        return bench.not_applicable("reversibility", "the run did not come to its end")
+        return "the run did not come to its end"
     state = out.q[-1], -out.p[-1]
     if not np.isfinite(state).all():
-        return bench.verdict("reversibility", float("inf"), float(case.roundings), "roundings", ENDED)
+        return Finding(np.inf, case.roundings, "roundings", ENDED)
     # kick-drift and drift-kick undo each other; they differ by the first stage, at start and end
     if two_stage:
         state = _shifted(case.judged, scheme, state, -1)
@@ -207,12 +200,10 @@ def reversibility(bench: Bench) -> Verdict:
     size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
     enlarged = _enlarged(case, steps, state, size)
     if enlarged is None:
-        return bench.not_applicable("reversibility", "the motion grows, and rounding with it")
+        return "the motion grows, and rounding with it"
     bound = case.roundings * enlarged
     if len(back.t) < len(out.t):
-        return bench.verdict(
-            "reversibility", float("inf"), bound, "roundings", "it ended early on its way back"
-        )
+        return Finding(np.inf, bound, "roundings", "it ended early on its way back")
     end = back.q[-1], back.p[-1]
     if two_stage:
         end = _shifted(case.judged, scheme, end, 1)
@@ -220,9 +211,8 @@ def reversibility(bench: Bench) -> Verdict:
     # a motion that stood still after its turning point would end there, with the momenta flipped
     moved = case.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
     if off <= bound * size and moved[-1] <= bound * size and np.any(moved > 0):
-        return bench.not_applicable("reversibility", "standing still on the way back would pass")
-    return bench.verdict(
-        "reversibility",
+        return "standing still on the way back would pass"
+    return Finding(
         float(off / size),
         bound,
         "roundings",
@@ -276,75 +266,61 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
 
 
 @check("mirror", family="repeat", needs="a fixed step and no friction")
-def mirror(bench: Bench) -> Verdict:
+def mirror(bench: Bench) -> Finding | str:
     """A negative step does what flipped momenta do, bit for bit."""
     if not bench.scheme.one_step:
-        return bench.not_applicable("mirror", "an adaptive solver is judged by its tolerance")
+        return "an adaptive solver is judged by its tolerance"
     if bench.scene.system.is_damped:
-        return bench.not_applicable("mirror", "friction knows forwards from backwards")
+        return "friction knows forwards from backwards"
     steps = min(bench.scene.steps, 20)
     flipped = bench.run(replace(bench.scene, p=-bench.scene.p, steps=steps, every=1), bench.label)
     backwards = bench.run(replace(bench.scene, step=-bench.scene.step, steps=steps, every=1), bench.label)
     if len(flipped.t) != len(backwards.t):
-        return bench.verdict("mirror", float("inf"), 0.0, "frames", "one of the two runs ended early")
+        return Finding(np.inf, 0.0, "frames", "one of the two runs ended early")
     if len(flipped.t) < 2:
-        return bench.not_applicable("mirror", ENDED)
+        return ENDED
     differ = np.any((flipped.q != backwards.q) | (flipped.p != -backwards.p), axis=1)
-    return bench.verdict(
-        "mirror",
-        float(np.count_nonzero(differ)),
-        0.0,
-        "frames",
-        "rounding to nearest does not know the sign",
-    )
+    return Finding(np.count_nonzero(differ), 0.0, "frames", "rounding to nearest does not know the sign")
 
 
 @check("company", family="repeat", needs="a linear scene and an explicit scheme")
-def company(bench: Bench) -> Verdict:
+def company(bench: Bench) -> Finding | str:
     """A livelier copy beside it, which acts on nothing of it, changes no number of the motion."""
     if not bench.scheme.one_step:
-        return bench.not_applicable("company", "an adaptive solver takes its steps by all components")
+        return "an adaptive solver takes its steps by all components"
     if bench.scheme.implicit or not bench.scene.system.is_linear:
-        return bench.not_applicable("company", "what is solved, or exponentiated, may round otherwise")
+        return "what is solved, or exponentiated, may round otherwise"
     alone, scene = bench.forwards, bench.scene
     steps = len(alone.t) - 1
     if steps < 1:
-        return bench.not_applicable("company", ENDED)
+        return ENDED
     two = scene.system.tiled(2)
     lively = 3 * scene.p + np.sqrt(2 * scene.m) * (float(scene.system.norm.unit) or 1.0)
     beside = replace(two, p=np.concatenate([scene.p, lively]), steps=steps, every=1)
     both = bench.run(beside, bench.label)
     if len(both.t) != len(alone.t):
-        return bench.verdict("company", float("inf"), 0.0, "frames", "the two runs differ in length")
+        return Finding(np.inf, 0.0, "frames", "the two runs differ in length")
     n = scene.n
     differ = np.any((both.q[:, :n] != alone.q) | (both.p[:, :n] != alone.p), axis=1)
     if np.any(differ):
         part = replace(alone, q=both.q[:, :n].copy(), p=both.p[:, :n].copy())
         if all(step_defect(Case(trajectory=run, scene=scene)).passed for run in (alone, part)):
-            return bench.not_applicable(
-                "company", "the two runs differ by rounding alone, as sums of another length do"
-            )
-    return bench.verdict(
-        "company", float(np.count_nonzero(differ)), 0.0, "frames", "systems side by side share nothing"
-    )
+            return "the two runs differ by rounding alone, as sums of another length do"
+    return Finding(np.count_nonzero(differ), 0.0, "frames", "systems side by side share nothing")
 
 
 @check("repeat", family="repeat", needs="a run of one step at least")
-def repeatability(bench: Bench) -> Verdict:
+def repeatability(bench: Bench) -> Finding | str:
     """A second run of the same scene gives the same numbers, bit for bit."""
     first = bench.forwards
     again = bench.run(replace(bench.scene, every=1, steps=min(bench.scene.steps, 200)), bench.label)
     if first.q.shape != again.q.shape:
-        return bench.verdict("repeatability", float("inf"), 0.0, "frames", "the runs differ in length")
+        return Finding(np.inf, 0.0, "frames", "the runs differ in length")
     if len(first.t) < 2:
-        return bench.not_applicable("repeatability", ENDED)
+        return ENDED
     same = (first.q.view(np.int64) == again.q.view(np.int64)) & (
         first.p.view(np.int64) == again.p.view(np.int64)
     )
-    return bench.verdict(
-        "repeatability",
-        float(np.count_nonzero(~np.all(same, axis=1))),
-        0.0,
-        "frames",
-        "the same operations in the same order",
+    return Finding(
+        np.count_nonzero(~np.all(same, axis=1)), 0.0, "frames", "the same operations in the same order"
     )

@@ -17,7 +17,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
-from springcheck.checks.check import check
+from springcheck.checks.check import Finding, check
 from springcheck.checks.experiments import symmetric
 from springcheck.checks.stats import line, student
 from springcheck.physics import exact
@@ -25,7 +25,7 @@ from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
-from springcheck.trajectory import Limits, Trajectory, Verdict
+from springcheck.trajectory import Limits, Trajectory
 
 HALVINGS = 6
 CHANCE = 1e-3
@@ -51,21 +51,21 @@ DURATION = 2.5 / np.sqrt(2.9 / 3.7)
 
 
 @check("order", family="law", needs="a fixed step")
-def order(bench: Bench) -> Verdict:
+def order(bench: Bench) -> Finding | str:
     """On a spring the error falls with the scheme's power of the step."""
-    return _order(bench, "order", SPRING, "spring")
+    return _order(bench, SPRING, "spring")
 
 
 @check("order, well", family="law", needs="a fixed step and quartic potentials")
-def order_anharmonic(bench: Bench) -> Verdict:
+def order_anharmonic(bench: Bench) -> Finding | str:
     """In a quartic potential, where order cannot lie, the error falls with the scheme's power of the step."""
-    return _order(bench, "order-anharmonic", WELL, "quartic potential")
+    return _order(bench, WELL, "quartic potential")
 
 
-def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
+def _order(bench: Bench, scene: Scene, where: str) -> Finding | str:
     scheme = bench.scheme
     if not scheme.one_step:
-        return bench.not_applicable(check, "an adaptive solver chooses its order as it goes")
+        return "an adaptive solver chooses its order as it goes"
     truth = exact_end(where)
     norm = scene.system.norm
     h, error, floor = [], [], []
@@ -74,15 +74,14 @@ def _order(bench: Bench, check: str, scene: Scene, where: str) -> Verdict:
         made = replace(scene, step=float(DURATION / steps), steps=steps, every=steps)
         run = bench.run(made, bench.label)
         if len(run.t) < 2:
-            return bench.verdict(check, float("inf"), UNRESOLVED, "orders", f"stopped at h = {made.step:g}")
+            return Finding(np.inf, UNRESOLVED, "orders", f"stopped at h = {made.step:g}")
         case = Case(trajectory=run, scene=made)
         h.append(made.step)
         error.append(float(norm(run.q[-1] - truth[0], run.p[-1] - truth[1])))
         floor.append(float(norm(*(x[0] for x in case.allowance))) * steps)
     slope, se, rounding = fitted(h, error, floor, second=2 if symmetric(scheme) else 1)
     bound = min(student(HALVINGS - 3, CHANCE) * se + rounding, UNRESOLVED)
-    return bench.verdict(
-        check,
+    return Finding(
         abs(slope - scheme.order),
         bound,
         "orders",
@@ -180,29 +179,26 @@ def _walk(bench: Bench) -> str | None:
 
 
 @check("bias", family="law", needs="a symplectic splitting in double precision", unless=_walk)
-def rounding_bias(bench: Bench) -> Verdict:
+def rounding_bias(bench: Bench) -> Finding | str:
     """Rounding makes the shadow energy walk, not drift, beyond what the arithmetic implies."""
     if any(_is_short(bench, h) for h in (ODD, EVEN)):
-        return bench.verdict("rounding-bias", float("inf"), 0.0, "a step", SHORT)
+        return Finding(np.inf, 0.0, "a step", SHORT)
     found = [_drift(bench, h) for h in (ODD, EVEN)]
     off = np.array([abs(mean - implied) for mean, _, implied in found])
     limit = np.array([SIGMAS * se + exact.EPS for _, se, _ in found])
     # the first that is no number, or else the worse
     worst = int(np.argmax(off / limit))
     if np.all(off <= limit) and np.max(limit) >= (most := schemes.roundings(bench.scheme) * 2.0**-52):
-        return bench.not_applicable(
-            "rounding-bias", f"its walk hides even {most:.1e} a step, the bias of every rounding together"
-        )
+        return f"its walk hides even {most:.1e} a step, the bias of every rounding together"
     seen = "; ".join(
         f"at h = {h:.6g} the drift is {mean:.1e} +- {se:.0e} a step, implied is {implied:.1e}"
         for h, (mean, se, implied) in zip((ODD, EVEN), found, strict=True)
     )
     if limit[worst] < off[worst] <= ROUNDED_MATRIX:
         seen += "; a one-step matrix whose elements are rounded drifts by as much"
-    return bench.verdict(
-        "rounding-bias",
-        float(off[worst]),
-        float(limit[worst]),
+    return Finding(
+        off[worst],
+        limit[worst],
         "a step",
         f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}",
         # momenta times 1 + x at each step raise the energy by x of it: half of it is kinetic, and squared
@@ -230,21 +226,18 @@ def _drift(bench: Bench, h: float) -> tuple[float, float, float]:
 
 
 @check("growth", family="law", needs="a symplectic splitting in double precision", unless=_walk)
-def rounding_growth(bench: Bench) -> Verdict:
+def rounding_growth(bench: Bench) -> Finding | str:
     """The shadow energy's rounding grows no faster than a random walk, with the square root of the steps."""
     scene = ensemble(ODD)
     run = bench.once(scene)
     if _is_short(bench, ODD):
-        return bench.verdict("rounding-growth", float("inf"), 0.0, "exponent", SHORT)
+        return Finding(np.inf, 0.0, "exponent", SHORT)
     steps, change = drifts(scene, run)
     change = change - predicted_drift(run) * steps[:, None]
     slope, se = _growth(steps, change)
     if slope <= 0.5 + SIGMAS * se and 0.5 + SIGMAS * se >= 1:
-        return bench.not_applicable(
-            "rounding-growth", f"an exponent of {slope:.3f} +- {se:.3f} does not tell a walk from a bias"
-        )
-    return bench.verdict(
-        "rounding-growth",
+        return f"an exponent of {slope:.3f} +- {se:.3f} does not tell a walk from a bias"
+    return Finding(
         slope,
         0.5 + SIGMAS * se,
         "exponent",
@@ -284,20 +277,20 @@ def _seen_bias(steps: Floats, change: Floats) -> float | None:
 
 
 @check("tolerance", family="law", needs="an adaptive method")
-def convergence(bench: Bench) -> Verdict:
+def convergence(bench: Bench) -> Finding | str:
     """The error of an adaptive solver falls with its tolerance, decade by decade."""
     if bench.scheme.one_step:
-        return bench.not_applicable("convergence", "a method of fixed step has no tolerance")
+        return "a method of fixed step has no tolerance"
     power = bench.scheme.convergence
     if power is None:
-        return bench.not_applicable("convergence", f"no law is known for {bench.scheme.title}")
+        return f"no law is known for {bench.scheme.title}"
     duration = 20.0
     error = []
     for tolerance in DECADES:
         scene = replace(SPRING, tolerance=tolerance, step=duration / 40, steps=40, quantities=("q", "p"))
         run = bench.run(scene, bench.label)
         if len(run.t) < scene.frames:
-            return bench.verdict("convergence", float("inf"), UNRESOLVED, "", f"stopped at {tolerance:g}")
+            return Finding(np.inf, UNRESOLVED, "", f"stopped at {tolerance:g}")
         case = Case(trajectory=run, scene=scene)
         q, p = exact.true_motion(scene, case.steps, scene.step)
         error.append(float(np.sqrt(np.mean(case.norm(run.q - q, run.p - p) ** 2))))
@@ -305,11 +298,8 @@ def convergence(bench: Bench) -> Verdict:
     slope, se, law = fit.slope, fit.standard_error, float(power)
     bound = student(len(error) - 2, CHANCE) * se
     if abs(slope - law) <= bound and bound >= law:
-        return bench.not_applicable(
-            "convergence", f"an exponent of {slope:.3f} +- {se:.2g} does not tell its law from no law at all"
-        )
-    return bench.verdict(
-        "convergence",
+        return f"an exponent of {slope:.3f} +- {se:.2g} does not tell its law from no law at all"
+    return Finding(
         abs(slope - law),
         bound,
         "exponent",

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.case import Case
-from springcheck.checks.check import check
+from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import STILL, closed_or_not
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.text.wording import count
-from springcheck.trajectory import Limits, Verdict
+from springcheck.trajectory import Limits
 
 
 def growth_bound(case: Case) -> tuple[Floats, Floats]:
@@ -26,7 +26,7 @@ def growth_bound(case: Case) -> tuple[Floats, Floats]:
 
 
 @check("closed", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
-def closed_form(case: Case) -> Verdict:
+def closed_form(case: Case) -> Finding | str:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
     y, v = case.closed_states
     q, p = case.modes.out_of(y + case.modes.centre(), v)
@@ -39,15 +39,14 @@ def closed_form(case: Case) -> Verdict:
         ratio = np.where(late, distance / allowed, 0)
     worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
-        return case.not_applicable("closed-form", f"{STILL} the motion")
+        return f"{STILL} the motion"
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
         return np.where(late[at], case.norm.size(*case.modes.out_of(*change)) / allowed[at], 0)
 
-    return case.verdict(
-        "closed-form",
-        float(distance[worst] / unit[worst]),
-        float(bound[worst]),
+    return Finding(
+        distance[worst] / unit[worst],
+        bound[worst],
         "roundings",
         f"roundings of {count(int(case.steps[worst]), 'step')}, carried on by the map: {_how(case)}"
         + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
@@ -84,7 +83,7 @@ def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
 
 
 @check("shadow", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
-def shadow_energy(case: Case) -> Verdict:
+def shadow_energy(case: Case) -> Finding | str:
     """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
     run = case.trajectory
     form = schemes.invariant(case.matrices, h=run.step)
@@ -116,7 +115,7 @@ def shadow_energy(case: Case) -> Verdict:
     with np.errstate(over="ignore", invalid="ignore"):
         drowned = energy <= limit * scale
     if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & ~drowned):
-        return case.not_applicable("shadow-energy", "rounding may be as large as the energy")
+        return "rounding may be as large as the energy"
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
         (u, v), (du, dv) = right, change
@@ -127,10 +126,9 @@ def shadow_energy(case: Case) -> Verdict:
         most = np.max(np.abs(of_u * du + of_v * dv), axis=1)
         return np.where(late[at], most / (limit * scale)[at], 0)
 
-    return case.verdict(
-        "shadow-energy",
-        float(seen[worst]),
-        float(limit[worst]),
+    return Finding(
+        seen[worst],
+        limit[worst],
         "roundings",
         f"roundings of {count(int(case.steps[worst]), 'step')}: {_how(case)}"
         + _untold(case, drowned, "energy"),
@@ -144,22 +142,22 @@ def _rest(case: Case) -> Floats:
 
 
 @check("freq", family="motion", needs="a mode that oscillates without friction", unless=closed_or_not)
-def frequency(case: Case) -> Verdict:
+def frequency(case: Case) -> Finding | str:
     """The phase turns by the scheme's own frequency, to rounding."""
     if case.scene.system.is_damped:
-        return case.not_applicable("frequency", "a phase that decays is seen in the closed form")
+        return "a phase that decays is seen in the closed form"
     turn = schemes.rotation(case.matrices)
     y0, v0 = case.modes.into(case.scene.q, case.scene.p)
     u0 = y0 - case.modes.centre()
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
     j = int(np.argmax(strength))
     if strength[j] <= 0:
-        return case.not_applicable("frequency", "no mode oscillates")
+        return "no mode oscillates"
     form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
     y, v = case.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
     steps = int(case.steps[-1])
     if steps == 0:
-        return case.not_applicable("frequency", "nothing has moved yet")
+        return "nothing has moved yet"
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
     # on an inverted spring a scheme that goes back on part of its way can turn the other way
@@ -175,16 +173,14 @@ def frequency(case: Case) -> Verdict:
     mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
     wide = unit[-1] * np.sqrt(np.longdouble(2))
     if not np.isfinite(mode) or not np.isfinite(wide):
-        return case.not_applicable("frequency", "what rounding may do is beyond all numbers")
+        return "what rounding may do is beyond all numbers"
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
     shape = schemes.condition(case.matrices, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
-        return case.not_applicable(
-            "frequency", "rounding may be as large as the mode, which has no phase then"
-        )
+        return "rounding may be as large as the mode, which has no phase then"
     if angle >= abs(expected):
-        return case.not_applicable("frequency", f"{STILL} the whole turn")
+        return f"{STILL} the whole turn"
     limit = float(angle / abs(expected))
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
@@ -195,9 +191,8 @@ def frequency(case: Case) -> Verdict:
         return np.asarray(abs(x * dy - y * dx) / (x * x + y * y) / angle)
 
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
-    return case.verdict(
-        "frequency",
-        float(abs(off) / abs(expected)),
+    return Finding(
+        abs(off) / abs(expected),
         limit,
         "relative",
         f"the closed form's bound as an angle; the scheme itself is off the true frequency by {true:.2e}",
@@ -223,15 +218,15 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
 
 
 @check("moment", family="motion", needs="nothing that holds a particle")
-def momentum(case: Case) -> Verdict:
+def momentum(case: Case) -> Finding | str:
     """Nothing outside pulls, so the total momentum stays."""
     if any(term.bodies == 1 for term in case.scene.terms):
-        return case.not_applicable("momentum", "walls and fixed potentials take up momentum")
+        return "walls and fixed potentials take up momentum"
     if not case.scheme.one_step:
-        return case.not_applicable("momentum", "an adaptive solver is judged by its tolerance")
+        return "an adaptive solver is judged by its tolerance"
     run = case.trajectory
     if len(run.t) < 2:
-        return case.not_applicable("momentum", "there is no second frame")
+        return "there is no second frame"
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
@@ -252,15 +247,14 @@ def momentum(case: Case) -> Verdict:
     worst = int(np.argmax(seen / limit))
     size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
     if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(~beyond & (size > limit * unit)):
-        return case.not_applicable("momentum", "rounding may be as large as all momenta together")
+        return "rounding may be as large as all momenta together"
     # a force too large by x gains x times what its particle has gained
     gained = np.max(np.abs(run.p[1:] - first), axis=1)
     known = gained > limit * unit
     off_by = np.min((limit * unit)[known] / gained[known], initial=np.inf)
-    return case.verdict(
-        "momentum",
-        float(seen[worst]),
-        float(limit[worst]),
+    return Finding(
+        seen[worst],
+        limit[worst],
         "roundings",
         f"forces cancel in pairs; {count(int(steps[worst + 1]), 'step')}, each rounded, all of one sign",
         Limits(reaction=float(off_by) if np.isfinite(off_by) else None),

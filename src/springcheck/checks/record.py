@@ -5,34 +5,33 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.checks.case import REPEATED, Case
-from springcheck.checks.check import check
+from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
 from springcheck.text.wording import count
-from springcheck.trajectory import Verdict
 
 
 @check("start", family="record", needs="the first frame")
-def start(case: Case) -> Verdict:
+def start(case: Case) -> Finding | str:
     """Row 0 is the start, exactly."""
     run, scene = case.trajectory, case.scene
     if case.piece and case.steps[0] != 0:
-        return case.not_applicable("start", "this piece does not hold the start")
+        return "this piece does not hold the start"
     value = float(np.max(np.abs([run.q[0] - scene.q, run.p[0] - scene.p])))
-    return case.verdict("start", value, 0.0, "", "the start is recorded, not computed")
+    return Finding(value, 0.0, "", "the start is recorded, not computed")
 
 
 @check("times", family="record", needs="frames")
-def times(case: Case) -> Verdict:
+def times(case: Case) -> Finding | str:
     """Times are the number of steps times the step, rounded once, up to where the run says it ended."""
     run = case.trajectory
     off = np.abs(run.t - case.steps * run.step)
     missing = abs(float(case.steps[-1]) - run.outcome.step) * abs(run.step)
     value = float(np.max([*off, missing]))
-    return case.verdict("times", value, 0.0, "T", "one product, no accumulation; the last frame is the end")
+    return Finding(value, 0.0, "T", "one product, no accumulation; the last frame is the end")
 
 
 @check("grid", family="record", needs="frames")
-def grid(case: Case) -> Verdict:
+def grid(case: Case) -> Finding | str:
     """The trajectory is the one that the scene asks for: its step, frames, quantities and tolerance, to its
     end."""
     run, scene = case.trajectory, case.scene
@@ -55,7 +54,7 @@ def grid(case: Case) -> Verdict:
     elif status in ("stopped", "diverged") and not (_gives_up(case) or _explodes(case)):
         wrong.append(f"{status} after {last} of {asked} steps for no reason that is known here")
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
-    return case.verdict("grid", float(len(wrong)), 0.0, "facts", why)
+    return Finding(len(wrong), 0.0, "facts", why)
 
 
 def _gives_up(case: Case) -> bool:
@@ -97,24 +96,24 @@ SINGLE_RANGE = float(np.sqrt(np.finfo(np.float32).max))
 
 
 @check("line", family="record", needs="an engine in three dimensions")
-def line(case: Case) -> Verdict:
+def line(case: Case) -> Finding | str:
     """y and z stay exactly 0."""
     off = case.trajectory.off_axis
     if off is None:
-        return case.not_applicable("line", "the engine moves along a line only")
-    return case.verdict("line", off, 0.0, "L", "every force along y and z is a product with 0")
+        return "the engine moves along a line only"
+    return Finding(off, 0.0, "L", "every force along y and z is a product with 0")
 
 
 @check("energy", family="record", needs="energies that are asked for")
-def energies(case: Case) -> Verdict:
+def energies(case: Case) -> Finding | str:
     """Stored energies are those of the stored states, bit for bit."""
     run = case.trajectory
     if run.energy is None:
-        return case.not_applicable("energies", "the scene keeps no energies")
+        return "the scene keeps no energies"
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
     same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
     # the energy of finite states may overflow; states that are no numbers have none
     same &= np.isfinite(run.q).all(axis=1) & np.isfinite(run.p).all(axis=1)
     value = float(np.count_nonzero(~same))
-    return case.verdict("energies", value, 0.0, "frames", "one formula, one order of operations")
+    return Finding(value, 0.0, "frames", "one formula, one order of operations")

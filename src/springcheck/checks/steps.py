@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
-from springcheck.checks.check import check
+from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
 from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.system import MOST_JOINED
 from springcheck.text.wording import count
-from springcheck.trajectory import Limits, Verdict
+from springcheck.trajectory import Limits
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has
@@ -60,46 +60,60 @@ def closed_or_not(case: Case) -> str | None:
 
 
 @check("step", family="motion", needs="a fixed step and two frames", unless=no_map)
-def step_defect(case: Case) -> Verdict:
+def step_defect(case: Case) -> Finding | str:
     """Each step is the scheme's own step, to rounding."""
     # `arithmetic` asks for it too
     return case.once(_step_defect)
 
 
-def _step_defect(case: Case) -> Verdict:
+def _step_defect(case: Case) -> Finding | str:
     run = case.trajectory
-    if case.ahead is None:
-        return _by_norm(case)
-    bound = case.roundings
-    told = _told(case)
+    if run.every > REPEATED and (no_leap := closed_or_not(case)):
+        return f"{run.every} steps lie between frames, and {no_leap}"
+    bound, told = _allowed(case)
     if not np.any(told):
-        return case.not_applicable(
-            "step-defect", "between two frames a rounding may grow to the whole motion"
-        )
-    seen = np.where(told, _defects(case), 0)
+        return "between two frames a rounding may grow to the whole motion"
+    seen = np.where(told, _in_roundings(case, run.q[1:], run.p[1:]), 0)
     still = np.where(told, _in_roundings(case, run.q[:-1], run.p[:-1]), 0)
     off = ~(seen <= bound)
     if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
-        return case.not_applicable("step-defect", f"{STILL} any step")
-    worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
+        return f"{STILL} any step"
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
-    if run.every > 1:
+    if case.ahead is None:
+        why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
+    elif run.every > 1:
         why = f"roundings of each of {run.every} steps, each carried to the frame by the steps after it"
     if not np.all(told):
         first = case.steps[int(np.argmin(told)) + 1]
         frames = count(int(np.count_nonzero(~told)), "frame")
         why += f"; {frames}, from step {first} on, where one may grow to all of it"
     why = _beyond_range(case, off) or why + _where(case, off)
-    value, most = float(seen[worst]), float(bound)
+    value, most = seen[worst], bound[worst]
     if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
         value, most, why = slow
-    return case.verdict("step-defect", value, most, "roundings", why, _sees(case, told))
+    return Finding(value, most, "roundings", why, _sees(case, bound, told))
 
 
-def _sees(case: Case, told: NDArray[np.bool_]) -> Limits:
-    """What the roundings allowed in each degree of freedom would not have hidden."""
+def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
+    """By how many roundings each frame but the first may be off, and whether that is known (f-1,).
+
+    In the energy norm over all particles for very many steps, or very many joined particles.
+    """
+    if case.ahead is not None:
+        told = known(case, case.ahead, case.trajectory.every)
+        return np.full(len(told), float(case.roundings)), told
+    bound = case.roundings * _amplified(case, case.trajectory.every)
+    told = bound * case.trajectory.arithmetic.state < 1
+    return np.where(told, bound, 1), told
+
+
+def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> Limits:
+    """What the roundings allowed, in each degree of freedom where that is known, would not have hidden."""
     ahead = case.ahead
-    assert ahead is not None
+    if ahead is None:
+        unit = case.allowance_of_stretches * bound
+        return sight.of_steps(case, told, lambda at, change: case.norm.size(*change) / unit[at])
     most = [case.roundings * x for x in (ahead.of_q, ahead.of_p)]
 
     def part(at: Integers, change: States) -> Reals:
@@ -112,11 +126,8 @@ def first_off(case: Case) -> int | None:
     """The first frame that is not the scheme's own after the frame before; None where none is."""
     if no_map(case):
         return None
-    if case.ahead is None:
-        bound = case.roundings * _amplified(case, case.trajectory.every)
-        off = ~(_defects(case) <= bound) & (bound * case.trajectory.arithmetic.state < 1)
-    else:
-        off = ~(_defects(case) <= case.roundings) & _told(case)
+    bound, told = _allowed(case)
+    off = ~(_in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:]) <= bound) & told
     return int(np.argmax(off)) + 1 if np.any(off) else None
 
 
@@ -124,54 +135,13 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
     """Where the first of the frames that are off (f-1,) is, and how many are."""
     if not np.any(off):
         return ""
-    first, number = int(np.argmax(off)) + 1, int(np.count_nonzero(off))
-    return (
-        f"; the first of {number} frames off is at step {case.steps[first]}"
-        if number > 1
-        else (f"; one frame is off, at step {case.steps[first]}")
-    )
-
-
-def _told(case: Case) -> NDArray[np.bool_]:
-    """At which frames but the first the scheme's own state and what rounding does to it are known (f-1,)."""
-    assert case.ahead is not None
-    return known(case, case.ahead, case.trajectory.every)
-
-
-def _by_norm(case: Case) -> Verdict:
-    """The same in the energy norm over all particles: for very many steps, or very many joined particles."""
-    run = case.trajectory
-    if run.every > REPEATED and (no_leap := closed_or_not(case)):
-        return case.not_applicable("step-defect", f"{run.every} steps lie between frames, and {no_leap}")
-    bound = case.roundings * _amplified(case, run.every)
-    why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
-    seen, told = _defects(case), bound * run.arithmetic.state < 1
-    if not told[0]:
-        return case.not_applicable(
-            "step-defect", "between two frames a rounding may grow to the whole motion"
-        )
-    if not np.all(told):
-        # a motion that has grown steeper since: what rounding can do there is no smaller than the motion
-        seen, bound = seen[told], bound[told]
-        why += f"; judged up to step {case.steps[len(seen)]}, beyond which it may grow to the whole motion"
-    off = ~(seen <= bound)
-    still = _in_roundings(case, run.q[:-1], run.p[:-1])[: len(seen)]
-    if not np.any(off) and np.any(still > 0) and not np.any(still > bound):
-        return case.not_applicable("step-defect", f"{STILL} any step")
-    worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
-    why = _beyond_range(case, np.pad(off, (0, len(told) - len(off)))) or why + _where(case, off)
-    unit = case.allowance_of_stretches[: len(bound)] * bound
-    sees = sight.of_steps(case, told, lambda at, change: case.norm.size(*change) / unit[at])
-    return case.verdict("step-defect", float(seen[worst]), float(bound[worst]), "roundings", why, sees)
+    step, number = case.steps[int(np.argmax(off)) + 1], int(np.count_nonzero(off))
+    several = f"the first of {number} frames off is at step {step}"
+    return f"; {several}" if number > 1 else f"; one frame is off, at step {step}"
 
 
 STILL = "standing still would pass: rounding may be as large as"
 """A check that an engine passes which does not move says nothing of one that does."""
-
-
-def _defects(case: Case) -> Reals:
-    """How far each frame is from the scheme's own steps after the frame before (f-1,), in roundings."""
-    return _in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:])
 
 
 def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
@@ -237,31 +207,30 @@ def fastest(case: Case) -> float:
 
 
 @check("arith", family="motion", needs="an arithmetic coarser than double precision", unless=no_map)
-def arithmetic(case: Case) -> Verdict:
+def arithmetic(case: Case) -> Finding | str:
     """The size of the step defect is that of the arithmetic the method says it has."""
     named = case.trajectory.arithmetic
     plain = Arithmetic()
     if named.state <= plain.state and named.force <= plain.force and not named.quantum:
-        return case.not_applicable("arithmetic", "plain double precision: the step defect says it all")
-    seen = step_defect(case)
-    if seen.passed is None:
-        return case.not_applicable("arithmetic", seen.why)
+        return "plain double precision: the step defect says it all"
+    seen = case.once(_step_defect)
+    if isinstance(seen, str):
+        return seen
     # over many steps the bound is a sum of which roundings that are as good as random fill a part
     alone = seen.value
     if case.ahead is not None and case.trajectory.every > 1:
-        told = _told(case)
+        told = known(case, case.ahead, case.trajectory.every)
         last = replace(case.ahead, of_q=case.ahead.last_q, of_p=case.ahead.last_p)
         alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
     coarser, fine = (float(np.max(x.norm.size(*x.allowance))) for x in (case, finer))
     # at rest the only rounding is underflow, which is the same in both
     if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
-        return case.not_applicable("arithmetic", "its coarser parts do not show in these states")
-    if seen.passed is False:
-        why = seen.why
-    else:
-        why = f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better"
-    return replace(seen, check="arithmetic", passed=bool(alone >= FLOOR and seen.passed), why=why)
+        return "its coarser parts do not show in these states"
+    if not seen.value <= seen.bound:
+        return seen
+    why = f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better"
+    return replace(seen, why=why, holds=bool(alone >= FLOOR))
 
 
 FLOOR = 2.0**-8
