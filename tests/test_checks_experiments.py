@@ -229,3 +229,14 @@ def test_a_sum_of_another_length_in_company_is_no_influence() -> None:
     verdict = experiments.company(checks.Bench(scene=scene, label="", run=run))
     assert verdict.passed is None
     assert "rounding alone" in verdict.why
+
+
+def test_friction_that_leaves_no_area_has_no_determinant_to_judge() -> None:
+    """exp(-h c / m) is 0: the scheme's one-step matrix has no inverse."""
+    scene = scenes.load_scene("detest-b1")
+    (damping,) = (term for term in scene.terms if term.key == "damping")
+    heavy = replace(damping, c=np.full_like(damping.c, 1e9))
+    scene = replace(scene, terms=tuple(heavy if term is damping else term for term in scene.terms))
+    verdicts = checks.judge_thoroughly(scene, "own:langevin-middle-early", simulate.run)
+    assert [v for v in verdicts if v.passed is False] == []
+    assert {v.check: v.passed for v in verdicts}["determinant"] is None

@@ -101,7 +101,10 @@ def determinant(bench: Bench) -> Finding | str:
     if why_no_step := _no_step(bench.copies[0]):
         return Finding(np.inf, 0.0, "relative", why_no_step)
     ideal, departure, allowed, _ = _matrices(bench)
-    inverse = np.linalg.inv(ideal)
+    try:
+        inverse = np.linalg.inv(ideal)
+    except np.linalg.LinAlgError:
+        return bench.not_applicable("determinant", "friction leaves nothing of an area within a step")
     relative = inverse @ departure
     # det(1 + X) - 1, whose leading part is exact as a trace where the determinant itself would round
     change = float(np.trace(relative))
