@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -266,6 +267,53 @@ def test_a_commit_that_has_replaced_the_store_takes_its_journal_away(tmp_path: P
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
     assert [path.name for path in tmp_path.iterdir()] == ["s.h5"]
     assert store.summary(tmp_path / "s.h5").complete
+
+
+def test_an_interrupt_as_the_new_store_is_opened_leaves_no_half_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then libhdf5 has the file open, and nothing but a frame of h5py knows of it."""
+    right, scene = h5py.h5f.open, scenefile.load_scene("spring")
+
+    def opened(name: Any, *rest: Any, **named: Any) -> Any:
+        handle = right(name, *rest, **named)
+        if os.fsdecode(name).endswith("collection.new"):
+            raise KeyboardInterrupt
+        return handle
+
+    with store.open_new(tmp_path / "s.h5", "run") as journal:
+        with monkeypatch.context() as patch:
+            patch.setattr(h5py.h5f, "open", opened)
+            with pytest.raises(KeyboardInterrupt):
+                journal.commit(scene)
+        assert sorted(path.name for path in journal.folder.iterdir()) == ["command", "lock"]
+        journal.commit(scene)
+    assert store.summary(tmp_path / "s.h5").complete
+
+
+SHOWN = """
+import builtins, os, signal, sys
+from springcheck import __main__
+right = builtins.open
+def opened(name, *rest, **named):
+    file = right(name, *rest, **named)
+    if name == "my.toml":
+        os.kill(os.getpid(), signal.SIGINT)
+    return file
+builtins.open = opened
+sys.argv[1:] = ["show", "spring", "-o", "my.toml"]
+sys.exit(__main__.main())
+"""
+
+
+@posix
+def test_an_interrupt_leaves_no_file_half_written(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SHOWN], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "springcheck: interrupted; no file is half written\n"
+    assert (tmp_path / "my.toml").read_text() == scenefile.text_of("spring")
 
 
 @posix

@@ -35,8 +35,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _mistake(error)
     command: Callable[[argparse.Namespace], int] = options.command
-    kept = "keeps" in options and options.keeps(options)
-    what = "what was finished is kept, the same command goes on" if kept else "nothing is kept"
+    what = "nothing is kept"
+    if "keeps" not in options and "output" in options:
+        # each is put in its place at once, as one of many figures
+        what = "no file is half written"
+    elif "keeps" in options and options.keeps(options):
+        what = "what was finished is kept, the same command goes on"
     interrupts.announce(f"interrupted; {what}")
     try:
         slips.look(options)

@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from springcheck import interrupts
 from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
 from springcheck.studies.study import JSON, QUIET, Argument, engine_option
@@ -101,7 +102,7 @@ def _show(options: Namespace) -> int:
         sys.stdout.write(text)
         return 0
     try:
-        with open(options.output, "x", encoding="utf-8") as file:
+        with interrupts.held(), open(options.output, "x", encoding="utf-8") as file:
             file.write(text)
     except OSError as error:
         raise SpringcheckError(f"cannot write {options.output}: {error.strerror}") from error

@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import re
+import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -261,7 +262,9 @@ class Journal:
             try:
                 temporary.unlink(missing_ok=True)
                 merge.collection(temporary, found, root, extra, documents or {})
-            except BaseException:
+            except BaseException as error:
+                # an interrupt as the file was opened leaves it to a frame, which holds it open
+                traceback.clear_frames(error.__traceback__)
                 _give_up(temporary, self.run)
                 raise
             # whole once begun, in milliseconds: no interrupt leaves a complete store beside its journal
