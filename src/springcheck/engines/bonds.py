@@ -84,7 +84,7 @@ def walls(scene: Scene, label: str) -> Iterator[tuple[int, float, float]]:
     taken: set[int] = set()
     for term in scene.terms:
         if isinstance(term, WallSpring):
-            for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+            for i, k, at in term.rows():
                 if i in taken or k < 0:
                     raise MethodError(
                         f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"

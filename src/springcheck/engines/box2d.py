@@ -16,7 +16,6 @@ from springcheck.engines.contract import (
     Engine,
     Label,
     Method,
-    Simulation,
     Stopped,
     by_name,
     named,
@@ -36,13 +35,6 @@ def version() -> dict[str, str]:
     return {"box2d": version("box2d")}
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A world with the scene's bodies at its start.  MethodError for a negative step."""
-    if step < 0:
-        raise MethodError(f"{label}: Box2D takes no negative step")
-    return _World(scene, step, joints=method.name == "distance-joint")
-
-
 def arithmetic(label: Label) -> Arithmetic:
     """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
     force = 16 * 2.0**-24 if label.method == "distance-joint" else 2.0**-24
@@ -52,9 +44,12 @@ def arithmetic(label: Label) -> Arithmetic:
 class _World(Bodies):
     """Box2D's world in motion."""
 
-    def __init__(self, scene: Scene, step: float, *, joints: bool) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import Box2D
 
+        if step < 0:
+            raise MethodError(f"{label}: Box2D takes no negative step")
+        joints = method.name == "distance-joint"
         super().__init__(scene, springs=joints)
         self._h = step
         self._world = world = Box2D.b2World(gravity=(0, 0), doSleep=False)
@@ -112,7 +107,7 @@ ENGINE = Engine(
             frozenset({"wall-spring"}),
         ),
     ),
-    start=start,
+    start=_World,
     version=version,
     arithmetic=arithmetic,
     step_seconds=5e-6,

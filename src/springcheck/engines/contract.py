@@ -174,11 +174,13 @@ def named(*methods: Method) -> dict[str, Method]:
     return {method.name: method for method in methods}
 
 
-def deferred(module: str) -> dict[str, Any]:
-    """`start`, `version`, `arithmetic` and `convention` of a module that imports a library.
+def version_of(module: str, name: str = "") -> Callable[[], dict[str, str]]:
+    """The function `version` of a library with a `__version__`, under the name of its module or another."""
+    return lambda: {name or module: str(import_module(module).__version__)}
 
-    The module is imported as the first of them is called.
-    """
+
+def deferred(module: str, *more: str) -> dict[str, Any]:
+    """`start`, `version` and more functions of a module that is imported as the first of them is called."""
 
     def of(name: str) -> Callable[..., Any]:
         def call(*arguments: object) -> Any:
@@ -186,4 +188,4 @@ def deferred(module: str) -> dict[str, Any]:
 
         return call
 
-    return {name: of(name) for name in ("start", "version", "arithmetic", "convention")}
+    return {name: of(name) for name in ("start", "version", *more)}

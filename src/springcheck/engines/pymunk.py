@@ -16,7 +16,6 @@ from springcheck.engines.contract import (
     Engine,
     Label,
     Method,
-    Simulation,
     by_name,
     named,
 )
@@ -32,11 +31,6 @@ def version() -> dict[str, str]:
     return {"pymunk": pymunk.version, "chipmunk": pymunk.chipmunk_version}
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A space with the scene's bodies at its start."""
-    return _Space(scene, step, springs=method.name == "damped-spring")
-
-
 def arithmetic(label: Label) -> Arithmetic:
     """Double precision; a spring's length, up to 8 times the motion's reach, is rounded at both ends."""
     return Arithmetic(force=16 * 2.0**-53) if label.method == "damped-spring" else Arithmetic()
@@ -45,9 +39,10 @@ def arithmetic(label: Label) -> Arithmetic:
 class _Space(Bodies):
     """Chipmunk's space in motion."""
 
-    def __init__(self, scene: Scene, step: float, *, springs: bool) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import pymunk
 
+        springs = method.name == "damped-spring"
         super().__init__(scene, springs=springs)
         self._h = step
         self._space = space = pymunk.Space()
@@ -65,11 +60,10 @@ class _Space(Bodies):
         spring = pymunk.DampedSpring  # type: ignore[attr-defined]
         for term in scene.terms:
             if isinstance(term, WallSpring):
-                for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+                for i, k, at in term.rows():
                     self._space.add(spring(wall, bodies[i], (at - length, 0), (0, 0), length, k, 0.0))
             elif isinstance(term, Spring):
-                ends = zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True)
-                for a, b, k, rest in ends:
+                for a, b, k, rest in term.rows():
                     # from a, moved back by the length, to b
                     self._space.add(spring(bodies[a], bodies[b], (rest - length, 0), (0, 0), length, k, 0.0))
 
@@ -100,7 +94,7 @@ ENGINE = Engine(
             SPRINGS,
         ),
     ),
-    start=start,
+    start=_Space,
     version=version,
     arithmetic=arithmetic,
     step_seconds=5e-6,

@@ -16,28 +16,14 @@ from springcheck.engines.contract import (
     Engine,
     Label,
     Method,
-    Simulation,
     Stopped,
     by_name,
     named,
+    version_of,
 )
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
-
-
-def version() -> dict[str, str]:
-    """Version of rapier3d."""
-    import rapier3d
-
-    return {"rapier3d": rapier3d.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A world with the scene's bodies at its start.  MethodError for a negative step."""
-    if step < 0:
-        raise MethodError(f"{label}: Rapier takes no negative step")
-    return _World(scene, step, joints=method.name == "spring-joint")
 
 
 def arithmetic(label: Label) -> Arithmetic:
@@ -49,9 +35,12 @@ def arithmetic(label: Label) -> Arithmetic:
 class _World(Bodies):
     """Rapier's world in motion."""
 
-    def __init__(self, scene: Scene, step: float, *, joints: bool) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import rapier3d
 
+        if step < 0:
+            raise MethodError(f"{label}: Rapier takes no negative step")
+        joints = method.name == "spring-joint"
         super().__init__(scene, springs=joints)
         self._world = world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
         world.integration_parameters.dt = step
@@ -102,8 +91,8 @@ ENGINE = Engine(
             frozenset({"wall-spring"}),
         ),
     ),
-    start=start,
-    version=version,
+    start=_World,
+    version=version_of("rapier3d"),
     arithmetic=arithmetic,
     step_seconds=2e-5,
 )

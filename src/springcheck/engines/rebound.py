@@ -19,22 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, Simulation, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, named, version_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
-
-
-def version() -> dict[str, str]:
-    """Version of REBOUND."""
-    import rebound
-
-    return {"rebound": rebound.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A simulation at the scene's start."""
-    return _Simulation(scene, method.name, step)
 
 
 @contextmanager
@@ -52,9 +40,10 @@ def _signals() -> Iterator[None]:
 class _Simulation:
     """REBOUND's simulation in motion."""
 
-    def __init__(self, scene: Scene, integrator: str, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import rebound
 
+        integrator = method.name
         self.force_calls = 0
         self.off_axis = 0.0
         self._m, self._step, self._done = scene.m, step, 0
@@ -140,7 +129,7 @@ ENGINE = Engine(
         ),
     ),
     schemes=SCHEMES,
-    start=start,
-    version=version,
+    start=_Simulation,
+    version=version_of("rebound"),
     step_seconds=8e-6,
 )

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped, named
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Stopped, named, version_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
@@ -22,24 +22,13 @@ SMALLEST_TOLERANCE = 100 * np.finfo(np.float64).eps
 """What SciPy raises smaller relative tolerances to."""
 
 
-def version() -> dict[str, str]:
-    """Version of SciPy."""
-    import scipy
-
-    return {"scipy": scipy.__version__}
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A solver at the scene's start."""
-    return _Solver(scene, SOLVERS[method.name], step)
-
-
 class _Solver:
     """An `OdeSolver` in motion."""
 
-    def __init__(self, scene: Scene, name: str, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         from scipy import integrate
 
+        name = SOLVERS[method.name]
         self.force_calls = 0
         self._n, self._h, self._done = scene.n, step, 0
         n, m, system = scene.n, scene.m, scene.system
@@ -122,7 +111,7 @@ ENGINE = Engine(
         )
     ),
     schemes=SCHEMES,
-    start=start,
-    version=version,
+    start=_Solver,
+    version=version_of("scipy"),
     step_seconds=1e-4,
 )

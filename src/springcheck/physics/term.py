@@ -8,7 +8,7 @@ A formula is written once for every width of float, for one state and for a whol
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self, TypeAlias, cast
@@ -112,6 +112,10 @@ class Term:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Its numbers by the names of their fields, (s,) each: the ends of each row, then the columns."""
         return {name: getattr(self, name) for name in (*self.ends, *(c.field for c in self.columns))}
+
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Each row as Python's numbers: its ends, then its columns."""
+        return zip(*(values.tolist() for values in self.arrays.values()), strict=True)
 
     @cached_property
     def parameters(self) -> tuple[Floats, ...]:

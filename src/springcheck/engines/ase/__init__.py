@@ -17,5 +17,5 @@ ENGINE = Engine(
         )
     ),
     step_seconds=3e-4,
-    **deferred(f"{__name__}.simulation"),
+    **deferred(f"{__name__}.simulation", "arithmetic"),
 )

@@ -36,11 +36,6 @@ def arithmetic(label: Label) -> Arithmetic:
     return Arithmetic(stale=1e-15)
 
 
-def convention(method: Method) -> str:
-    """Kick, drift, kick: momenta are synchronised."""
-    return "synchronised"
-
-
 class Springs(Calculator):  # type: ignore[misc]
     """The terms of a scene along x, as an ASE calculator.  `length` and `time` are the scene's units."""
 

@@ -76,5 +76,5 @@ ENGINE = Engine(
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     step_seconds=8e-7,
     squares_lengths=True,
-    **deferred(f"{__name__}.simulation"),
+    **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )

@@ -49,5 +49,6 @@ ENGINE = Engine(
     methods=named(*map(_method, _SCHEMES)),
     # compiled
     step_seconds=4e-9,
+    convention=lambda method: "positions and momenta belong to the same time",
     **deferred(f"{__name__}.simulation"),
 )

@@ -22,7 +22,7 @@ from springcheck import schemes
 from springcheck.engines.contract import Label, Method
 from springcheck.engines.own import kernels, layout, solver, tiles, vectors
 from springcheck.engines.own.operations import Program, program, terms_of
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme
@@ -71,16 +71,6 @@ def version() -> dict[str, str]:
 def start(scene: Scene, method: Method, label: Label, step: float) -> Own:
     """Start a run of `scene.steps` steps of length `step`; compiles here where that pays."""
     return prepare(scene, method.scheme, step)
-
-
-def arithmetic(label: Label) -> Arithmetic:
-    """IEEE double precision throughout."""
-    return Arithmetic()
-
-
-def convention(method: Method) -> str:
-    """How momenta are kept, as a phrase for the report."""
-    return "positions and momenta belong to the same time"
 
 
 def prepare(

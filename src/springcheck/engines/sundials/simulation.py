@@ -18,7 +18,7 @@ from springcheck.engines import quiet
 from springcheck.engines.contract import Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
@@ -71,16 +71,6 @@ def most_steps(scene: Scene, step: float) -> int:
 def version() -> dict[str, str]:
     """Versions of the wrapper and of SUNDIALS beneath it."""
     return {"scikit-sundae": sksundae.__version__, "sundials": str(sksundae.SUNDIALS_VERSION)}
-
-
-def arithmetic(label: Label) -> Arithmetic:
-    """SUNDIALS' realtype is double in the wheels."""
-    return Arithmetic()
-
-
-def convention(method: Method) -> str:
-    """q and p are one vector of one time."""
-    return "synchronised"
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:

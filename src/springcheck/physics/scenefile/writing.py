@@ -94,20 +94,16 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
             if scene.kind == "circuit"
             else ("[[damping]]", "particle", "coefficient")
         )
-        for i, c in zip(term.i.tolist(), term.c.tolist(), strict=True):
+        for i, c in term.rows():
             yield _table(name[0], [(name[1], i), (name[2], c)])
     elif isinstance(term, WallSpring | Spring) and scene.kind == "circuit" and _are_capacitors(term):
-        for loops, k in zip(
-            zip(*(x.tolist() for x in term.particles), strict=True), term.k.tolist(), strict=True
-        ):
-            yield _table("[[capacitor]]", [("loops", list(loops)), ("capacitance", 1 / k)])
+        for *loops, k, _ in term.rows():
+            yield _table("[[capacitor]]", [("loops", loops), ("capacitance", 1 / k)])
     elif isinstance(term, WallSpring):
-        for i, k, at in zip(term.i.tolist(), term.k.tolist(), term.at.tolist(), strict=True):
+        for i, k, at in term.rows():
             yield _spring(["wall", i], k, 0.0, at, fast=term.fast)
     elif isinstance(term, Spring):
-        for a, b, k, rest in zip(
-            term.a.tolist(), term.b.tolist(), term.k.tolist(), term.rest.tolist(), strict=True
-        ):
+        for a, b, k, rest in term.rows():
             yield _spring([a, b], k, rest, 0.0, fast=term.fast)
     else:
         yield from _by_columns(term)
