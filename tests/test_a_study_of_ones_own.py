@@ -56,12 +56,10 @@ def lines(found, options=None):
 """
 FIGURE = """
 from matplotlib.figure import Figure
-from springcheck.figures.style import save, style
-def draw(found, folder):
+def pictures(found):
     figure = Figure()
     figure.add_subplot().plot([x.number for x in found.rows], [x.square for x in found.rows])
-    with style():
-        return save(figure, folder, "squares")
+    return {"squares": figure}
 """
 STUDY = """
 from springcheck.studies.study import Study, store_options

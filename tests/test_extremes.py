@@ -14,8 +14,8 @@ import pytest
 from springcheck import engines, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
+from springcheck.studies.extremes import STUDY, grid, judging, refusals, running, solving
 from springcheck.studies.extremes import figure as figures
-from springcheck.studies.extremes import grid, judging, refusals, running, solving
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
 from springcheck.studies.extremes.planes import planes
@@ -134,7 +134,7 @@ def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
         drawn = np.isfinite(columns[f"log10_{name}"])
         assert np.array_equal(drawn, (wanted > 0) & np.isfinite(wanted))
         np.testing.assert_allclose(columns[f"log10_{name}"][drawn], np.log10(wanted[drawn]), rtol=1e-15)
-    assert {path.suffix for path in figures.draw(atlas, tmp_path)} == {".png", ".svg"}
+    assert {path.suffix for path in STUDY.draw(atlas, tmp_path)} == {".png", ".svg"}
 
 
 def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:

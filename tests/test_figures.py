@@ -96,7 +96,7 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
     assert looks.members(run.label for run in group.members).split() == [
         looks.mark("own")[1], "own", looks.mark("x")[1], "x", "(2)", looks.mark("y")[1], "y",
     ]  # fmt: skip
-    figure = trajectories.pictures(scene, same, same)["energy"]
+    figure = trajectories.of_runs(scene, same, same)["energy"]
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 2  # the exact solution, and the scheme
 
@@ -156,7 +156,7 @@ def test_errors_are_distances_from_the_exact_solution() -> None:
     # m = k = 1 from (0, 1): the distance in the plane
     expected = np.hypot(run.q[:, 0] - np.sin(run.t), run.p[:, 0] - np.cos(run.t))
     np.testing.assert_allclose(exact.error(run), expected, rtol=1e-9, atol=1e-15)
-    axes = trajectories.pictures(scene, {"own:euler": run}, {"own:euler": run})["error"].axes[0]
+    axes = trajectories.of_runs(scene, {"own:euler": run}, {"own:euler": run})["error"].axes[0]
     np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata(), float), expected[1:], rtol=1e-9)
 
 
@@ -181,7 +181,7 @@ def test_a_scene_has_the_pictures_that_suit_it(name: str, also: set[str]) -> Non
 
         scene = replace(scene, steps=40)
     made = runs(scene, "own:semi-implicit-euler", "own:euler")
-    found = trajectories.pictures(scene, made, made)
+    found = trajectories.of_runs(scene, made, made)
     assert set(found) == {"phase-portrait", "position", "energy", "error"} | also
     for picture in found.values():
         for axes in picture.axes:
@@ -191,7 +191,7 @@ def test_a_scene_has_the_pictures_that_suit_it(name: str, also: set[str]) -> Non
 def test_many_periods_are_shown_by_the_first_and_the_last_ones() -> None:
     scene = scenefile.load_scene("stiff-spring")
     made = runs(scene, "own:implicit-euler")
-    figure = trajectories.pictures(scene, made, made)["position"]
+    figure = trajectories.of_runs(scene, made, made)["position"]
     first, last = (axes.get_xlim() for axes in figure.axes)
     omega = np.sqrt(14800 / 0.37)
     assert (last[1] - last[0]) * omega / (2 * np.pi) == pytest.approx(6, rel=0.15)

@@ -34,7 +34,7 @@ from springcheck.studies.precision import text as report
 from springcheck.studies.run import figure as trajectories
 from springcheck.studies.run import measure as session
 from springcheck.studies.run.drawable import drawable
-from springcheck.studies.stability import limits, result
+from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
 
 Need = Callable[[str], None]
@@ -87,7 +87,7 @@ def test_what_a_stored_study_of_stability_fails_is_still_seen(tmp_path: Path) ->
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(limits, "measure", lambda _: replace(right, growth_above=2 * right.growth_above))
         wrong = stability.record(scene, path, ["own:semi-implicit-euler"])
-    assert result.failures(stability.stored(path)) == result.failures(wrong) != []
+    assert stability.stored(path).failures == wrong.failures != []
 
 
 def test_the_atlas_is_read_back_as_it_was(tmp_path: Path) -> None:
@@ -231,7 +231,7 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     # 1,500 parts of one length, and closer ones at the start, where a stiff motion may decay
     assert 1400 < len(t) <= 1501 + 200
     np.testing.assert_allclose(q, exact.true_motion(scene, t / step, step)[0], atol=1e-12)
-    assert trajectories.draw_runs(scene, found.runs, tmp_path, followed=found.followed)
+    assert trajectories.of_runs(scene, found.runs, found.followed)
 
 
 def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
@@ -239,7 +239,7 @@ def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
     session.run(scene, path, methods=["own:euler", "own:implicit-euler"])
     found = drawable(path)
     assert np.max(np.abs(found.runs["own:euler"].q)) > 1e200
-    for name, picture in trajectories.pictures(scene, found.runs, found.followed).items():
+    for name, picture in trajectories.of_runs(scene, found.runs, found.followed).items():
         for axes in picture.axes:
             assert max(np.abs(axes.get_ylim())) <= 1000, name
             assert "outside: explicit Euler at 0.05" in [axes.get_title(loc="right")], name
@@ -254,7 +254,7 @@ def drawn(tmp_path: Path, name: str, *methods: str) -> dict[str, Any]:
     scene, path = scenes.load_scene(name), tmp_path / f"{name}.h5"
     session.run(scene, path, methods=methods)
     found = drawable(path)
-    return trajectories.pictures(scene, found.runs, found.followed)
+    return trajectories.of_runs(scene, found.runs, found.followed)
 
 
 def test_a_line_that_leaves_the_picture_leaves_it_towards_the_next_state(tmp_path: Path) -> None:

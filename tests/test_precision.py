@@ -17,7 +17,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.schemes import SCHEMES
-from springcheck.studies.precision import accuracy, figure, fits, sweeps
+from springcheck.studies.precision import STUDY, accuracy, fits, sweeps
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import POINTS, Point
@@ -320,7 +320,7 @@ def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
     assert np.nanmin(repeats[0]) == mine[0].seconds
     with pytest.raises(StoreError, match="exists"):
         precision.record(scene, labels, path, budget=0.5)
-    written = figure.draw(found, tmp_path)
+    written = STUDY.draw(found, tmp_path)
     assert {file.suffix for file in written} == {".png", ".svg"}
     assert "own:semi-implicit-euler" in (tmp_path / "precision.svg").read_text()
 

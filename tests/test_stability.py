@@ -17,8 +17,7 @@ import pytest
 from springcheck import engines, schemes
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
-from springcheck.studies.stability import costs, limits, propagators, regions, resonance, result
-from springcheck.studies.stability import figure as figures
+from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.propagators import Springs
 
@@ -125,7 +124,7 @@ def test_a_wrong_growth_fails_the_study(need: Need) -> None:
     (limit,) = study.limits
     wrong = replace(study, limits=(replace(limit, growth_above=limit.growth_above * (1 + 1e-4)),))
     assert not wrong.passed
-    assert "growth" in result.failures(wrong)[0]
+    assert "growth" in wrong.failures[0]
 
 
 def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
@@ -134,7 +133,7 @@ def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
         scenes.load_scene("multiple-time-steps"), ["own:semi-implicit-euler", "openmm:mts"]
     )
     damped = stability.measure(scenes.load_scene("overdamped"), ["own:implicit-euler"])
-    written = [path.name for one in (study, damped) for path in figures.draw(one, tmp_path)]
+    written = [path.name for one in (study, damped) for path in STUDY.draw(one, tmp_path)]
     for name in ("limits", "resonances", "regions", "costs-overdamped"):
         assert f"stability-{name}.png" in written
         assert (tmp_path / f"stability-{name}.png").stat().st_size > 10_000

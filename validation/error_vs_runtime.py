@@ -49,7 +49,7 @@ from springcheck import engines
 from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
 from springcheck.studies.choose import choose
-from springcheck.studies.precision import figure, text
+from springcheck.studies.precision import STUDY, text
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.result import PrecisionStudy
 
@@ -82,7 +82,7 @@ def main() -> int:
         study = precision.study(scene, labels, budget=budget)
         for line in text.lines(study):
             console.print(line)
-        for path in figure.draw(study, folder / name):
+        for path in STUDY.draw(study, folder / name):
             console.print(str(path))
         wrong += failures(study)
     for what in wrong:

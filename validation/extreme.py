@@ -32,8 +32,7 @@ import numpy as np
 
 from arguments import arguments
 from springcheck import engines, schemes, simulate
-from springcheck.studies.extremes import figure as figures
-from springcheck.studies.extremes import grid
+from springcheck.studies.extremes import STUDY, grid
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes.judging import Cell
 
@@ -95,7 +94,7 @@ def main() -> int:
         print(f"left out {left.method}: {left.reason}")
     for cell in atlas.wrong:
         print(f"silently wrong: {cell}")
-    for path in figures.draw(atlas, folder):
+    for path in STUDY.draw(atlas, folder):
         print(path)
     wrong = alone(atlas.cells)
     return 0 if atlas.passed and not wrong else 1

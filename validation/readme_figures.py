@@ -13,9 +13,9 @@ from pathlib import Path
 
 from arguments import arguments
 from springcheck import load_scene
-from springcheck.studies.census import figure as orbits
+from springcheck.studies.census import STUDY as CENSUS
 from springcheck.studies.census.measure import measure
-from springcheck.studies.run import figure as trajectories
+from springcheck.studies.run import STUDY as RUN
 from springcheck.studies.run.measure import run, stored
 
 NAMES = ("phase-portrait.png", "census.png")
@@ -28,7 +28,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         report = run(load_scene("spring"), Path(name, "spring.h5"))
         census = measure()
-        drawn = trajectories.draw(stored(report.path), Path(name)) + orbits.draw(census, Path(name))
+        drawn = RUN.draw(stored(report.path), Path(name)) + CENSUS.draw(census, Path(name))
         for path in drawn:
             if path.name in NAMES:
                 (folder / path.name).write_bytes(path.read_bytes())

@@ -26,8 +26,9 @@ import numpy as np
 from arguments import arguments
 from springcheck import load_scene
 from springcheck.checks import compare, judge
+from springcheck.figures.style import save, style
 from springcheck.simulate import run
-from springcheck.studies.run import figure as trajectories
+from springcheck.studies.run.figure import of_runs
 
 METHODS = [
     "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:euler", "openmm:leapfrog",
@@ -72,8 +73,9 @@ def main() -> int:
     verdicts = [verdict for each in runs.values() for verdict in judge(scene, each)]
     failed = [verdict for verdict in verdicts if verdict.passed is False]
     print(f"{sum(v.passed is True for v in verdicts)} verdicts passed, {len(failed)} failed")
-    for path in trajectories.draw_runs(scene, runs, folder):
-        print(path)
+    with style():
+        for name, picture in of_runs(scene, runs, runs).items():
+            print(*save(picture, folder, name), sep="\n")
     return 0 if good and not failed else 1
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from arguments import arguments
 from springcheck.physics import scenefile as scenes
-from springcheck.studies.stability import figure as figures
+from springcheck.studies.stability import STUDY
 from springcheck.studies.stability import measure as stability
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
@@ -45,7 +45,7 @@ def main() -> int:
                 f"{cost.method:28} {cost.ratio:7.0e} {cost.steps:10d} steps {cost.rejected:6d} rejected "
                 f"{cost.force_calls:10d} calls, error {cost.error:.1e}, {cost.outcome}"
             )
-        for path in figures.draw(study, folder):
+        for path in STUDY.draw(study, folder):
             print(path)
     return 0 if passed else 1
 

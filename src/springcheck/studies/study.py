@@ -1,8 +1,8 @@
 """What a study is: a folder with its measure, result, text and figure, and its line in the list of studies.
 
 The folder's `__init__` declares the study and imports nothing heavy; its parts are imported when they are
-used: `measure.perform` and `measure.stored`, `text.lines`, `figure.draw`, and `page.banks` where there are
-charts for the report page.
+used: `measure.perform` and `measure.stored`, `text.lines`, `figure.pictures`, and `page.banks` where there
+are charts for the report page.
 """
 
 from __future__ import annotations
@@ -93,8 +93,11 @@ class Study:
 
     def draw(self, found: Result, folder: Path, **chosen: Any) -> list[Path]:
         """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
-        written: list[Path] = self._part("figure").draw(found, folder, **chosen)
-        return written
+        from springcheck.figures.style import save, style
+
+        with style():
+            pictures = self._part("figure").pictures(found, **chosen)
+            return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
 
     def banks(self, found: Result) -> list[Bank]:
         """Its charts in the report page; none where it has no such part."""

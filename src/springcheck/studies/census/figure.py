@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from springcheck.figures import looks
-from springcheck.figures.style import save, style
 from springcheck.studies.census.result import Census, title
 
 MOST_NAMES = 3
 
 
-def draw(census: Census, folder: Path) -> list[Path]:
-    """Draw the census into a folder; returns the files."""
-    with style():
-        return save(portrait(census), folder, "census")
+def pictures(census: Census) -> dict[str, Figure]:
+    """Its one figure by name."""
+    return {"census": portrait(census)}
 
 
-def portrait(census: Census, axes: Axes | None = None) -> Figure:
+def portrait(census: Census) -> Figure:
     """Orbits in the plane of q and p: one colour and line a scheme, a dot where each orbit ends."""
     figure = Figure(figsize=(9.8, 5.2), layout="constrained")
     axes = figure.add_subplot()

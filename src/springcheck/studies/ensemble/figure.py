@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.style import save, style
 from springcheck.physics.arrays import Floats
 from springcheck.studies.ensemble.measure import OUTCOMES
 from springcheck.studies.ensemble.result import Ensemble
@@ -37,21 +35,18 @@ UNKNOWN = "#bbbbbb"
 OUTCOME_COLORS = ("#9ecae1", "#d94801", "#444444")
 
 
-def draw(
-    found: Ensemble, folder: Path, *, quantity: str | None = None, over: str | None = None
-) -> list[Path]:
-    """Draw error and energy, or one `quantity`, over one or two fields into a folder; returns the files.
+def pictures(found: Ensemble, *, quantity: str | None = None, over: str | None = None) -> dict[str, Figure]:
+    """Error and energy, or one `quantity`, over one or two fields, by name.
 
     SpringcheckError where there is no such quantity or field.
     """
-    written = []
-    with style():
-        for choice in choices(found, quantity, over):
-            shown = dict(parts(found, choice)) if found.path else {}
-            if shown:
-                fields = "" if over is None else "-over-" + "-".join(choice.over)
-                written += save(picture(shown, choice), folder, f"ensemble-{choice.quantity}{fields}")
-    return written
+    out = {}
+    for choice in choices(found, quantity, over):
+        shown = dict(parts(found, choice)) if found.path else {}
+        if shown:
+            fields = "" if over is None else "-over-" + "-".join(choice.over)
+            out[f"ensemble-{choice.quantity}{fields}"] = picture(shown, choice)
+    return out
 
 
 def picture(shown: Mapping[str, Line | Map], choice: Choice) -> Figure:

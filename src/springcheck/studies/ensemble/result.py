@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -104,11 +104,3 @@ class Ensemble:
             }
         )
         return found
-
-
-def summed(method: str, chunks: Sequence[Columns]) -> Tally:
-    """The tally of all chunks of a method."""
-    tally = Tally(method=method, smallest={}, largest={})
-    for chunk in chunks:
-        tally = tally.plus(chunk)
-    return tally

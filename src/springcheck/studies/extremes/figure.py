@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import textwrap
-from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from springcheck.figures.style import save, style
 from springcheck.physics.arrays import Floats
 from springcheck.studies.extremes.planes import planes
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
@@ -23,12 +21,9 @@ RARE = "not measured"
 """It stands in the legend only where there is one."""
 
 
-def draw(atlas: Atlas, folder: Path) -> list[Path]:
-    """Draw the atlas into a folder; returns the files, none where no method of fixed step was tried."""
-    if not planes(atlas.cells):
-        return []
-    with style():
-        return save(picture(atlas), folder, "extremes")
+def pictures(atlas: Atlas) -> dict[str, Figure]:
+    """Its one figure by name, none where no method of fixed step was tried."""
+    return {"extremes": picture(atlas)} if planes(atlas.cells) else {}
 
 
 def picture(atlas: Atlas) -> Figure:

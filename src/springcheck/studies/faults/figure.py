@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from matplotlib.figure import Figure
 
-from springcheck.figures.style import save, style
 from springcheck.studies.faults.result import FaultReport
 
 MARKERS = "os^DvPX*<>"
 
 
-def draw(found: FaultReport, folder: Path) -> list[Path]:
-    """Draw the detection limits into a folder; returns the files."""
-    if not any(result.limits for result in found.results):
-        return []
-    with style():
-        return save(limits(found), folder, "faults")
+def pictures(found: FaultReport) -> dict[str, Figure]:
+    """The detection limits, where there are any, by name."""
+    return {"faults": limits(found)} if any(result.limits for result in found.results) else {}
 
 
 def limits(found: FaultReport) -> Figure:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.style import save, style
 from springcheck.studies.precision.result import PrecisionStudy
 
 Document = Mapping[str, Any]
@@ -22,13 +20,10 @@ ROOM = 30.0
 """Errors above this are left of the picture: nothing is read off them."""
 
 
-def draw(study: PrecisionStudy, folder: Path) -> list[Path]:
-    """Draw a study, fresh or stored, into a folder; returns the files."""
+def pictures(study: PrecisionStudy) -> dict[str, Figure]:
+    """The one figure of a study, fresh or stored, by name; none where it has no errors."""
     document = study.document()
-    if not any(point["max_error"] for point in document["points"]):
-        return []
-    with style():
-        return save(picture(document), folder, "precision")
+    return {"precision": picture(document)} if any(x["max_error"] for x in document["points"]) else {}
 
 
 def picture(document: Document) -> Figure:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +10,6 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.style import save, style
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
@@ -22,21 +20,18 @@ ROOM = 30.0
 """Errors above this say nothing."""
 
 
-def draw(study: Stability, folder: Path) -> list[Path]:
-    """Draw what was measured into a folder; returns the files."""
-    written = []
-    with style():
-        if study.limits:
-            written += save(
-                limits(study.limits, abs(study.scene.step) * study.fastest), folder, "stability-limits"
-            )
-        if study.regions:
-            written += save(regions(study.regions), folder, "stability-regions")
-        if study.resonances:
-            written += save(resonances(study.resonances), folder, "stability-resonances")
-        if study.costs:
-            written += save(costs(study.costs), folder, f"stability-costs-{study.scene.name}")
-    return written
+def pictures(study: Stability) -> dict[str, Figure]:
+    """Figures of what was measured, by name."""
+    out = {}
+    if study.limits:
+        out["stability-limits"] = limits(study.limits, abs(study.scene.step) * study.fastest)
+    if study.regions:
+        out["stability-regions"] = regions(study.regions)
+    if study.resonances:
+        out["stability-resonances"] = resonances(study.resonances)
+    if study.costs:
+        out[f"stability-costs-{study.scene.name}"] = costs(study.costs)
+    return out
 
 
 def limits(found: Sequence[Limit], fastest: float | None = None) -> Figure:

@@ -49,7 +49,7 @@ class Stability:
     @property
     def passed(self) -> bool:
         """Whether limits, growth, regions and bands are where theory puts them, and any was measured."""
-        return bool(self.limits) and not failures(self)
+        return bool(self.limits) and not self.failures
 
     @property
     def status(self) -> Literal[0, 1]:
@@ -57,9 +57,43 @@ class Stability:
         return 0 if self.passed else 1
 
     @property
+    def failures(self) -> list[str]:
+        """What is not where theory puts it, one sentence each."""
+        out = []
+        for x in self.limits:
+            if not x.agrees:
+                out.append(f"{x.method}: limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}")
+            if np.isfinite(x.theory):
+                off = abs(x.growth_above / x.growth_predicted - 1)
+                if not off <= growth_allowed(x):
+                    out.append(
+                        f"{x.method}: growth {x.growth_above:.9g} a step, predicted {x.growth_predicted:.9g}"
+                    )
+            if np.isfinite(x.growth_below) and not x.growth_below <= max(x.growth_below_predicted, 0) + 1e-4:
+                out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
+        out += [
+            f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory"
+            for x in self.regions
+            if x.wrong
+        ]
+        for y in self.resonances:
+            if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
+                out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
+        return out
+
+    @property
     def sentences(self) -> list[str]:
         """What was found beside the table of limits, in sentences."""
-        return sentences(self)
+        out = [
+            f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
+            f"{x.wrong} against theory; radii within {x.off:.2f} of what rounding allows"
+            for x in self.regions
+        ]
+        for y in self.resonances:
+            bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in y.bands)
+            out.append(f"{y.method}: grows at h w_fast from {bands}; the exact map agrees to {_apart(y):.1e}")
+        out += self.failures
+        return out
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
@@ -80,7 +114,7 @@ class Stability:
                 "resonances": [_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
                 "costs": self.costs,
                 "left_out": self.left_out,
-                "failures": failures(self),
+                "failures": self.failures,
             }
         )
         return found
@@ -134,45 +168,6 @@ def growth_allowed(limit: Limit) -> float:
     if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED:
         return GROWTH
     return GROWTH + 0.5 * limit.bound / (limit.theory * limits.NEXT)
-
-
-def failures(study: Stability) -> list[str]:
-    """What is not where theory puts it, one sentence each."""
-    out = []
-    for x in study.limits:
-        if not x.agrees:
-            out.append(f"{x.method}: limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}")
-        if np.isfinite(x.theory):
-            off = abs(x.growth_above / x.growth_predicted - 1)
-            if not off <= growth_allowed(x):
-                out.append(
-                    f"{x.method}: growth {x.growth_above:.9g} a step, predicted {x.growth_predicted:.9g}"
-                )
-        if np.isfinite(x.growth_below) and not x.growth_below <= max(x.growth_below_predicted, 0) + 1e-4:
-            out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
-    out += [
-        f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory"
-        for x in study.regions
-        if x.wrong
-    ]
-    for y in study.resonances:
-        if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
-            out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
-    return out
-
-
-def sentences(study: Stability) -> list[str]:
-    """What was found beside the table of limits, in sentences."""
-    out = [
-        f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
-        f"{x.wrong} against theory; radii within {x.off:.2f} of what rounding allows"
-        for x in study.regions
-    ]
-    for y in study.resonances:
-        bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in y.bands)
-        out.append(f"{y.method}: grows at h w_fast from {bands}; the exact map agrees to {_apart(y):.1e}")
-    out += failures(study)
-    return out
 
 
 def _apart(x: Resonance) -> float:
