@@ -15,7 +15,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import exact as solutions
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
+from springcheck.trajectory import Comparison, Outcome, Trajectory, Verdict
 
 if TYPE_CHECKING:
     from springcheck.identify.result import Identification
@@ -146,8 +146,6 @@ def exact(scene: Scene | str | Path) -> Trajectory:
         step=found.step,
         every=found.every,
         outcome=Outcome(status="complete", step=found.steps),
-        timing=Timing(start=0.0, run=0.0),
-        force_calls=0,
     )
 
 

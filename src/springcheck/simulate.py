@@ -6,7 +6,7 @@ The engine only moves.  Clock, chunks, energies, progress and divergence are kep
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal, Protocol
 
@@ -16,7 +16,7 @@ from springcheck import engines
 from springcheck.engines.contract import Label, Simulation, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics import memory
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.trajectory import Outcome, Timing, Trajectory
 
@@ -46,25 +46,6 @@ Progress = Callable[[int], None]
 """Called with the number of steps done since the last call."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Record:
-    """What is known of a run apart from its frames."""
-
-    label: Label
-    scheme: str
-    step: float
-    every: int
-    tolerance: float | None
-    outcome: Outcome
-    timing: Timing
-    force_calls: int
-    arithmetic: Arithmetic
-    rebuilds_velocity: bool
-    off_axis: float | None
-    """Largest |y| or |z| seen, for engines in three dimensions."""
-    origin: dict[str, str]
-
-
 TINY = float(np.finfo(np.float64).smallest_normal)
 SUBNORMAL = (
     f"it has decayed below {TINY:.1e}: numbers are subnormal there, with fewer and fewer digits, and a "
@@ -74,8 +55,8 @@ SUBNORMAL = (
 
 def play(
     scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None, planned: int = 0
-) -> Record:
-    """Run a scene and hand every recorded frame, the start first, to `sink`.
+) -> Trajectory:
+    """Run a scene and hand every recorded frame, the start first, to `sink`; returns the run without frames.
 
     Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
     through.  For `planned` see `bare`.
@@ -120,9 +101,12 @@ def play(
             break
         if 0 < max(np.max(np.abs(q[f - 1])), np.max(np.abs(p[f - 1]))) < TINY:
             outcome = Outcome(status="complete", step=scene.steps, message=SUBNORMAL)
-    return Record(
-        label=label,
+    return Trajectory(
+        label=str(label),
         scheme=method.scheme,
+        t=np.empty(0),
+        q=np.empty((0, scene.n)),
+        p=np.empty((0, scene.n)),
         step=scene.step,
         every=scene.every,
         tolerance=scene.tolerance if method.adaptive else None,
@@ -224,34 +208,11 @@ class Gather:
             self._energy[a:b] = energy
         self._frames = b
 
-    def trajectory(self, record: Record) -> Trajectory:
-        """The frames with what is known of the run."""
+    def onto(self, run: Trajectory) -> Trajectory:
+        """The run with these frames."""
         f = self._frames
-        return trajectory(
-            record, self._t[:f], self._q[:f], self._p[:f], None if self._energy is None else self._energy[:f]
-        )
-
-
-def trajectory(record: Record, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> Trajectory:
-    """A trajectory, or a piece of one, of a recorded run."""
-    return Trajectory(
-        label=str(record.label),
-        scheme=record.scheme,
-        t=t,
-        q=q,
-        p=p,
-        energy=energy,
-        step=record.step,
-        every=record.every,
-        outcome=record.outcome,
-        timing=record.timing,
-        force_calls=record.force_calls,
-        tolerance=record.tolerance,
-        arithmetic=record.arithmetic,
-        rebuilds_velocity=record.rebuilds_velocity,
-        off_axis=record.off_axis,
-        origin=record.origin,
-    )
+        energy = None if self._energy is None else self._energy[:f]
+        return replace(run, t=self._t[:f], q=self._q[:f], p=self._p[:f], energy=energy)
 
 
 def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) -> Trajectory:
@@ -266,7 +227,7 @@ def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) 
     """
     label = engines.parse(method) if isinstance(method, str) else method
     gather = Gather(scene)
-    return gather.trajectory(play(scene, label, gather, progress=progress))
+    return gather.onto(play(scene, label, gather, progress=progress))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,8 +26,8 @@ class Outcome:
 class Timing:
     """Seconds of wall clock: `start` until the engine stands ready, `run` inside `advance` alone."""
 
-    start: float
-    run: float
+    start: float = 0.0
+    run: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,8 +42,8 @@ class Trajectory:
     step: float
     every: int
     outcome: Outcome
-    timing: Timing
-    force_calls: int
+    timing: Timing = Timing()
+    force_calls: int = 0
     tolerance: float | None = None
     """Relative tolerance per step; None for a method of fixed step."""
     energy: Floats | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,10 @@ from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
+from springcheck.studies import keeper
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
-from springcheck.trajectory import Outcome, Timing, Trajectory, Verdict
+from springcheck.trajectory import Outcome, Trajectory, Verdict
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
@@ -51,17 +52,16 @@ class Judgement:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "file": str(self.path), "scene": self.scene, "scheme": self.scheme, "frames": self.frames,
-            "notes": list(self.notes), "not_judged": self.not_judged,
-            "verdicts": [
-                {
-                    "check": v.check, "value": _finite(v.value), "bound": _finite(v.bound), "unit": v.unit,
-                    "passed": v.passed, "why": v.why, "sees": asdict(v.sees),
-                }
-                for v in self.verdicts
-            ],
-        }  # fmt: skip
+        names = ("check", "value", "bound", "unit", "passed", "why", "sees")
+        return keeper.document(
+            file=self.path,
+            scene=self.scene,
+            scheme=self.scheme,
+            frames=self.frames,
+            notes=self.notes,
+            not_judged=self.not_judged,
+            verdicts=[{name: getattr(v, name) for name in names} for v in self.verdicts],
+        )
 
     def lines(self) -> Lines:
         """The report as text."""
@@ -84,10 +84,6 @@ class Judgement:
             ),
             *([plain(NOT_JUDGED, "bold yellow")] if self.not_judged else ()),
         ]
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None
 
 
 def judge(
@@ -238,7 +234,6 @@ def as_trajectory(
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
-        timing=Timing(start=0.0, run=0.0), force_calls=0,
         arithmetic=Arithmetic(name="as written", state=states.roundoff),
     )  # fmt: skip
     return judged, run, tuple(notes)

@@ -112,27 +112,24 @@ def document(found: Found) -> dict[str, Any]:
     shown = frames and {
         "label": frames.label, "stride": found.stride, "t": frames.t, "q": frames.q, "p": frames.p,
     }  # fmt: skip
-    out: dict[str, Any] = keeper.plain(
-        {
-            "store": summary.path,
-            "bytes": summary.size,
-            "complete": summary.complete,
-            "root": summary.root,
-            "trajectories": [
-                {
-                    "label": run.label,
-                    "frames": run.frames,
-                    "particles": run.n,
-                    "quantities": run.quantities,
-                    "parameters": run.parameters,
-                }
-                for run in summary.runs
-            ],
-            "tables": summary.tables,
-            "measured_on": keeper.who(summary.path),
-            "studies": documents,
-            **kept,
-            "trajectory": shown,
-        }
+    return keeper.document(
+        store=summary.path,
+        bytes=summary.size,
+        complete=summary.complete,
+        root=summary.root,
+        trajectories=[
+            {
+                "label": run.label,
+                "frames": run.frames,
+                "particles": run.n,
+                "quantities": run.quantities,
+                "parameters": run.parameters,
+            }
+            for run in summary.runs
+        ],
+        tables=summary.tables,
+        measured_on=keeper.who(summary.path),
+        studies=documents,
+        **kept,
+        trajectory=shown,
     )
-    return out

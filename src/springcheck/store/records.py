@@ -20,6 +20,17 @@ Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 Message = Annotated[str, msgspec.Meta(max_length=1 << 20)]
 _DOUBLE = Arithmetic()
+_ARITHMETIC = {
+    "arithmetic": "name",
+    "state_roundoff": "state",
+    "force_roundoff": "force",
+    "force_quantum": "quantum",
+    "force_overflow": "overflow",
+    "parameter_precision": "parameters",
+    "force_excess": "excess",
+    "keeps_displacement": "keeps_displacement",
+}
+"""Attributes, and the fields of `Arithmetic` that they keep."""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,7 +85,6 @@ def record(place: str, known: Mapping[str, Any]) -> Record:
 
 def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
     """What `Draft.finish` stores of a trajectory besides its numbers, which are not looked at."""
-    a = trajectory.arithmetic
     origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
     return {
         "method": trajectory.label,
@@ -88,14 +98,7 @@ def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
         "run_seconds": trajectory.timing.run,
         "force_calls": trajectory.force_calls,
         "tolerance": trajectory.tolerance,
-        "arithmetic": a.name,
-        "state_roundoff": a.state,
-        "force_roundoff": a.force,
-        "force_quantum": a.quantum,
-        "force_overflow": a.overflow,
-        "parameter_precision": a.parameters,
-        "force_excess": a.excess,
-        "keeps_displacement": a.keeps_displacement,
+        **{name: getattr(trajectory.arithmetic, field) for name, field in _ARITHMETIC.items()},
         "rebuilds_velocity": trajectory.rebuilds_velocity,
         "off_axis": trajectory.off_axis,
         **origin,
@@ -120,16 +123,7 @@ def trajectory(
         timing=Timing(start=x.start_seconds, run=x.run_seconds),
         force_calls=x.force_calls,
         tolerance=x.tolerance,
-        arithmetic=Arithmetic(
-            name=x.arithmetic,
-            state=x.state_roundoff,
-            force=x.force_roundoff,
-            quantum=x.force_quantum,
-            overflow=x.force_overflow,
-            parameters=x.parameter_precision,
-            excess=x.force_excess,
-            keeps_displacement=x.keeps_displacement,
-        ),
+        arithmetic=Arithmetic(**{field: getattr(x, name) for name, field in _ARITHMETIC.items()}),
         rebuilds_velocity=x.rebuilds_velocity,
         off_axis=x.off_axis,
         origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from springcheck import engines, simulate, store
+from springcheck import engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
@@ -201,10 +201,9 @@ class Draft:
         self._draft = draft
         self.append = draft.append
 
-    def finish(self, record: simulate.Record) -> str:
-        """Keep it, with what is known of the run -> digest."""
-        empty = np.empty(0)
-        return self._draft.finish(store.attributes(simulate.trajectory(record, empty, empty, empty, None)))
+    def finish(self, run: Trajectory) -> str:
+        """Keep it, with what is known of the run besides its frames -> digest."""
+        return self._draft.finish(store.attributes(run))
 
 
 @contextmanager
@@ -304,6 +303,11 @@ def command(study: str, labels: Sequence[Label], *options: str) -> str:
 def plain(data: Any) -> Any:
     """Results as plain data for JSON: dataclasses are objects, arrays lists; no finite number is None."""
     return msgspec.json.decode(msgspec.json.encode(data, enc_hook=_plain))
+
+
+def document(**named: Any) -> dict[str, Any]:
+    """Named results as plain data for JSON (see `plain`)."""
+    return {name: plain(value) for name, value in named.items()}
 
 
 def _plain(value: Any) -> Any:

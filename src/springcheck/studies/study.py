@@ -69,18 +69,16 @@ class Study:
         return found
 
     def lines(self, found: Result, options: Namespace | None = None, path: Path | None = None) -> Lines:
-        """The report as text; without options the one that `inspect` shows.
-
-        `path` is its store, where the result does not say.
-        """
+        """The report as text; with the `path` of its store the one that `inspect` shows."""
         lines: Lines = self._part("text").lines(found, options)
-        path = path or getattr(found, "path", None)
-        if path is None or self.trajectories:
+        where: Path | None = path or getattr(found, "path", None)
+        if self.trajectories or where is None:
             return lines
         from springcheck.studies import keeper
         from springcheck.text.lines import plain
 
-        return [*lines, *map(plain, keeper.who(path))]
+        said = [] if path else [f"Stored in {where}"]
+        return [*lines, *map(plain, [*said, *keeper.who(where)])]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -86,12 +86,13 @@ class Census:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the orbits are in the tables of the store."""
-        rows = []
-        for entry in self.entries:
-            row = keeper.plain(entry)
-            rows.append({key: value for key, value in row.items() if key not in ("q", "p")})
-            rows[-1]["partners"] = list(self.partners[entry.method])
-        return {"entries": rows, "left_out": keeper.plain(self.left_out)}
+        names = [field.name for field in fields(Entry) if field.name not in ("q", "p")]
+        partners = self.partners
+        rows = [
+            {**{name: getattr(x, name) for name in names}, "partners": partners[x.method]}
+            for x in self.entries
+        ]
+        return keeper.document(entries=rows, left_out=self.left_out)
 
 
 def title(name: str) -> str:

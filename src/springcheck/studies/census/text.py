@@ -36,7 +36,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
         if not x.agrees
     ]
     out += left_out(census.left_out)
-    return [*out, plain(f"Stored in {census.path}")] if census.path else out
+    return out
 
 
 def _row(x: Entry, partners: tuple[str, ...]) -> Row:

@@ -11,7 +11,7 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import Table, plain
+from springcheck.studies.keeper import Table, document
 from springcheck.studies.tables import Form
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
@@ -94,13 +94,10 @@ class Ensemble:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the cells are in the tables."""
-        found: dict[str, Any] = plain(
-            {
-                "scene": self.scene.name,
-                "fields": self.fields,
-                "grid": self.grid,
-                "methods": self.tallies,
-                "left_out": self.left_out,
-            }
+        return document(
+            scene=self.scene.name,
+            fields=self.fields,
+            grid=self.grid,
+            methods=self.tallies,
+            left_out=self.left_out,
         )
-        return found

@@ -30,7 +30,7 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
         ),
         *left_out(found.left_out),
     ]
-    return [*out, plain(f"Stored in {found.path}")] if found.path else out
+    return out
 
 
 def _span(tally: Tally, name: str) -> tuple[str, str]:

@@ -21,7 +21,7 @@ from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.tables import column
-from springcheck.trajectory import Timing, Trajectory
+from springcheck.trajectory import Trajectory
 
 Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"
@@ -232,8 +232,6 @@ def as_trajectory(label: Label, scene: Scene, q: Floats, p: Floats, how: Arithme
         step=scene.step,
         every=scene.every,
         outcome=trajectory.Outcome(status="complete", step=scene.steps),
-        timing=Timing(start=0.0, run=0.0),
-        force_calls=0,
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.extremes.judging import Cell, Outcome
-from springcheck.studies.keeper import plain
+from springcheck.studies.keeper import document
 from springcheck.studies.tables import Rows
 
 
@@ -59,16 +59,13 @@ class Atlas:
 
     def document(self, *, cells: bool = True) -> dict[str, Any]:
         """Plain data for JSON; in a store the tables hold the cells, and hold them exactly."""
-        found: dict[str, Any] = plain(
-            {
-                "passed": self.passed,
-                "counts": self.counts(),
-                **({"cells": self.cells} if cells else {}),
-                "windows": self.windows,
-                "left_out": self.left_out,
-            }
+        return document(
+            passed=self.passed,
+            counts=self.counts(),
+            **({"cells": self.cells} if cells else {}),
+            windows=self.windows,
+            left_out=self.left_out,
         )
-        return found
 
 
 def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:

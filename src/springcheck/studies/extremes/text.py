@@ -41,4 +41,4 @@ def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:
         plain(verdict, "bold red" if wrong else "bold green"),
         *left_out(atlas.left_out),
     ]
-    return [*out, plain(f"Stored in {atlas.path}")] if atlas.path else out
+    return out

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from springcheck.studies.keeper import Kept, plain
+from springcheck.studies.keeper import Kept, document
 from springcheck.studies.tables import Rows
 
 
@@ -55,15 +55,13 @@ class FaultReport:
     def document(self) -> dict[str, Any]:
         """As one JSON document."""
         names = ("name", "about", "size", "rejected_by", "missed_by")
-        found: dict[str, Any] = {
-            "faults": [{name: getattr(result, name) for name in names} for result in self.results],
-            "limits": {result.name: result.limits for result in self.results if result.limits},
-            "clean_runs": self.clean.runs,
-            "clean_verdicts": self.clean.verdicts,
-            "false_alarms": self.clean.alarms,
-        }
-        document: dict[str, Any] = plain(found)
-        return document
+        return document(
+            faults=[{name: getattr(result, name) for name in names} for result in self.results],
+            limits={result.name: result.limits for result in self.results if result.limits},
+            clean_runs=self.clean.runs,
+            clean_verdicts=self.clean.verdicts,
+            false_alarms=self.clean.alarms,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

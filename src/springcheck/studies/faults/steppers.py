@@ -14,7 +14,7 @@ from springcheck import schemes
 from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.schemes.stepping import Slope
-from springcheck.trajectory import Outcome, Timing, Trajectory
+from springcheck.trajectory import Outcome, Trajectory
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]
@@ -99,7 +99,6 @@ def trajectory(
         step=scene.step,
         every=scene.every,
         outcome=Outcome(status="complete" if f == scene.frames else "diverged", step=(f - 1) * scene.every),
-        timing=Timing(start=0.0, run=0.0),
         force_calls=scene.steps if calls is None else calls,
         tolerance=tolerance,
         arithmetic=arithmetic or Arithmetic(),

@@ -39,4 +39,4 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
             f"{count(clean.verdicts, 'verdict')}, {count(len(clean.alarms), 'false alarm')}"
         ),
     ]
-    return [*out, plain(f"Stored in {found.path}")] if found.path else out
+    return out

@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import Table, plain
+from springcheck.studies.keeper import Table, document
 from springcheck.studies.precision.fits import Condition
 from springcheck.studies.precision.points import Point
 
@@ -92,20 +92,17 @@ class PrecisionStudy:
 
     def document(self) -> dict[str, Any]:
         """The study as plain data for JSON; what is not known is None."""
-        found: dict[str, Any] = plain(
-            {
-                "scene": self.scene.name,
-                "budget_seconds": self.budget,
-                "seconds": self.seconds,
-                "machine": self.machine,
-                "clock_seconds": self.tick,
-                "points": [point.document() for point in self.points],
-                "methods": [_method(method) for method in self.methods],
-                "front": [{"method": p.method, "step": p.step, "tolerance": p.tolerance} for p in self.front],
-                "cheapest": [_answer(answer) for answer in self.cheapest],
-            }
+        return document(
+            scene=self.scene.name,
+            budget_seconds=self.budget,
+            seconds=self.seconds,
+            machine=self.machine,
+            clock_seconds=self.tick,
+            points=[point.document() for point in self.points],
+            methods=[_method(method) for method in self.methods],
+            front=[{"method": p.method, "step": p.step, "tolerance": p.tolerance} for p in self.front],
+            cheapest=[_answer(answer) for answer in self.cheapest],
         )
-        return found
 
     def summary(self) -> Table:
         """The table of the methods, for readers of the file."""

@@ -48,7 +48,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     if getattr(options, "points", False):
         out += [plain(), _points(study.points)]
     out += left_out(study.left_out)
-    return [*out, plain(f"Stored in {study.path}")] if study.path else out
+    return out
 
 
 def _methods(methods: Sequence[MethodSummary]) -> Table:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from springcheck import simulate
-from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, nearest
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import Draft
 from springcheck.studies.run.result import FAULT
-from springcheck.trajectory import Trajectory
 
 MOST_NUMBERS = 10**7
 """Of one trajectory: a fault is recorded in memory, by loops in Python."""
@@ -50,24 +47,8 @@ class Broken:
             ) from error
         energy = made.energy if "energy" in scene.quantities else None
         draft.append(made.t, made.q, made.p, energy)
-        draft.finish(_record(made, self))
-
-
-def _record(made: Trajectory, broken: Broken) -> simulate.Record:
-    return simulate.Record(
-        label=Label(engine=FAULT, method=broken.fault.name),
-        scheme=made.scheme,
-        step=made.step,
-        every=made.every,
-        tolerance=made.tolerance,
-        outcome=made.outcome,
-        timing=made.timing,
-        force_calls=made.force_calls,
-        arithmetic=made.arithmetic,
-        rebuilds_velocity=made.rebuilds_velocity,
-        off_axis=made.off_axis,
-        origin={"engine": "broken on purpose", "method": broken.about, "velocity": "as it says"},
-    )
+        origin = {"engine": "broken on purpose", "method": self.about, "velocity": "as it says"}
+        draft.finish(replace(made, origin=origin))
 
 
 def broken(text: str) -> Broken:

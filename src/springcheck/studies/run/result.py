@@ -12,7 +12,7 @@ from springcheck import checks
 from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import plain
+from springcheck.studies.keeper import document
 from springcheck.text.wording import count
 from springcheck.trajectory import Comparison, Verdict
 
@@ -86,21 +86,18 @@ class Report:
 
     def document(self) -> dict[str, Any]:
         """The report as plain data for JSON."""
-        found: dict[str, Any] = plain(
-            {
-                "scene": self.scene.name,
-                "store": self.path,
-                "runs": self.runs,
-                "judged_frames": self.judged_frames,
-                "left_out": self.left_out,
-                "verdicts": self.verdicts,
-                "not_judged": self.not_judged,
-                "comparison": self.comparison,
-                "same_motion": self.same,
-                "faults": dict(self.faults),
-            }
+        return document(
+            scene=self.scene.name,
+            store=self.path,
+            runs=self.runs,
+            judged_frames=self.judged_frames,
+            left_out=self.left_out,
+            verdicts=self.verdicts,
+            not_judged=self.not_judged,
+            comparison=self.comparison,
+            same_motion=self.same,
+            faults=dict(self.faults),
         )
-        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,8 +128,7 @@ class Repeats:
 
     def document(self) -> dict[str, Any]:
         """Repetitions as plain data for JSON."""
-        found: dict[str, Any] = plain(self)
-        return found
+        return document(repeats=self.repeats)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -158,4 +154,4 @@ class Stored:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {"verdicts": plain(self.verdicts)}
+        return document(verdicts=self.verdicts)

@@ -12,7 +12,7 @@ from rich.text import Text
 from springcheck import checks, schemes
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
-from springcheck.studies.ensemble import text as ensemble
+from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
@@ -24,7 +24,7 @@ from springcheck.trajectory import Comparison, Limits, Verdict
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
     """What `springcheck run` says, what `run --from` says, and what `inspect` says of a stored run."""
     if isinstance(found, Ensemble):
-        return ensemble.lines(found, options)
+        return ENSEMBLE.lines(found, options)
     verdicts = getattr(options, "verdicts", False)
     if isinstance(found, Repeats):
         return [_repeat(one) for one in found.repeats]

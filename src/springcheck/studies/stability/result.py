@@ -12,7 +12,7 @@ from springcheck.errors import SceneError
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import plain
+from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
@@ -97,27 +97,24 @@ class Stability:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
-        found: dict[str, Any] = plain(
-            {
-                "scene": self.scene.name,
-                "passed": self.passed,
-                "fastest": self.fastest,
-                "h_w": abs(self.scene.step) * self.fastest,
-                "methods": [_limit(limit) for limit in self.limits],
-                "regions": [
-                    {
-                        "stable": np.count_nonzero(x.stable),
-                        **_named(x, "method", "points", "wrong", "undecided", "off"),
-                    }
-                    for x in self.regions
-                ],
-                "resonances": [_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
-                "costs": self.costs,
-                "left_out": self.left_out,
-                "failures": self.failures,
-            }
+        return document(
+            scene=self.scene.name,
+            passed=self.passed,
+            fastest=self.fastest,
+            h_w=abs(self.scene.step) * self.fastest,
+            methods=[_limit(limit) for limit in self.limits],
+            regions=[
+                {
+                    "stable": np.count_nonzero(x.stable),
+                    **_named(x, "method", "points", "wrong", "undecided", "off"),
+                }
+                for x in self.regions
+            ],
+            resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
+            costs=self.costs,
+            left_out=self.left_out,
+            failures=self.failures,
         )
-        return found
 
 
 def _named(found: Any, *names: str) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         out += [table(titles, costs, left=("method", "outcome")), plain()]
     out += [plain(line) for line in study.sentences]
     out += left_out(study.left_out)
-    return [*out, plain(f"Stored in {study.path}")] if study.path else out
+    return out
 
 
 def _of_scene(study: Stability) -> Lines:
