@@ -91,6 +91,19 @@ _spec.loader.exec_module(census)
         (38303, "cause named"),
         (35151, "cause named"),
         (100290, "error seen"),
+        # friction takes the phase of a step beyond the largest that it has without
+        (32607, "named"),
+        (36207, "named"),
+        (32421, "named"),
+        # steps in which large terms cancel round by the size of these
+        (104125, "named"),
+        (103280, "named"),
+        (113587, "named"),
+        # a velocity that is added up in substeps
+        (31924, "named"),
+        # what the roundings of one scheme explain they explain of another with the same map
+        (118302, "not told apart"),
+        (105363, "not told apart"),
     ],
 )
 def test_what_was_wrong_once_is_right(number: int, said: str) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 
 from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
-from springcheck.identify.maps import table
+from springcheck.identify.maps import power, table
 from springcheck.identify.match import Match
 from springcheck.identify.orbit import powers
 from springcheck.identify.record import Record
@@ -40,6 +40,8 @@ class Defect:
     ulp: float
     precision: str
     note: str = ""
+    miss: float = 0.0
+    """How far it falls short, as a share of the state."""
     certain: bool = True
     """Whether the arithmetic itself shows, and not only an error of its size."""
 
@@ -83,6 +85,33 @@ def _slipped(
     return np.asarray(out.reshape(-1, 2, 2))
 
 
+def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
+    """Sums (c, 2, 2) of the sizes of all that a step adds up, and what a frame's first step adds up to at
+    its end, in the frame of `found`."""
+    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
+    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
+    a, g, log_mass, stride = (
+        np.array([getattr(match, name) for match in matches], np.float64)
+        for name in ("a", "g", "log_mass", "stride")
+    )
+    every = table(families)
+    step = every.sums(which, a, g)
+    first = step
+    if np.any(stride > 1):
+        first = np.abs(power(every.unit(which, a, g), stride - 1)) @ step
+    up = np.exp(-log_mass) / stride * float(found.size[1] / found.size[0])
+    scale = np.ones((len(up), 2, 2))
+    scale[:, 0, 1], scale[:, 1, 0] = up, 1 / up
+    return step * scale, first * scale
+
+
+def _substeps(match: Match) -> int:
+    """Substeps of a step whose force is held, 1 of any other."""
+    if not FAMILIES[match.family].held:
+        return 1
+    return substeps(match.g, match.g_error + G_ROUNDING)[0] or 1
+
+
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     """Most that unlike steps within a frame, of which the clock shows the sum alone, do to it (c, f - 1, 2).
 
@@ -121,11 +150,12 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     signed = _misses(matches, found, found.slips).astype(np.float64)
     missing = np.abs(signed)
     b = np.abs(np.array([match.predicted for match in matches]).reshape(-1, 2, 2)).astype(np.float64)
+    step, first = _sums(matches, found)
     stride = np.array([float(match.stride) for match in matches])
     # a force is that of the whole position, whose rounding it carries into the velocity
-    at = centre + b @ centre
+    at = centre + np.maximum(step, first) @ centre
     # sums of absolute values: what a rounding of either term is relative to
-    size = np.abs(z[:-1]) @ np.swapaxes(b, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
+    size = np.abs(z[:-1]) @ np.swapaxes(first, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
     # states between two frames lie on the same orbit: either component may be as large as the whole
     lengths = np.sqrt(np.sum(z**2, axis=1))
     size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * (lengths[:-1] + lengths[1:])[:, None]
@@ -143,7 +173,8 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     difference = np.zeros_like(size)
     difference[:, :, 1] = 2 * ratio[:, None] * position
-    path = stride * [4 if scheme.flow else scheme.path for scheme in schemes]
+    steps = stride * [_substeps(match) for match in matches]
+    path = steps * [4 if scheme.flow else scheme.path for scheme in schemes]
     ulp = _largest(missing, 2.0**-52 * size)
     follows = np.full(len(matches), found.slips is not None)
     if record.slips is not None and found.slips is None:
@@ -155,7 +186,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         missing = np.abs(signed)
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
-    usual = 4 + 2 * np.sqrt(stride)
+    usual = 4 + 2 * np.sqrt(steps)
     rounded = ulp
     if record.slips is not None and np.any(stride > 1):
         rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
@@ -173,9 +204,10 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
         rebuilt = (size + difference) * path[:, None, None]
         # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
-        slack = 1 + 10 / np.sqrt(len(z))
-        stored = _largest(missing, slack * half + 2.0**-52 * rebuilt) <= 1
-        coarse_file = _largest(missing, slack * half + 2.0**-24 * rebuilt) <= 1
+        half = (1 + 10 / np.sqrt(len(z))) * half
+        stored = _largest(missing, half + 2.0**-52 * rebuilt) <= 1
+        coarse_file = _largest(missing, half + 2.0**-24 * rebuilt) <= 1
+    share = _largest(missing, np.repeat(lengths[None, :-1, None], 2, axis=2))
     out = []
     for i, match in enumerate(matches):
         precision, note, certain = "", "", True
@@ -195,7 +227,8 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
             texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
             # one orbit, rounded once, leaves no room for more than that
             precision = texts[0] if texts else "" if found.once else "single"
-        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, certain=certain))
+        miss = float(share[i])
+        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, miss=miss, certain=certain))
     return out
 
 

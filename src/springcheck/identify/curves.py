@@ -2,18 +2,21 @@
 
 Without friction a family is a curve over its phase.  A map that turns has one phase for each number of steps
 and of unseen turns, so the entries of its root and those of the curve there can be compared at once, for
-all families and roots.  With friction a map of the same phase differs from the curve by the order of g.
+all families and roots.  With friction a map of the same phase differs from the curve by the order of g; where
+the phase has a largest value, which friction exceeds, there are curves of some frictions beside it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import unit
 from springcheck.physics.arrays import Floats, Integers
@@ -38,6 +41,12 @@ critical damping: 1.7."""
 
 END = 0.05
 """Room beside the end of a curve."""
+
+FRICTIONS = 0.1, 0.2, 0.3, 0.4
+"""Values of g that have curves of their own where the phase without friction turns back."""
+
+BETWEEN = 0.3
+"""Change of the log of the determinant up to which such a curve is looked at."""
 
 SMALL = 0.05
 """Size below which an entry is not asked to agree relatively."""
@@ -80,18 +89,45 @@ def _steps(strides: range) -> tuple[Floats, Floats]:
     return s, np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
 
 
+Key: TypeAlias = tuple[str, float]
+"""A family and the friction g of its curve."""
+
+
 @cache
-def _ranges(name: str) -> tuple[tuple[Floats, Floats], ...]:
+def keys(families: tuple[Family, ...]) -> tuple[tuple[Key, ...], tuple[tuple[int, ...], ...]]:
+    """The curves that stand behind families, each once, and the numbers of each family's own; none of what
+    has no step."""
+    own: list[tuple[Key, ...]] = []
+    for family in families:
+        base = (family.scheme if family.damped else family.name, 0.0)
+        if family.flow or family.held:
+            own.append(())
+        elif family.damped and len(_ranges(base)) > 1 and FAMILIES[base[0]].stages:
+            own.append((base, *((family.name, g) for g in FRICTIONS)))
+        else:
+            own.append((base,))
+    each = tuple(dict.fromkeys(key for row in own for key in row))
+    return each, tuple(tuple(each.index(key) for key in row) for row in own)
+
+
+@cache
+def _ranges(key: Key) -> tuple[tuple[Floats, Floats], ...]:
     """(phase of one step ascending, h w) over each range of h w in which the phase grows or falls."""
-    family = FAMILIES[name]
+    family, g = FAMILIES[key[0]], key[1]
     top = min(family.limit, 60.0) if family.limit > 0 else 4.0
     # the phase bends like a square root at a limit of stability, so points crowd there
     x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
     # and areas change with the square of a small step
     x = np.geomspace(1e-4, x[-1], 4000) if top == 60 else x
     x = np.concatenate([np.geomspace(1e-4, 0.05 * top, 500), x[x > 0.05 * top]]) if top < 60 else x
-    matrices = unit(family, np.square(x), np.zeros(len(x)))
+    matrices = unit(family, np.square(x), np.full(len(x), g))
     found = rotation(matrices)
+    if g:
+        # strong friction does not turn
+        turning = np.flatnonzero(found.angle > 0)
+        part = slice(turning[0], turning[-1] + 1)
+        x, matrices = x[part], matrices[part]
+        found = rotation(matrices)
     side = np.where(matrices[:, 0, 1] < 0, -1, 1)
     phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
     rising = np.diff(phase) > 0
@@ -100,7 +136,8 @@ def _ranges(name: str) -> tuple[tuple[Floats, Floats], ...]:
     ordered = [(y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts]
     # a phase below that of the first tabulated step is as good as proportional to it
     first, x = ordered[0]
-    return (np.append(0.0, first), np.append(0.0, x)) if first[0] > 0 else ordered[0], *ordered[1:]
+    least = x[0] if g else 0.0
+    return (np.append(0.0, first), np.append(least, x)) if first[0] > 0 else ordered[0], *ordered[1:]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,6 +145,8 @@ class Curves:
     """Curves (b,) of several families: `base` is the number of each one's family."""
 
     base: Integers
+    g: Floats
+    """Friction (b, 1) of each curve."""
     low: Floats
     high: Floats
     normal: Floats
@@ -148,13 +187,14 @@ class Curves:
             off = np.maximum(off, np.abs(loss) / 2)
         good = off <= room
         if damped and not growing:
-            good &= loss > -room
+            good &= loss + self.g > -room
         if far and len(root.s):
             good |= off <= FAR
             starts = np.flatnonzero(np.diff(root.s, prepend=-1.0))
             off = np.where(np.isfinite(off), off, np.inf)
             lowest = np.minimum.reduceat(off, starts, axis=1)
             good |= off == np.repeat(lowest, np.diff(np.append(starts, len(root.s))), axis=1)
+        good &= (self.g == 0) | (np.abs(loss) <= BETWEEN)
         which, index = np.nonzero(good & (root.phase > self.low) & (root.phase < self.high))
         return which, index
 
@@ -165,13 +205,14 @@ class Curves:
 
 
 @lru_cache(maxsize=64)
-def curves(names: tuple[str, ...]) -> Curves:
-    """The curves of families, by name."""
-    each = [_curve(name) for name in names]
-    base = np.repeat(np.arange(len(names)), [len(x.low) for x in each])
-    shift = np.repeat(APART * np.arange(len(base)), [len(y) for name in names for y, _ in _ranges(name)])
+def curves(of: Sequence[Key]) -> Curves:
+    """The curves of these families and frictions."""
+    each = [_curve(key) for key in of]
+    base = np.repeat(np.arange(len(of)), [len(x.low) for x in each])
+    shift = np.repeat(APART * np.arange(len(base)), [len(y) for key in of for y, _ in _ranges(key)])
     return Curves(
         base,
+        np.concatenate([x.g for x in each]),
         np.concatenate([x.low for x in each]),
         np.concatenate([x.high for x in each]),
         np.concatenate([x.normal for x in each], axis=1),
@@ -184,18 +225,18 @@ def curves(names: tuple[str, ...]) -> Curves:
 
 
 @cache
-def _curve(name: str) -> Curves:
+def _curve(key: Key) -> Curves:
     """The curves of one family, all at the beginning of the axis."""
     grid = np.linspace(0, np.pi, CELLS + 1)
-    ranges = _ranges(name)
+    ranges = _ranges(key)
     ends = np.array([(y[0], y[-1]) for y, _ in ranges])
     x = np.array([np.interp(grid, *part) for part in ranges])
     with np.errstate(all="ignore"):
         for _ in range(3):
             # straight lines between tabulated steps are not as fine as the comparison
-            better = x + (grid - _phase(name, x)) * np.gradient(x, grid, axis=1)
+            better = x + (grid - _phase(key, x)) * np.gradient(x, grid, axis=1)
             x = np.where(np.isfinite(better) & (np.abs(better - x) < 0.1 * x), better, x)
-        cells = _normal(name, x.ravel())
+        cells = _normal(key, x.ravel())
     # a root beside the end of a curve lies between two cells of which one is beyond it
     inside = (grid > ends[:, :1] - np.pi / CELLS) & (grid < ends[:, 1:] + np.pi / CELLS)
     normal, log_det = (np.where(inside, part.reshape(*part.shape[:-1], *x.shape), np.nan) for part in cells)
@@ -208,20 +249,20 @@ def _curve(name: str) -> Curves:
     bend[:, :-1] = np.maximum(bend[:, :-1], bend[:, 1:])
     axis, every = (np.concatenate([part[i] for part in ranges]) for i in (0, 1))
     return Curves(
-        np.zeros(len(ranges), dtype=np.int64), ends[:, :1], ends[:, 1:], normal, log_det, bend, axis, every,
-        _normal(name, every)[1],
+        np.zeros(len(ranges), dtype=np.int64), np.full((len(ranges), 1), key[1]), ends[:, :1], ends[:, 1:],
+        normal, log_det, bend, axis, every, _normal(key, every)[1],
     )  # fmt: skip
 
 
-def _phase(name: str, x: Floats) -> Floats:
+def _phase(key: Key, x: Floats) -> Floats:
     """The phase of a step of h w = x (b, c), between 0 and 2 pi."""
-    out = unit(FAMILIES[name], np.square(x.ravel()), np.zeros(x.size))
+    out = unit(FAMILIES[key[0]], np.square(x.ravel()), np.full(x.size, key[1]))
     angle = np.asarray(rotation(out).angle, np.float64)
     return np.where(out[:, 0, 1] < 0, 2 * np.pi - angle, angle).reshape(x.shape)
 
 
-def _normal(name: str, x: Floats) -> tuple[Floats, Floats]:
+def _normal(key: Key, x: Floats) -> tuple[Floats, Floats]:
     """M11 and M12 (2, c) over the root of the determinant, and its log (c,)."""
-    out = unit(FAMILIES[name], np.square(x), np.zeros(len(x)))
+    out = unit(FAMILIES[key[0]], np.square(x), np.full(len(x), key[1]))
     log_det = np.log(np.abs(np.linalg.det(out)))
     return np.asarray(out[:, 0, :].T * np.exp(-log_det / 2)), log_det

@@ -31,6 +31,10 @@ HELD_SHARES = 64
 """Largest number of substeps that a held force is looked for at; a force held over more is a held force."""
 
 
+G_ROUNDING = 1e-13
+"""Error of the share of a held force that its own roundings may make, beside that of the fit."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Family:
     """A one-step map with unknowns a and, where `damped`, g; `place` says where the friction acts.

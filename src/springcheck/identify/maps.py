@@ -82,10 +82,6 @@ class Table:
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
     damped: bool
-    names: tuple[str, ...]
-    """The families without friction that stand behind those of the table, each once."""
-    bases: tuple[int, ...]
-    """The number of each family's among `names`; -1 for what has no step, or no such family."""
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
@@ -129,6 +125,32 @@ class Table:
         over, under, inside = (x.astype(a.dtype)[..., n] for x in self.rational)
         return _rational(over, under, a, g * inside)
 
+    def sums(self, which: Integers, a: Floats, g: Floats) -> Floats:
+        """Sums (c, 2, 2) of the sizes of all that a step adds up, which its roundings are relative to."""
+        out = np.zeros((2, 2, len(a)))
+        out[0, 0] = out[1, 1] = 1
+        for kind, members in self.kinds:
+            at = np.flatnonzero(members[which])
+            n, x, y = which[at], a[at], g[at]
+            if kind != "rational":
+                size = np.abs(self._special(kind, n, x, y))
+                size[0, 0] = 1 + np.abs(x * y) if kind == "held" else size[0, 0]
+            else:
+                over, under, inside = (part.astype(np.float64)[..., n] for part in self.rational)
+                one = np.ones((2, len(n))) * [[1.0], [0.0]]
+                terms = _rational(np.abs(over), one, -np.abs(x), -np.abs(y * inside))
+                size = np.einsum("ijc,jkc->ikc", np.abs(_rational(one, under, x, y * inside)), terms)
+            out[:, :, at] = size
+        q, v = out
+        for slot in self.slots:
+            e, i, x, b, d = (part[which].astype(np.float64) for part in slot.columns[a.dtype])
+            v *= 1 + np.abs(e * g)
+            v += np.abs(b * a) * q
+            v /= np.abs(1 + i * g)
+            v *= np.exp(-x * g)
+            q += np.abs(d) * v
+        return out.transpose(2, 0, 1)
+
     def frame(self, which: Integers, a: Reals, g: Reals, log_mass: Reals, s: Floats, ratio: Reals) -> Reals:
         """Predicted entries (c, 4) over s steps on (q, v T), T = s h, `ratio` the unit of v T over q's."""
         out = self.unit(which, a, g)
@@ -153,11 +175,6 @@ def table(families: tuple[Family, ...]) -> Table:
         for i in (0, 1)
     ]
     inside = np.array([0 if family.stages else 1 for family in families], np.longdouble)
-    own = [
-        "" if family.flow or family.held else family.scheme if family.damped else family.name
-        for family in families
-    ]
-    names = tuple(dict.fromkeys(name for name in own if name))
     kinds = {
         "held": [family.held for family in families],
         "flow": [family.flow for family in families],
@@ -171,8 +188,6 @@ def table(families: tuple[Family, ...]) -> Table:
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
         damped=any(family.damped for family in families),
-        names=names,
-        bases=tuple(names.index(name) if name else -1 for name in own),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, other_names, rows
 from springcheck.identify.evidence import title
-from springcheck.identify.families import FAMILIES, HELD, Family, substeps
+from springcheck.identify.families import FAMILIES, G_ROUNDING, HELD, Family
 from springcheck.identify.fit import ROUNDING
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
@@ -119,16 +119,10 @@ def _first(found: list[Recurrence], families: tuple[Family, ...], strides: range
     return out
 
 
-def _substeps(joint: Joint) -> int:
-    """Substeps that a force is held over, 0 where no whole number is certain."""
-    each = {substeps(part.g, part.g_error + 1e-13)[0] or 0 for part in joint.parts}
-    return each.pop() if len(each) == 1 else 0
-
-
 def _may_hold(joint: Joint) -> bool:
     """Whether the force may be held over some whole number of substeps."""
     for part in joint.parts:
-        off, error = abs(2 * part.g - 1), 6 * (part.g_error + 1e-13)
+        off, error = abs(2 * part.g - 1), 6 * (part.g_error + G_ROUNDING)
         if off > error and not (off < 0.5 + error and abs(off - 1 / max(round(1 / off), 2)) <= error):
             return False
     return True
@@ -202,7 +196,7 @@ def _known(
         law = f" with {candidates[0].law}" if candidates[0].law else " with friction" if damped else ""
         whose = title(scheme)
         if scheme == HELD.scheme:
-            whose = f"Semi-implicit Euler whose force is held over {_substeps(joints[0])} substeps"
+            whose = f"Semi-implicit Euler whose force is held over {joints[0].substeps[0]} substeps"
         statement = f"{whose}{law}{frames}, by positions alone: {precision} arithmetic explains them"
     else:
         listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])

@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.coarse import irregular
-from springcheck.identify.curves import curves
+from springcheck.identify.curves import BETWEEN, curves, keys
 from springcheck.identify.families import Family
 from springcheck.identify.fit import ROUNDING, least_squares
 from springcheck.identify.maps import Table, table, unit
@@ -310,17 +310,19 @@ def _starts(
             a = (1 - root) ** 2 + 4 * root * np.sin(phase / 2) ** 2
             parts.append((np.full(len(s), k), s, turns, a, 1 + (1 - root**2) / a))
         else:
-            curve = curves((family.scheme,))
+            curve = curves(keys((family,))[0])
             at, index = np.nonzero((phase > curve.low) & (phase < curve.high))
             x, loss = curve.at(at, phase[index])
-            g = loss - found.log_det / s[index] if family.damped else np.zeros(len(x))
+            off = loss - found.log_det / s[index]
+            g = curve.g[at, 0] + off if family.damped else np.zeros(len(x))
             # the area of a frame is known, and that of a scheme without friction beside it
             room = 0.02 * np.abs(loss) * s[index] + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
             good = (g > 0) if family.damped else np.abs(loss * s[index] - found.log_det) <= room
+            good &= (curve.g[at, 0] == 0) | (np.abs(off) <= BETWEEN)
             parts.append(
                 (
                     np.full(np.count_nonzero(good), k), s[index][good], turns[index][good],
-                    (np.square(x) + np.square(g / 2))[good], g[good],
+                    (np.square(x) + np.square(off / 2) * family.damped)[good], g[good],
                 )
             )  # fmt: skip
     which, s, turns, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))

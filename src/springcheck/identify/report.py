@@ -20,7 +20,7 @@ from springcheck.identify.candidates import (
 from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, HELD, substeps
+from springcheck.identify.families import FAMILIES, HELD
 from springcheck.identify.fit import Map
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
@@ -51,6 +51,9 @@ VELOCITY_OFFSET = {
     "langevin-middle-early": -0.5,
 }
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
+
+AS_NEAR = 1.5
+"""Factor by which one scheme may miss the states by more than another that is explained."""
 
 UNTOLD = "cannot tell"
 """Arithmetic where the candidates' are several."""
@@ -163,7 +166,7 @@ def _explained(
     record: Record, moving: list[int], maps: list[Map], accepted: list[Joint], terms: list[Terms]
 ) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
-    left = [x for x in accepted if not FAMILIES[x.family].held or _whole_substeps(x)[0]]
+    left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
     alone = len({(x.scheme, x.stride) for x in accepted}) == 1
     defects: list[list[arithmetic.Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):
@@ -171,20 +174,15 @@ def _explained(
             break
         seen = alone and visible(found, what, damped=left[0].damped)
         new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], visible=seen)
-        excuse = next((x for x in new if x.note == arithmetic.REBUILT_NOTE), None)
-        # what excuses one scheme's misses does not exclude the others whose maps are as near
-        new = [x if x.precision or excuse is None else excuse for x in new]
+        # what explains one scheme's misses does not exclude the others, which miss the states by no more
+        good = [x for x in new if x.precision]
+        new = [
+            next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
+        ]
         explained = [k for k, x in enumerate(new) if x.precision]
         defects = [[*defects[k], new[k]] for k in explained]
         left = [left[k] for k in explained]
     return dict(zip(left, defects, strict=True))
-
-
-def _whole_substeps(joint: Joint) -> tuple[int, bool]:
-    """Number of substeps that a force is held over, 0 where it is none that is known, and their order."""
-    found = {substeps(part.g, part.g_error + 1e-13) for part in joint.parts}
-    n, first = found.pop() if len(found) == 1 else (None, True)
-    return n or 0, first
 
 
 def _single_parameters(
@@ -254,7 +252,7 @@ def _known(
     )
     law = f" with {first.law}" if first.law and len(candidates) == 1 else " with friction" if damped else ""
     if scheme == "held-force":
-        n, kicks = _whole_substeps(plainest)
+        n, kicks = plainest.substeps
         order = "kick, then drift" if kicks else "drift, then kick"
         statement = f"Semi-implicit Euler whose force is held over {n} substeps ({order}){steps}"
     elif scheme:

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.families import DAMPED, FAMILIES, HELD, UNDAMPED, Family
+from springcheck.identify.families import DAMPED, FAMILIES, G_ROUNDING, HELD, UNDAMPED, Family, substeps
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.match import Match, match
@@ -69,6 +69,13 @@ class Joint:
             self.stride,
             -1 if self.scheme == "exact" else list(FAMILIES).index(self.family),
         )
+
+    @property
+    def substeps(self) -> tuple[int, bool]:
+        """Number of substeps that a force is held over, 0 where none is certain; whether they kick first."""
+        found = {substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts}
+        n, first = found.pop() if len(found) == 1 else (None, True)
+        return n or 0, first
 
     def __str__(self) -> str:
         steps = "" if self.stride == 1 else f", {self.stride} steps a frame"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.identify.curves import SIDE, Roots, curves, roots
+from springcheck.identify.curves import SIDE, Roots, curves, keys, roots
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
@@ -102,24 +102,26 @@ def starts(
         for k, family in enumerate(every.families)
         if family.held
     ]
-    if every.names:
-        curve = curves(every.names)
+    of_curves, bases = keys(every.families)
+    if of_curves:
+        curve = curves(of_curves)
         at, index = curve.near(
             root, error, damped=every.damped, growing=terms.growing, free_scale=terms.mass_unknown, far=far
         )  # fmt: skip
         x, loss = curve.at(at, root.phase[index])
         a, g = np.square(x), np.zeros_like(x)
         if every.damped:
-            g = loss - root.log_det[index]
+            off = loss - root.log_det[index]
+            g = curve.g[at, 0] + off
             # friction shrinks areas; what grows beyond the scheme's own growth is no friction
             good = (g > 0) | terms.growing
             at, index, g = at[good], index[good], g[good]
-            a = a[good] + np.square(g / 2)
-        ends = np.searchsorted(curve.base[at], np.arange(len(every.names) + 1))
-        for k, base in enumerate(every.bases):
-            if base >= 0 and ends[base] < ends[base + 1]:
-                own = slice(ends[base], ends[base + 1])
-                parts.append((np.full(ends[base + 1] - ends[base], k), index[own], a[own], g[own]))
+            a = a[good] + np.square(off[good] / 2)
+        ends = np.searchsorted(curve.base[at], np.arange(len(of_curves) + 1))
+        for k, own in enumerate(bases):
+            for base in own:
+                mine = slice(ends[base], ends[base + 1])
+                parts.append((np.full(ends[base + 1] - ends[base], k), index[mine], a[mine], g[mine]))
     if not parts and flows:
         return joined(flows)
     parts = parts or [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
