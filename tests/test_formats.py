@@ -37,6 +37,27 @@ def csv(run: Trajectory) -> list[str]:
     return ["x.csv"]
 
 
+def with_index(run: Trajectory) -> list[str]:
+    """As pandas writes a table, its index first and without a name."""
+    rows = np.hstack([np.arange(len(run.t))[:, None], run.t[:, None], run.q, run.p])
+    np.savetxt("x.csv", rows, fmt="%.17g", delimiter=",", header=",t,q,p", comments="")
+    return ["x.csv"]
+
+
+def printed_with_index(run: Trajectory) -> list[str]:
+    """As pandas or R print a table: the index has no name at all."""
+    rows = np.hstack([np.arange(len(run.t))[:, None], run.t[:, None], run.q, run.p])
+    np.savetxt("x.txt", rows, fmt="%.17g", header="t q p", comments="  ")
+    return ["x.txt"]
+
+
+def decimal_commas(run: Trajectory) -> list[str]:
+    csv(run)
+    path = Path("x.csv")
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    return ["x.csv"]
+
+
 def blanks(run: Trajectory) -> list[str]:
     v = run.p[:, 0] / SCENE.m[0]
     np.savetxt("x.txt", np.stack([run.t, run.q[:, 0], v], axis=1), fmt="%.17g")
@@ -194,7 +215,7 @@ def store(run: Trajectory) -> list[str]:
 
 Writer = Callable[[Trajectory], list[str]]
 WRITERS: list[Writer] = [
-    csv, blanks, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
+    csv, with_index, printed_with_index, decimal_commas, blanks, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [

@@ -38,6 +38,8 @@ def read_table(path: Path, names: Sequence[str]) -> States:
             header = cells
     if not rows:
         raise StoreError(f"{path}: holds no row of numbers")
+    if not names and len(header) == len(rows[0]) - 1 and _are_counted(rows):
+        header = ["", *header]
     chosen = list(names) or header
     if not chosen:
         raise StoreError(f"{path}: its {len(rows[0])} columns have no names; give them, as --columns t,q,v")
@@ -47,10 +49,22 @@ def read_table(path: Path, names: Sequence[str]) -> States:
 
 
 def _cells(line: str) -> list[str]:
-    text = line.strip().lstrip("#").strip()
-    # a name may hold a blank, as in "t [s]", where something else lies between the columns
-    parts = re.split(r"\s*[,;\t]\s*", text) if re.search(r"[,;\t]", text) else text.split()
-    return [part for part in parts if part]
+    text = line.strip(" \r\n").lstrip("#").strip(" ")
+    if re.search(r"[;\t]", text):
+        # there a comma stands for a decimal point
+        parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", x.strip()) for x in re.split(r"[;\t]", text)]
+    else:
+        # a name may hold a blank, as in "t [s]", where something else lies between the columns
+        parts = [x.strip() for x in text.split(",")] if "," in text else text.split()
+    while parts and not parts[-1]:
+        parts.pop()
+    return parts
+
+
+def _are_counted(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether the first column numbers the rows, as tables do that are written with their index."""
+    first = float(rows[0][0])
+    return first in (0, 1) and all(float(row[0]) == first + i for i, row in enumerate(rows))
 
 
 def _is_number(cell: str) -> bool:
