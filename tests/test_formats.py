@@ -215,7 +215,8 @@ def store(run: Trajectory) -> list[str]:
 
 Writer = Callable[[Trajectory], list[str]]
 WRITERS: list[Writer] = [
-    csv, with_index, printed_with_index, decimal_commas, blanks, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
+    csv, with_index, printed_with_index, decimal_commas, blanks,
+    six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
