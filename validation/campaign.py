@@ -238,7 +238,9 @@ def wrongs(result: Result, *, signalled: bool, whole: tuple[str, ...]) -> Iterat
         yield f"exit status {result.status}"
     if "Traceback" in err or "Traceback" in out or "mistake in springcheck" in err:
         yield f"a traceback: {err[-300:]!r}"
-    if result.status == 2 and len(lines) != 1 and (lines or not out):
+    # identify says a line of each of its files
+    files = max(1, sum(word[:1] != "-" for word in result.command[1:]) * (result.command[0] == "identify"))
+    if result.status == 2 and not 1 <= len(lines) <= files and (lines or not out):
         # where nothing could be measured or judged the report on standard output says why
         yield f"{len(lines)} lines of message: {err[:300]!r}"
     if any(len(line) > MESSAGE for line in lines):

@@ -302,6 +302,8 @@ def _taken(file: BinaryIO) -> bool | None:
     if sys.platform == "win32":
         import msvcrt
 
+        # nobody can read what is locked there, and who holds it stands at the beginning
+        file.seek(1 << 30)
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         except OSError:
