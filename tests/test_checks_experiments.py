@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from onestep import propagator
 from springcheck import checks, schemes, simulate
 from springcheck.checks import experiments, laws
 from springcheck.checks.stats import student
@@ -210,7 +211,7 @@ def test_a_sum_of_another_length_in_company_is_no_influence() -> None:
 
     def run(made: Scene, label: str) -> Trajectory:
         n = made.n
-        whole = schemes.propagator(scheme, made, h=made.step).astype(np.float64)
+        whole = propagator(scheme, made, h=made.step).astype(np.float64)
 
         def step(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
             z = np.concatenate([q, p])

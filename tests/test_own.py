@@ -37,6 +37,7 @@ from springcheck.physics.terms import (
     Term,
     WallSpring,
 )
+from springcheck.schemes.rounding import Met
 
 SCHEMES = tuple(method.scheme for method in ENGINE.methods.values())
 IMPLICIT = tuple(name for name in SCHEMES if schemes.SCHEMES[name].implicit)
@@ -192,10 +193,13 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
         exact = schemes.step(
             law, *before, h=what.step, m=what.m, force=system.force, parts=system.parts, **laws
         )
-        parts = system.magnitude_of(system.slow), system.magnitude_of(system.fast)
-        size = schemes.magnitude_step(
-            law, *before, h=what.step, m=what.m, magnitude=system.magnitude(), parts=parts, **laws
-        )
+        parts = {"slow": system.magnitude_of(system.slow), "fast": system.magnitude_of(system.fast)}
+        stiff, rate = laws["stiffness"], laws["rate"]
+        kicks = [kind for kind, _ in law.stages if kind in ("kick", "pull", "slow", "fast")] or law.b
+        met = [
+            Met(magnitude=parts.get(str(x), system.magnitude()), stiffness=stiff, joined=True) for x in kicks
+        ]
+        size = schemes.magnitude_step(law, *before, h=what.step, m=what.m, met=met, rate=rate)
         # a force is a sum over up to 17 terms: one more rounding for each
         count = schemes.roundings(law) + 17
         for got, true, scale in zip((q, p), exact, size, strict=True):

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from onestep import propagator
 from springcheck import checks, engines, schemes, simulate
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
@@ -125,7 +126,7 @@ def test_graded_modes_find_a_chain_over_twelve_decades_and_its_free_translation(
 @pytest.mark.parametrize("row", reference("multiple-time-steps")["maps"], ids=lambda row: row["h_w_fast"])
 def test_the_respa_map_is_the_product_of_its_parts(row: dict[str, Any]) -> None:
     scene = scenes.load_scene("multiple-time-steps")
-    found = schemes.propagator(schemes.SCHEMES["respa8"], scene, h=float(row["step"]))
+    found = propagator(schemes.SCHEMES["respa8"], scene, h=float(row["step"]))
     wanted = np.array([extended(line) for line in row["matrix"]])
     assert np.max(np.abs(found - wanted)) <= 256 * exact.EPS * np.max(np.abs(wanted))
 

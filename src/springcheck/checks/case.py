@@ -89,13 +89,10 @@ class Case:
         scene = self.judged
         stiff: Extended | Slope | None = None
         if self.scheme.implicit and not self.straight:
-            stiff = self._slope
+            stiff = scene.system.slope
         elif self.scheme.implicit:
             stiff = scene.system.curvatures(scene.q)
         return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
-
-    def _slope(self, q: Reals) -> tuple[Extended, bool]:
-        return rounding.stiffness_at(self.judged, q, joined=self.joined), self.joined
 
     @property
     def joined(self) -> bool:
@@ -260,7 +257,7 @@ class Case:
             return np.full(len(steps), np.inf)
         n = steps.astype(np.float64)
         turn = min(abs(self.trajectory.step) * float(np.max(self.w)), 2.0)
-        added = max(1, int(np.max(self.scene.system.pulls)))
+        added = max(1, int(np.max(self.scene.system.pulls())))
         return np.asarray(5 * np.sqrt(n) + (2 * turn * added + 1.5) * n)
 
     @cached_property

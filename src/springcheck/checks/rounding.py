@@ -4,13 +4,12 @@ itself."""
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck import schemes
-from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Integers, Reals
-from springcheck.physics.scene import Scene
+from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Reals
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.rounding import Met
@@ -48,7 +47,6 @@ def of_step(
         p,
         h=run.step,
         m=m,
-        magnitude=_none,
         rate=scene.system.friction_rates if scene.system.is_damped else None,
         met=_evaluations(case, places, recorded),
     )
@@ -59,14 +57,10 @@ def of_step(
     if run.rebuilds_velocity and not how.keeps_displacement:
         of_p = of_p + how.state * m * (q + size_q) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
-    lost = smallest * (1 + m + h * pulls(scene, scene.terms))
+    lost = smallest * (1 + m + h * scene.system.pulls())
     if case.scheme.implicit:
         lost = lost * scene.n
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
-
-
-def _none(q: Reals, p: Reals) -> Reals:
-    raise ValueError("every evaluation of the force is given by itself")
 
 
 def _recorded(scheme: Scheme) -> list[bool]:
@@ -104,7 +98,7 @@ def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list
         stiffness = None
         if scheme.implicit:
             given = case.law["stiffness"]
-            stiffness = given if near is None or case.straight else stiffness_at(scene, near, joined=joined)
+            stiffness = given if near is None or case.straight else scene.system.slope(near)[0]
         made[known] = Met(
             magnitude=_force(
                 case, acting.get(kind, scene.terms), None if case.straight else near, whole, exact[number]
@@ -122,7 +116,7 @@ def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float
     quantum."""
     how = case.trajectory.arithmetic
     plain = case.judged.system.magnitude_of(terms, near, exact=exact)
-    count = pulls(case.scene, terms)
+    count = case.scene.system.pulls(terms)
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)
     if how.force > how.state:
@@ -139,26 +133,3 @@ def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float
         return np.asarray(bound)
 
     return force
-
-
-def pulls(scene: Scene, terms: tuple[Term, ...]) -> Integers:
-    """How many of these terms pull at each particle (n,)."""
-    count = np.zeros(scene.n)
-    for term in terms:
-        term.scatter(np.ones(len(term)), count)
-    return count.astype(np.int64)
-
-
-def stiffness_at(scene: Scene, q: Reals, *, joined: bool) -> Extended:
-    """Second derivatives of the potential at states q (..., n) -> (..., n), or (..., n, n) if joined."""
-    n = q.shape[-1]
-    out = np.zeros((*q.shape, n) if joined else q.shape, dtype=np.longdouble)
-    flat = out.reshape((*q.shape[:-1], n * n)) if joined else out
-    for term in scene.terms:
-        k = np.broadcast_to(term.curvature(q), (*q.shape[:-1], len(term)))
-        for i, one in enumerate(term.particles):
-            for j, other in enumerate(term.particles):
-                if joined or i == j:
-                    where: Any = (..., one * n + other if joined else one)
-                    np.add.at(flat, where, k if i == j else -k)
-    return out

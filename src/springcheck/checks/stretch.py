@@ -178,7 +178,7 @@ def tangent(case: Case, q: Extended, p: Extended) -> Extended:
 
     def slope(q: Reals) -> tuple[Extended, bool]:
         # the changes solve the linear equations that belong to the motion
-        return rounding.stiffness_at(case.judged, q[0], joined=not separate)[None], not separate
+        return case.judged.system.slope(q[0])[0][None], not separate
 
     q, p = case.step(dq, dp, forces=variational(case.judged.system), slope=slope)
     if separate:

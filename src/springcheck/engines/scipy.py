@@ -37,20 +37,13 @@ class _Solver:
             self.force_calls += 1
             return np.concatenate([y[n:] / m, system.force(y[:n], y[n:])])
 
-        def jacobian(t: float, y: Floats) -> Floats:
-            out = np.zeros((2 * n, 2 * n))
-            out[:n, n:] = np.diag(1 / m)
-            out[n:, :n] = -system.hessian(y[:n])
-            out[n:, n:] = -np.diag(system.friction_rates.astype(np.float64))
-            return out
-
         sizes = np.concatenate(system.amplitudes)
         options: dict[str, Any] = {
             "rtol": max(scene.tolerance, SMALLEST_TOLERANCE),
             "atol": scene.tolerance * np.where(sizes > 0, sizes, 1.0),
         }
         if name in ("Radau", "BDF", "LSODA"):
-            options["jac"] = jacobian
+            options["jac"] = lambda t, y: system.jacobian(y[:n])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self._solver = getattr(integrate, name)(

@@ -8,6 +8,7 @@ tells it from anything else is where it enters (in kicks, never in drifts) and i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from scipy.special import chdtri
@@ -19,6 +20,7 @@ from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.schemes import SCHEMES, magnitude_step
+from springcheck.schemes.rounding import Met
 
 QUANTUM = 2.0**-32
 """Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
@@ -108,10 +110,9 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
     def size(q: Reals, p: Reals) -> Reals:
         return np.asarray(1 + a * q)
 
-    q, p = magnitude_step(
-        SCHEMES[match.scheme], 0 * one, 0 * one, h=1.0, m=one, magnitude=size,
-        stiffness=np.diag(a), rate=rate if match.friction else None,
-    )  # fmt: skip
+    met = repeat(Met(magnitude=size, stiffness=np.diag(a), joined=True))
+    slowed = rate if match.friction else None
+    q, p = magnitude_step(SCHEMES[match.scheme], 0 * one, 0 * one, h=1.0, m=one, met=met, rate=slowed)
     numbers = np.arange(match.stride, dtype=np.float64)
     one_step = np.broadcast_to(
         unit(FAMILIES[match.family], match.a * one, match.g * one), (match.stride, 2, 2)

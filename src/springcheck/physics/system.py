@@ -6,7 +6,7 @@ well as one state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -103,11 +103,10 @@ class System:
                 out.setdefault(term.key, np.zeros(self.n, dtype=bool))[index] = True
         return out
 
-    @cached_property
-    def pulls(self) -> Integers:
-        """How many rows of terms act on each particle (n,)."""
+    def pulls(self, terms: Iterable[Term] | None = None) -> Integers:
+        """How many rows of these terms, or of all, act on each particle (n,)."""
         count = np.zeros(self.n)
-        for term in self.terms:
+        for term in self.terms if terms is None else terms:
             term.scatter(np.ones(len(term)), count)
         return count.astype(np.int64)
 
@@ -118,10 +117,7 @@ class System:
 
     @cached_property
     def rest_positions(self) -> Floats | None:
-        """Positions (n,) [L] at which every spring between particles has its rest length.
-
-        The lowest particle of each connected group stands at 0.  None where springs in a ring disagree.
-        """
+        """Positions (n,) [L] at which every spring between particles has its rest length, or None."""
         return graph.rest_positions(self.n, self.terms)
 
     # forces
@@ -213,44 +209,51 @@ class System:
 
     # curvature of the potential
 
+    def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
+        """Rows, columns and values (..., s) of what each pair of ends adds to the `hessian` at q (..., n)."""
+        for term in self.terms:
+            k = np.broadcast_to(term.curvature(q), (*q.shape[:-1], len(term)))
+            for one in term.particles:
+                for other in term.particles:
+                    yield one, other, k if one is other else -k
+
     def hessian(self, q: Reals) -> Extended:
-        """Second derivatives of the potential energy at q (n,) -> (n, n) [M/T2], extended precision."""
+        """Second derivatives of the potential energy at q (..., n) -> (..., n, n) [M/T2], extended."""
         if self.n > MOST_DENSE:
             what = f"second derivatives of {self.n} particles, n x n numbers,"
             memory.need(2 * 16 * self.n**2, what, "a shorter chain, or another method, needs none")
-        out = np.zeros((self.n, self.n), dtype=np.longdouble)
-        wide = np.asarray(q, dtype=np.longdouble)
-        for term in self.terms:
-            ends, k = term.particles, term.curvature(wide)
-            for end in ends:
-                np.add.at(out, (end, end), k)
-            if len(ends) == 2:
-                np.add.at(out, ends, -k)
-                np.add.at(out, ends[::-1], -k)
+        out = np.zeros((*q.shape, self.n), dtype=np.longdouble)
+        for row, column, k in self.elements(q.astype(np.longdouble)):
+            where: Any = (..., row, column)
+            np.add.at(out, where, k)
         return out
 
     def hessian_diagonal(self, q: Reals) -> Extended:
-        """Diagonal of `hessian` (n,), all of it where nothing joins two particles."""
-        out = np.zeros(self.n, dtype=np.longdouble)
-        wide = np.asarray(q, dtype=np.longdouble)
+        """Diagonal of `hessian` (..., n), all of it where nothing joins two particles."""
+        out, wide = np.zeros(q.shape, dtype=np.longdouble), q.astype(np.longdouble)
         for term in self.terms:
-            term.scatter(np.broadcast_to(term.curvature(wide), (len(term),)), out)
+            term.scatter(np.broadcast_to(term.curvature(wide), (*q.shape[:-1], len(term))), out)
         return out
+
+    def slope(self, q: Reals) -> tuple[Extended, bool]:
+        """The one or the other, by whether some term joins two particles, and whether one does."""
+        return self.hessian_diagonal(q) if self.is_separate else self.hessian(q), not self.is_separate
 
     def sparse_hessian(self, q: Reals) -> Any:
         """The `hessian` by its elements that are not 0, a scipy.sparse.csc_array in double precision."""
         from scipy.sparse import csc_array
 
-        rows, columns, values = [], [], []
-        for term in self.terms:
-            k = np.broadcast_to(np.asarray(term.curvature(q), np.float64), (len(term),))
-            for i, one in enumerate(term.particles):
-                for j, other in enumerate(term.particles):
-                    rows.append(one)
-                    columns.append(other)
-                    values.append(k if i == j else -k)
-        where = np.concatenate(rows), np.concatenate(columns)
-        return csc_array((np.concatenate(values), where), shape=(self.n, self.n))
+        rows, columns, values = (np.concatenate(x) for x in zip(*self.elements(q), strict=True))
+        return csc_array((values.astype(np.float64), (rows, columns)), shape=(self.n, self.n))
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Derivatives of (p/m, force) by (q, p) at q (n,) -> (2n, 2n), double precision."""
+        n = self.n
+        out = np.zeros((2 * n, 2 * n))
+        out[:n, n:] = np.diag(1 / self.m)
+        out[n:, :n] = -self.hessian(q)
+        out[n:, n:] = -np.diag(self.friction_rates)
+        return out
 
     def curvatures(self, q: Reals) -> Any:
         """Second derivatives in the cheapest form that holds them: (n,) of single particles, else (n, n).

@@ -15,7 +15,6 @@ from springcheck.schemes.linear import (
     invariant,
     matrix,
     propagate,
-    propagator,
     rotation,
 )
 from springcheck.schemes.lookup import bring, scheme, title
@@ -25,5 +24,5 @@ from springcheck.schemes.stepping import step
 __all__ = [
     "ATTACHED", "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "title", "number", "step",
     "magnitude_step", "roundings", "amplification", "condition", "invariant", "matrix", "propagate",
-    "propagator", "rotation",
+    "rotation",
 ]  # fmt: skip

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
-from springcheck.physics.scene import Scene
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.stepping import step
 
@@ -63,35 +62,10 @@ def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
     return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
 
 
-def propagator(scheme: Scheme, scene: Scene, *, h: float) -> Extended:
-    """One-step matrix (2n, 2n) on (q - q*, p - p*) of a linear scene, q* and p* a state that stays.
-
-    Found by stepping the unit vectors and taking off what the state 0 becomes; it serves scenes whose
-    modes a scheme mixes.
-    """
-    n = scene.n
-    z = np.concatenate([np.zeros((1, 2 * n)), np.eye(2 * n)]).astype(np.longdouble)
-    q, p = step(
-        scheme,
-        z[:, :n],
-        z[:, n:],
-        h=h,
-        m=scene.m.astype(np.longdouble),
-        force=scene.system.force,
-        stiffness=scene.system.hessian(scene.q) if scheme.implicit else None,
-        rate=scene.system.friction_rates,
-        parts=scene.system.parts,
-    )
-    after = np.concatenate([q, p], axis=1)
-    return np.asarray((after[1:] - after[0]).T, np.longdouble)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rotation:
-    """The powers of one-step matrices of determinant d: M**j = d**(j/2) (C I + S (M/sqrt(d) - cos(angle) I)).
-
-    With `angle` the phase of one step, C = cos(j angle) and S = sin(j angle)/sin(angle); hyperbolic where
-    the motion is unbounded (`growth` > 0 then, and `sign` the sign of the eigenvalues), linear between.
+    """How one-step matrices turn: by `angle`, or where the motion is unbounded by a hyperbolic angle `growth`
+    > 0, `sign` the sign of their eigenvalues.  `propagate` makes their powers of it.
     """
 
     determinant: Extended

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
-from springcheck.schemes.stepping import acting, sparse_solver, weighted_sum
+from springcheck.schemes.stepping import sparse_solver, weighted_sum
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,16 +36,12 @@ def magnitude_step(
     *,
     h: float,
     m: Reals,
-    magnitude: Force,
-    stiffness: Any = None,
+    met: Iterable[Met],
     rate: Reals | None = None,
-    parts: tuple[Force, Force] | None = None,
-    met: Sequence[Met] = (),
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step`: the same step with every difference taken as a sum.
 
-    `magnitude` and `parts` are made by `System.magnitude`; `met` has one entry for each evaluation of the
-    force, in their order, and stands for `magnitude`, `parts` and `stiffness` where it is given.
+    `met` has one entry for each evaluation of the force, in their order.
     """
     direction = np.sign(h)
     # in extended precision: the square of a step may leave the range of a double
@@ -68,19 +64,15 @@ def magnitude_step(
                 p = p * (1 + np.abs(x)) / np.abs(1 + x)
             else:
                 if kind != "held":
-                    here = next(each, None)
-                    bound = acting(kind, magnitude, parts) if here is None else here.magnitude
-                    last = bound(q, np.zeros_like(p) if kind == "pull" else p)
+                    last = next(each).magnitude(q, np.zeros_like(p) if kind == "pull" else p)
                 p = p + c * size * last
         return q, p
     forces: list[Reals] = []
     velocities: list[Reals] = []
-    whole = Met(magnitude=magnitude, stiffness=stiffness, joined=stiffness is not None and stiffness.ndim > 1)
     for row in scheme.a:
-        here = next(each, whole)
+        here = next(each)
         past = [abs(float(c)) * size for c in row[: len(forces)]]
-        qs = weighted_sum(list(zip(past, velocities, strict=True)), q)
-        ps = weighted_sum(list(zip(past, forces, strict=True)), p)
+        qs, ps = weighted_sum(q, past, velocities), weighted_sum(p, past, forces)
         own = abs(float(row[len(forces)])) * size
         if own:
             slowed = np.ones_like(m) if rate is None else np.abs(1 + direction * own * rate)
@@ -88,10 +80,7 @@ def magnitude_step(
         forces.append(here.magnitude(qs, ps))
         velocities.append(ps / m)
     weights = [abs(float(c)) * size for c in scheme.b]
-    return (
-        weighted_sum(list(zip(weights, velocities, strict=True)), q),
-        weighted_sum(list(zip(weights, forces, strict=True)), p),
-    )
+    return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
 def _implicit_stage(here: Met, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals) -> tuple[Reals, Reals]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -15,9 +15,9 @@ Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]
 """Positions (..., n) -> second derivatives there, and whether as matrices (..., n, n) instead of (..., n)."""
 
 
-def weighted_sum(terms: list[tuple[Any, Reals]], start: Reals) -> Reals:
+def weighted_sum(start: Reals, coefficients: Iterable[Any], values: Sequence[Reals]) -> Reals:
     """start plus the sum of c x; a coefficient of 0 adds nothing, whatever x is."""
-    for c, x in terms:
+    for c, x in zip(coefficients, values, strict=True):
         if c:
             start = start + c * x
     return start
@@ -76,26 +76,22 @@ def step(
     velocities: list[Reals] = []
     for row in scheme.a:
         past = [number(c, width) * h for c in row[: len(forces)]]
-        qs = weighted_sum(list(zip(past, velocities, strict=True)), q)
-        ps = weighted_sum(list(zip(past, forces, strict=True)), p)
-        own = row[len(forces)]
+        qs, ps = weighted_sum(q, past, velocities), weighted_sum(p, past, forces)
+        own: Any = row[len(forces)]
         if own:
             if stiffness is None:
                 raise ValueError(f"{scheme.name} needs the stiffness of the scene")
             # the stage stands at its share of the step
-            share = weighted_sum([(number(c, width), np.ones((), width)) for c in row], np.zeros((), width))
+            share = sum((number(c, width) for c in row), np.zeros((), width))
             guess = qs if near is None else np.where(np.isfinite(near), q + share * (near - q), qs)
-            stage = _implicit_stage(qs, ps, number(own, width) * h, m, force, stiffness, rate, guess=guess)
-            qs, ps = stage
+            own = number(own, width) * h
+            qs, ps = _implicit_stage(qs, ps, own, m, force, stiffness, rate, guess=guess)
         if met is not None:
             met.append(qs)
         forces.append(force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]
-    return (
-        weighted_sum(list(zip(weights, velocities, strict=True)), q),
-        weighted_sum(list(zip(weights, forces, strict=True)), p),
-    )
+    return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
 def acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:

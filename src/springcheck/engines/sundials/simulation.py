@@ -107,14 +107,8 @@ def _suits_matrix(scene: Scene) -> bool:
 
 def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     """Slope (2n, 2n) and constant part (2n,) of the right-hand side of a linear scene."""
-    n = scene.n
-    zero = np.zeros(n)
-    slope, pull = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
-    slope[:n, n:] = np.diag(1 / scene.m)
-    slope[n:, :n] = -scene.system.hessian(zero)
-    slope[n:, n:] = -np.diag(scene.system.friction_rates)
-    pull[n:] = scene.system.force(zero, zero)
-    return slope, pull
+    zero = np.zeros(scene.n)
+    return scene.system.jacobian(zero), np.concatenate([zero, scene.system.force(zero, zero)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +151,6 @@ class _Solver:
         as_matrix = _suits_matrix(scene)
         slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
         pulled = bool(np.any(pull))
-        rates = scene.system.friction_rates.astype(np.float64)
 
         def by_terms(t: float, y: Floats, yp: Floats) -> None:
             self._called(t)
@@ -172,12 +165,7 @@ class _Solver:
                 np.add(yp, pull, out=yp)
 
         def jacobian(t: float, y: Floats, yp: Floats, jacobian: Floats) -> None:
-            if as_matrix:
-                jacobian[:] = slope
-            else:
-                jacobian[:n, n:] = np.diag(1 / m)
-                jacobian[n:, :n] = -scene.system.hessian(y[:n])
-                jacobian[n:, n:] = -np.diag(rates)
+            jacobian[:] = slope if as_matrix else scene.system.jacobian(y[:n])
 
         self._n, self._step, self._done = n, step, 0
         atol = absolute_tolerance(scene)

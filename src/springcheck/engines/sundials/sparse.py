@@ -19,12 +19,9 @@ def options(scene: Scene) -> dict[str, Any]:
     """What CVODE needs for the linear systems of (q, p) of this scene."""
     n = scene.n
     rows, columns = [np.arange(n), n + np.arange(n)], [n + np.arange(n)] * 2
-    for term in scene.terms:
-        ends = term.particles
-        for i in ends:
-            for j in ends:
-                rows.append(n + i)
-                columns.append(j)
+    for i, j, _ in scene.system.elements(scene.q):
+        rows.append(n + i)
+        columns.append(j)
     where = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
     constant: list[Reals] = [1 / scene.m, -scene.system.friction_rates.astype(np.float64)]
 
@@ -33,10 +30,7 @@ def options(scene: Scene) -> dict[str, Any]:
         return coo_array((values, where), shape=(2 * n, 2 * n)).tocsc()
 
     def jacobian(t: float, y: Floats, yp: Floats, out: Floats) -> None:
-        values: list[Reals] = list(constant)
-        for term in scene.terms:
-            k = np.broadcast_to(term.curvature(y[:n]), term.rigidity.shape)
-            values += [-k] if term.bodies == 1 else [-k, k, k, -k]
+        values = [*constant, *(-k for *_, k in scene.system.elements(y[:n]))]
         out[:] = matrix(np.concatenate(values)).data
 
     pattern = matrix(np.ones(len(where[0])))

@@ -208,11 +208,10 @@ def _sums(system: System, of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]
         if isinstance(term, Damping):
             np.add.at(friction, term.i, exactly(term.c))
             continue
-        ends, row = term.particles, exactly(np.broadcast_to(term.curvature(zero), (len(term),)))
+        row = exactly(np.broadcast_to(term.curvature(zero), (len(term),)))
         term.add_pull(row * -exactly(getattr(term, term.origin)), force)
-        for one in range(len(ends)):
-            for other in range(len(ends)):
-                np.add.at(k, (ends[one], ends[other]), row if one == other else -row)
+    for one, other, added in system.elements(zero):
+        np.add.at(k, (one, other), exactly(added))
     return of(k), force, friction / exactly(system.m)
 
 

@@ -46,7 +46,7 @@ def wide(x: Any) -> Extended:
 
 def one_each(scene: Scene) -> bool:
     """Whether one term alone acts on each particle."""
-    return bool(np.all(scene.system.pulls == 1))
+    return bool(np.all(scene.system.pulls() == 1))
 
 
 def latency(m1: Extended) -> Extended:
