@@ -14,10 +14,10 @@ import census as by_hand
 from springcheck import engines, simulate
 from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import measure as census
 from springcheck.studies.census.result import Entry
 from springcheck.studies.team import Processes
-from springcheck.trajectory import Trajectory
 
 OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 

@@ -15,8 +15,8 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE, Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Trajectory, Verdict
 
 Need = Callable[[str], None]
 

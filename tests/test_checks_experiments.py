@@ -20,8 +20,8 @@ from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

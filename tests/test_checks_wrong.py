@@ -20,11 +20,11 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE, Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 from springcheck.studies.precision import accuracy, fits
 from springcheck.studies.precision.points import Point
 from springcheck.studies.run import measure as session
-from springcheck.trajectory import Trajectory, Verdict
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
 NAN = float("nan")

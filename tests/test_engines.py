@@ -17,7 +17,7 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

@@ -17,7 +17,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

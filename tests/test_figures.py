@@ -18,9 +18,9 @@ from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.attached import ATTACHED
 from springcheck.studies.run import figure as trajectories
-from springcheck.trajectory import Trajectory
 
 mpl.use("agg")
 

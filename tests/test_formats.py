@@ -19,7 +19,7 @@ from springcheck import simulate
 from springcheck.cli import main
 from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
 

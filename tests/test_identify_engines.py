@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import springcheck
 from springcheck.identify import Identification, identify
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 PRECISIONS = {"double": "fixed-point force", "mixed": "mixed", "single": "single"}
 GRID = (("spring", (1, 5)), ("spring-uneven", (2, 10)))

@@ -14,8 +14,8 @@ from springcheck.physics import exact
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Trajectory, Verdict
 
 FIXED = [n for n, s in schemes.SCHEMES.items() if s.one_step and not s.flow and not s.mixes]
 

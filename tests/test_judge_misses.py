@@ -15,8 +15,8 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Trajectory
 
 
 def plain(scene: Scene, name: str, moved: Scene | None = None) -> Trajectory:

@@ -20,9 +20,9 @@ from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 from springcheck.store import tables
 from springcheck.studies.faults import clean
-from springcheck.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 
 VALIDATION = Path(__file__).parent.parent / "validation"
 sys.path.insert(0, str(VALIDATION))

@@ -14,7 +14,7 @@ import pytest
 import springcheck
 from springcheck.errors import SpringcheckError
 from springcheck.physics.terms import Quartic
-from springcheck.trajectory import Comparison
+from springcheck.physics.trajectory import Comparison
 
 NAMES = [
     "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",

@@ -27,8 +27,8 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.exact import normal
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run import measure as session
-from springcheck.trajectory import Trajectory
 
 Need = Callable[[str], None]
 

@@ -19,8 +19,8 @@ from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
 from springcheck.store import draft, reading
-from springcheck.trajectory import Comparison, Outcome, Timing, Trajectory, Verdict
 
 LABELS = ["own:euler", "openmm:verlet@OpenCL-mixed", "sundials:adams"]
 

@@ -20,8 +20,8 @@ import pytest
 
 from springcheck import store
 from springcheck.errors import StoreError
+from springcheck.physics.trajectory import Comparison
 from springcheck.store import seal, trust
-from springcheck.trajectory import Comparison
 from test_store import LABELS, scene, trajectory
 
 READERS: list[Callable[[Path], object]] = [

@@ -18,9 +18,9 @@ from h5grove.content import get_content_from_file
 
 from springcheck import engines, simulate, store
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.trajectory import Comparison
 from springcheck.studies.stability import regions
 from springcheck.studies.stability.result import REGIONS
-from springcheck.trajectory import Comparison
 from test_store import LABELS, scene, trajectory, written
 
 OPTIONS: dict[str, Any] = {"swmr": True, "locking": False}

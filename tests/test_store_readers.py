@@ -18,7 +18,7 @@ from silx.io import open as silx_open
 
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.trajectory import Comparison
+from springcheck.physics.trajectory import Comparison
 from test_store import LABELS, scene, trajectory, written
 
 

@@ -30,8 +30,8 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping
+from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Limits, Trajectory, Verdict
 
 TURNS = (0.001, 0.01, 0.1, 0.5, 1.0, 1.5, 1.9)
 METHODS = (

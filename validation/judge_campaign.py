@@ -37,8 +37,8 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import clean, steppers
-from springcheck.trajectory import Trajectory
 
 FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow)
 COUNTED = 20.0

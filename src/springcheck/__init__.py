@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
-    from springcheck.trajectory import Trajectory, Verdict
+    from springcheck.physics.trajectory import Trajectory, Verdict
 
 __version__ = "0.1.0"
 
@@ -35,8 +35,8 @@ __all__ = [
 
 _HOMES = {
     "Scene": "physics.scene",
-    "Trajectory": "trajectory",
-    "Verdict": "trajectory",
+    "Trajectory": "physics.trajectory",
+    "Verdict": "physics.trajectory",
     "chain": "physics.builders",
     "compare": "api",
     "exact": "api",

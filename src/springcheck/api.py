@@ -15,7 +15,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import exact as solutions
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Comparison, Outcome, Trajectory, Verdict
+from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
 
 if TYPE_CHECKING:
     from springcheck.identify.result import Identification

@@ -29,7 +29,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "uneven_scenes"]
 

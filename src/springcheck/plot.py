@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from springcheck.errors import SpringcheckError
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,7 +18,7 @@ from springcheck.errors import MethodError
 from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Outcome, Timing, Trajectory
+from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""

@@ -31,7 +31,7 @@ from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import CONTRACTED, arithmetic, first_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Limits, Trajectory, Verdict
+from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 
 __all__ = [
     "ALL", "CHECKS", "CONTRACTED", "TELLING", "THOROUGH", "Bench", "Case", "Check", "Experiment", "Run",

@@ -14,7 +14,7 @@ from springcheck.checks.case import Case
 from springcheck.physics import exact
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 Run: TypeAlias = Callable[[Scene, str], Trajectory]
 """(scene, label) -> trajectory.  May raise MethodError: the experiment does not apply then."""

@@ -17,8 +17,8 @@ from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force
 from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
+from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.stepping import Slope
-from springcheck.trajectory import Trajectory
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 import numpy as np
 
 from springcheck.physics.arrays import WIDE
-from springcheck.trajectory import NOT_KNOWN, Limits, Verdict
+from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 
 BEYOND = 2.0**511
 """Stands for every value that fails and is no number or larger: a verdict and its ratio are numbers."""

@@ -14,7 +14,7 @@ from springcheck.checks.steps import fastest
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Comparison, Trajectory
+from springcheck.physics.trajectory import Comparison, Trajectory
 
 EXACT = "exact"
 """The label of the exact solution among the others."""

@@ -15,8 +15,8 @@ from springcheck.checks.steps import step_defect
 from springcheck.checks.stretch import JOINED, follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import NOT_KNOWN, Limits
 from springcheck.text.wording import count
-from springcheck.trajectory import NOT_KNOWN, Limits
 
 
 def _no_matrix(bench: Bench) -> str | None:

@@ -25,7 +25,7 @@ from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
-from springcheck.trajectory import Limits, Trajectory
+from springcheck.physics.trajectory import Limits, Trajectory
 
 HALVINGS = 6
 CHANCE = 1e-3

@@ -11,8 +11,8 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import STILL, closed_or_not
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
+from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
-from springcheck.trajectory import Limits
 
 
 def growth_bound(case: Case) -> tuple[Floats, Floats]:

@@ -22,7 +22,7 @@ from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Arithmetic, Extended, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.trajectory import NOT_KNOWN, Limits
+from springcheck.physics.trajectory import NOT_KNOWN, Limits
 
 CHANGE = 2.0**-20
 """Relative change of which the quotients are taken, over the phase of the motion: what is left out of them is

@@ -16,8 +16,8 @@ from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.system import MOST_JOINED
+from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
-from springcheck.trajectory import Limits
 
 CONTRACTED = 1e-3
 """Determinant of a step below which its powers are not formed: as the difference of two products it has

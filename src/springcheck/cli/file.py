@@ -17,10 +17,10 @@ from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
+from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
-from springcheck.trajectory import Outcome, Trajectory, Verdict
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import store
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Result, Study
 from springcheck.text.lines import Lines, Table, plain, table
 from springcheck.text.wording import ordinal
-from springcheck.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

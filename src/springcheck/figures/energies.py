@@ -14,7 +14,7 @@ from springcheck.figures.overlay import TRUTH, Frame, Group, every
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 MOST = 1e3
 """Energies and errors, relative to those of the start, beyond which nothing is read off a picture."""

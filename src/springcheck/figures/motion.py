@@ -9,7 +9,7 @@ import numpy as np
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 Motion = tuple[Floats, Floats, Floats]
 """t (f,) [T], q and p (f, n)."""

@@ -16,7 +16,7 @@ from springcheck.figures import looks
 from springcheck.figures.views import units
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 TRUTH: dict[str, Any] = {
     "color": "#b3b3b3",

@@ -15,7 +15,7 @@ from springcheck.figures.overlay import TRUTH, Frame, Group, every
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 EQUAL = 2.5
 """Ratio of two ranges up to which equal scales on both axes help."""

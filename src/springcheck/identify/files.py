@@ -14,7 +14,7 @@ from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
-from springcheck.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory
 
 MOST_FRAMES = 20_000
 """Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""

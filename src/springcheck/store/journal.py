@@ -25,12 +25,12 @@ import h5py
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
 from springcheck.store.parts import Parts, claim, name_of, opened, parts_folder
 from springcheck.store.tables import Table
-from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 COLLECTION = "collection.new"
 

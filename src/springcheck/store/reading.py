@@ -13,12 +13,12 @@ import numpy as np
 
 from springcheck.errors import StoreError, nearest
 from springcheck.physics.arrays import Floats
+from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
 from springcheck.store import access, digests, files, layout, parts, pieces, records, tables
 from springcheck.store.access import Scalar
 from springcheck.store.parts import Parts, claim, opened, parts_folder
 from springcheck.store.records import Record
 from springcheck.store.tables import Table
-from springcheck.trajectory import Comparison, Outcome, Trajectory, Verdict
 
 MAPPED = 1 << 26
 """Arrays larger than this [B] are mapped into memory, not read: their pages come when they are used."""

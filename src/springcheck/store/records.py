@@ -12,8 +12,8 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Kind, Units
+from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 from springcheck.store.access import Scalar
-from springcheck.trajectory import Outcome, Timing, Trajectory
 
 Count = Annotated[int, msgspec.Meta(ge=0, lt=2**53)]
 Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]

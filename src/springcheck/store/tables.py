@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
+from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.store import access
 from springcheck.store.access import Scalar
 from springcheck.store.layout import RESERVED, write_attributes, write_unit
-from springcheck.trajectory import Comparison, Limits, Verdict
 
 _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""

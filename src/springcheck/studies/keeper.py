@@ -18,11 +18,11 @@ from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies import provenance
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
 from springcheck.studies.team import ALONE, Team
-from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 __all__ = [
     "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restored",

@@ -18,9 +18,9 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import Finding, Summary
 from springcheck.studies.charts import numbers
-from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 NUMBERS = 15_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""

@@ -15,9 +15,9 @@ from markupsafe import Markup
 from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
+from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
 from springcheck.text.wording import ordinal
-from springcheck.trajectory import Verdict
 
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'

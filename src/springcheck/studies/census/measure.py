@@ -17,6 +17,7 @@ from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.census.result import ENTRIES, Census, Entry
@@ -24,7 +25,6 @@ from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Keeper, each
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
-from springcheck.trajectory import Trajectory
 
 EVERY = "*:*"
 """Every method of every engine; of an engine that has default ones, those."""

@@ -14,14 +14,15 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from springcheck import checks, engines, schemes, trajectory
+from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
 from springcheck.engines.contract import Label
+from springcheck.physics import trajectory
 from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.tables import column
-from springcheck.trajectory import Trajectory
 
 Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"

@@ -17,6 +17,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.faults import clean, steppers
@@ -25,7 +26,6 @@ from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
-from springcheck.trajectory import Trajectory
 
 
 @cache

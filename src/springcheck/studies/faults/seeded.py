@@ -15,8 +15,8 @@ from springcheck import schemes
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
-from springcheck.trajectory import Outcome, Trajectory
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
 Where: TypeAlias = Literal["spring", "chain", "long spring"]

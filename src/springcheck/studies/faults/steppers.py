@@ -13,8 +13,8 @@ import numpy as np
 from springcheck import schemes
 from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.schemes.stepping import Slope
-from springcheck.trajectory import Outcome, Trajectory
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]

@@ -9,9 +9,9 @@ import numpy as np
 
 from springcheck.physics import memory
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.text.wording import ordinal
-from springcheck.trajectory import Trajectory
 
 MOST_FRAMES = 4001
 """Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""

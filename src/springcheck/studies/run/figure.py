@@ -12,8 +12,8 @@ from springcheck.figures.motion import Exact, true_motion
 from springcheck.figures.overlay import every
 from springcheck.figures.views import views
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import Stored
-from springcheck.trajectory import Trajectory
 
 
 def pictures(found: Stored, *, particle: int | None = None) -> dict[str, Figure]:

@@ -20,11 +20,11 @@ from springcheck.errors import MethodError, SpringcheckError, StoreError
 from springcheck.physics import exact, memory, scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.result import FAULT, MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.study import Progress
-from springcheck.trajectory import Comparison, Trajectory, Verdict
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble

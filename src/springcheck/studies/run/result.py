@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from springcheck import checks
 from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
 from springcheck.text.wording import count
-from springcheck.trajectory import Comparison, Verdict
 
 if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable

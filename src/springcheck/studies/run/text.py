@@ -12,13 +12,13 @@ from rich.text import Text
 from springcheck import checks, schemes
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Row, Table, plain, table
 from springcheck.text.wording import count, seconds
-from springcheck.trajectory import Comparison, Limits, Verdict
 
 
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:

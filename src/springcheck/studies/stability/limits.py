@@ -11,10 +11,10 @@ from springcheck import engines, schemes, simulate
 from springcheck.checks.stats import line
 from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
 from springcheck.studies.tables import column
-from springcheck.trajectory import Trajectory
 
 FIRST, LAST, COARSE = 1e-9, 1e6, 4096
 """The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
