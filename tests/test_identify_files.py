@@ -61,6 +61,18 @@ def document(capsys: pytest.CaptureFixture[str]) -> dict:
     return found
 
 
+def test_an_h5md_file_of_positions_alone_says_what_they_leave_open(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(*motion())
+    with h5py.File(path, "a") as file:
+        del file["particles/bead/velocity"]
+    assert main(["identify", path]) == 0
+    assert "positions alone show a frequency" in " ".join(capsys.readouterr().out.split())
+    assert main(["judge", path, "--scene", "spring", "--scheme", "velocity-verlet"]) == 2
+    assert "velocity beside its positions" in capsys.readouterr().err
+
+
 def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     path = written(*motion(), kind="f4")
     assert main(["identify", path, "--json"]) == 0

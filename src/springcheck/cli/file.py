@@ -180,7 +180,7 @@ def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
             t=group.t,
             q=group.q.reshape(len(group.t), -1),
             p=None,
-            v=group.v.reshape(len(group.t), -1),
+            v=np.reshape(np.asarray(group.v), (len(group.t), -1)),
             mass=group.mass,
             roundoff=max(2.0**-53, group.roundoff),
         )

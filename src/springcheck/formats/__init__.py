@@ -68,8 +68,8 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -
     """The trajectories of an HDF5 file that is neither a store nor H5MD, by name.
 
     Every group with datasets of times, positions, and momenta or velocities (unless positions may be `alone`)
-    is one; or `columns` name the
-    datasets, as ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where there is none.
+    is one; or `columns` name the datasets, as ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where
+    there is none.
     """
     if columns:
         wanted = {text.rpartition("=")[2].strip("/") for text in columns}

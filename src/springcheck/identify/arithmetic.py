@@ -121,12 +121,14 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     d = 1e-6
     one = _slipped(matches, found, 0.0, between=False).astype(np.float64)
     change = _slipped(matches, found, d, between=False) - _slipped(matches, found, -d, between=False)
-    out = np.zeros((len(matches), len(found.z) - 1, 2))
+    lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
+    out = np.zeros((len(matches), len(lengths), 2))
     for i, match in enumerate(matches):
-        ways = powers(one[i], match.stride)
+        ways = powers(one[i], match.stride).astype(np.float64)
         each = ways[::-1] @ (change[i] / (2 * d)).astype(np.float64) @ ways
-        apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=0)
-        out[i] = match.stride * record.clock * np.abs(found.z[:-1].astype(np.float64)) @ apart.T
+        apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=(0, 2))
+        # where steps differ alike in every frame another stiffness takes a part of it, and is off by as much
+        out[i] = match.stride * record.clock * lengths[:, None] * apart
     return out
 
 
@@ -156,9 +158,11 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     at = centre + np.maximum(step, first) @ centre
     # sums of absolute values: what a rounding of either term is relative to
     size = np.abs(z[:-1]) @ np.swapaxes(first, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
-    # states between two frames lie on the same orbit: either component may be as large as the whole
+    # states between two frames lie on the same orbit: either component may be as large as the whole, and a
+    # frame's last step rounds by what it adds up
     lengths = np.sqrt(np.sum(z**2, axis=1))
-    size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * (lengths[:-1] + lengths[1:])[:, None]
+    later = np.abs(z[1:]) @ np.swapaxes(step, 1, 2) + (lengths[:-1] + lengths[1:])[:, None]
+    size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * later
     # a solution is evaluated at times, and their rounding turns the phase
     turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
     flow = np.array([scheme.flow for scheme in schemes])
@@ -192,9 +196,8 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
     plain = rounded <= np.minimum(path, usual)
     if visible:
-        # an equilibrium away from 0, a decay within a frame and an uneven clock make roundings larger
-        damped = np.array([abs(match.friction) > 0 for match in matches]) | bool(np.any(centre > 0))
-        most = np.where(damped | follows, path, np.minimum(path, UNUSUAL * usual))
+        # an uneven clock makes roundings larger
+        most = np.where(follows, path, np.minimum(path, UNUSUAL * usual))
         for i in np.flatnonzero((rounded <= most) & ~plain).tolist():
             # an uneven clock's roundings follow its times; others are irregular, or they are no roundings
             plain[i] = follows[i] or coarse.irregular(signed[i] / size[i])

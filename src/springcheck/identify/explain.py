@@ -340,9 +340,7 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
         )
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
-    where = (
-        "depends on the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
-    )
+    where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
     if not irregular(e.misses * e.found.weight[:, None]):
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "

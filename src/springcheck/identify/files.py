@@ -68,7 +68,7 @@ def read(
     else:
         found = list(_foreign(path, label))
     if not found:
-        names = names or list(store.read_foreign(path, 2))
+        names = names or list(store.read_foreign(path, 2, alone=True))
         raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
     return found
 
@@ -117,7 +117,7 @@ def _adaptive(run: store.Run) -> str:
 
 
 def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
-    for name, group in store.read_foreign(path, MOST_FRAMES + 1).items():
+    for name, group in store.read_foreign(path, MOST_FRAMES + 1, alone=True).items():
         if wanted not in (None, name):
             continue
         notes: list[str] = []
@@ -125,12 +125,13 @@ def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
             notes.append(f"the first {len(group.t)} frames were looked at")
         frames, n, dimensions = group.q.shape
         mass = None if group.mass is None else np.repeat(group.mass, dimensions)
-        factor = _velocity_factor(group.units, notes)
-        v = group.v.reshape(frames, n * dimensions) * factor
         q = group.q.reshape(frames, n * dimensions)
-        chosen, remarks = _chosen(q, v, notes)
+        v = None
+        if group.v is not None:
+            v = group.v.reshape(q.shape) * _velocity_factor(group.units, notes)
+        chosen, remarks = _chosen(q, np.zeros_like(q) if v is None else v, notes)
         yield States(
-            label=name, t=group.t, q=q[:, chosen], p=None, v=v[:, chosen],
+            label=name, t=group.t, q=q[:, chosen], p=None, v=None if v is None else v[:, chosen],
             mass=None if mass is None else mass[chosen], notes=remarks,
         )  # fmt: skip
 

@@ -49,7 +49,7 @@ def main(kind: str, path: Path) -> str:
     try:
         for _ in foreign.arrays(path, lambda place: True):
             pass
-        foreign.load(path)
+        foreign.load(path, alone=True)
     except StoreError as error:
         return str(error)
     return ""

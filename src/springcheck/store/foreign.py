@@ -25,7 +25,8 @@ DEEPEST = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Foreign:
-    """One particle group of an H5MD file: t (f,), q and v (f, n, 3), mass (n,) or None.
+    """One particle group of an H5MD file: t (f,), q and v (f, n, 3), mass (n,) or None; v is None where
+    positions stand alone.
 
     `units` has those of q, v, t and mass that the file names; `roundoff` is the unit roundoff of the
     numbers as they were stored (6e-8 for single precision).
@@ -34,14 +35,15 @@ class Foreign:
     name: str
     t: Floats
     q: Floats
-    v: Floats
+    v: Floats | None
     mass: Floats | None
     units: Mapping[str, str]
     roundoff: float
 
 
-def read_foreign(path: str | Path, most: int | None = None) -> dict[str, Foreign]:
-    """Particle groups of an H5MD file by name, those that have positions and velocities.
+def read_foreign(path: str | Path, most: int | None = None, *, alone: bool = False) -> dict[str, Foreign]:
+    """Particle groups of an H5MD file by name, those that have positions and velocities; where none has both
+    and positions may be `alone`, those that have positions.
 
     `most` frames are read, from the first on; None for all.
 
@@ -50,22 +52,24 @@ def read_foreign(path: str | Path, most: int | None = None) -> dict[str, Foreign
     """
     path = Path(path)
     trust.trust(path, trust.FOREIGN)
-    return load(path, most)
+    return load(path, most, alone=alone)
 
 
-def load(path: Path, most: int | None = None) -> dict[str, Foreign]:
+def load(path: Path, most: int | None = None, *, alone: bool = False) -> dict[str, Foreign]:
     """The same in this process, whatever the file does to libhdf5."""
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
         names = access.children(file, "particles")
         if not names:
             raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
         found = dict(_groups(path, file, names, most))
-        if not found:
+        whole = {name: group for name, group in found.items() if group.v is not None}
+        if not (whole or (alone and found)):
+            lacks = "position and velocity" if not found else "velocity beside its positions"
             raise StoreError(
-                f"{path} has no group under /particles with both position and velocity ({', '.join(names)}): "
-                "write velocities too, nothing can be told from positions alone"
+                f"{path} has no group under /particles with {lacks} ({', '.join(names)}): write velocities "
+                "too; of positions alone `springcheck identify` says what they leave open"
             )
-        return found
+        return whole or found
 
 
 def is_foreign(path: str | Path) -> bool:
@@ -123,12 +127,17 @@ def _places(group: Any, before: str, depth: int = 0) -> Iterator[str]:
 def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:
     for name in names:
         group = access.find(file, f"particles/{name}")
-        if not isinstance(group, h5py.Group) or not {"position", "velocity"} <= set(access.members(group)):
+        elements = set(access.members(group)) if isinstance(group, h5py.Group) else set()
+        if "position" not in elements:
             continue
-        q, v = _numbers(path, group, "position/value"), _numbers(path, group, "velocity/value")
+        q = _numbers(path, group, "position/value")
+        v = _numbers(path, group, "velocity/value") if "velocity" in elements else q
         if q.ndim != 3 or q.shape[1:] != v.shape[1:] or not q.size:
             raise _unlike(path, name, q.shape, v.shape)
-        t, rows_q, rows_v = _common(path, name, group, len(q), len(v))
+        if v is q:
+            t, rows_q, rows_v = _axis(path, group, "position", "time", len(q)), slice(None), slice(None)
+        else:
+            t, rows_q, rows_v = _common(path, name, group, len(q), len(v))
         kept = max(1, MOST_NUMBERS // (q.shape[1] * q.shape[2]))
         kept = kept if most is None else min(most, kept)
         if len(t) > kept:
@@ -137,7 +146,9 @@ def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterat
         if values[0].shape != values[1].shape:
             raise _unlike(path, name, values[0].shape, values[1].shape)
         time = access.find(group, "position/time")
-        units = {key: _unit(node) for key, node in (("q", q), ("v", v), ("t", time))}
+        units = {
+            key: _unit(node) for key, node in (("q", q), ("v", v), ("t", time)) if key != "v" or v is not q
+        }
         mass, units["mass"] = _mass(path, group, q.shape[1])
         yield (
             name,
@@ -145,7 +156,7 @@ def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterat
                 name=name,
                 t=t,
                 q=values[0],
-                v=values[1],
+                v=None if v is q else values[1],
                 mass=mass,
                 units={key: unit for key, unit in units.items() if unit},
                 roundoff=max(
