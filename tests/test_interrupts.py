@@ -291,6 +291,55 @@ def test_an_interrupt_as_the_new_store_is_opened_leaves_no_half_of_it(
     assert store.summary(tmp_path / "s.h5").complete
 
 
+@posix
+@pytest.mark.parametrize(
+    "body",
+    [
+        # as its removal begins
+        "import shutil; right = shutil.rmtree\n"
+        "    def removed(name, **how): os.kill(os.getpid(), signal.SIGINT); right(name, **how)\n"
+        "    shutil.rmtree = removed\n"
+        "    with interrupts.folder() as made: (made / 'file').touch()",
+        # where nobody comes to remove it in time
+        "interrupts.GRACE = 0.1\n"
+        "    with interrupts.folder() as made:\n"
+        "        (made / 'file').touch(); os.kill(os.getpid(), signal.SIGINT)\n"
+        "        while True:\n"
+        "            try: time.sleep(60)\n"
+        "            except BaseException: pass",
+    ],
+)
+def test_no_temporary_folder_outlives_an_interrupt(body: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(body="import os, signal\n    " + body)],
+        env=os.environ | {"TMPDIR": str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes in")
+@pytest.mark.parametrize("swallowed", [False, True])
+def test_a_program_that_was_called_ends_with_all_that_it_has_started(swallowed: bool) -> None:
+    words = ["sh", "-c", "sleep 60 & kill -TERM $PPID; wait"]
+    body = f"interrupts.called({words}, 60)"
+    if swallowed:
+        body = (
+            "def deaf(*_, **__):\n"
+            "        while True:\n"
+            "            try: time.sleep(60)\n"
+            "            except BaseException: pass\n"
+            f"    interrupts.GRACE = 0.1; import subprocess; subprocess.Popen.communicate = deaf; {body}"
+        )
+    with subprocess.Popen(
+        [sys.executable, "-c", SCRIPT.format(body=body)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "springcheck: interrupted\n")
+    assert interrupting._left(process.pid) == 0
+
+
 SHOWN = """
 import builtins, os, signal, sys
 from springcheck import __main__

@@ -12,6 +12,13 @@ import signal
 import sys
 import time
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+    from typing import Any, ClassVar
+
 STATUS = 130
 """Exit status of a program that was interrupted, as shells expect it."""
 
@@ -31,6 +38,8 @@ class _State:
     """Its KeyboardInterrupt is on its way; further signals hurry nothing and spoil nothing."""
     held = 0
     message = "interrupted"
+    ends: ClassVar[set[Callable[[], object]]] = set()
+    """What the end of the process takes with it, wherever it is then: temporary folders, other processes."""
     errors = 2
     """Standard error as it was: a library's messages may be caught while the signal comes; 2 until `install`
     keeps another."""
@@ -86,6 +95,8 @@ def finish() -> None:
 
 def leave() -> None:
     """End an interrupted process now, with one line and none from the interpreter's shutdown."""
+    for end in list(_State.ends):
+        end()
     _say()
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -106,6 +117,78 @@ class held:  # noqa: N801  (a context manager reads as a word)
         if _State.seen and not (_State.held or _State.raised) and kind is None:
             _State.raised = True
             raise KeyboardInterrupt
+
+
+def takes(end: Callable[[], object]) -> None:
+    """Have `end` called when the process is ended by an interrupt; `forget` it where it has been done."""
+    _State.ends.add(end)
+
+
+def forget(end: Callable[[], object]) -> None:
+    """See `takes`."""
+    _State.ends.discard(end)
+
+
+class folder:  # noqa: N801
+    """A temporary folder, as `tempfile.mkdtemp` makes it, that no interrupt leaves behind."""
+
+    def __init__(self, *, prefix: str | None = None, dir: Path | None = None) -> None:
+        self._prefix, self._dir, self._name = prefix, dir, ""
+
+    def __enter__(self) -> Path:
+        from pathlib import Path
+        from tempfile import mkdtemp
+
+        takes(self._remove)
+        with held():
+            self._name = mkdtemp(prefix=self._prefix, dir=self._dir)
+        return Path(self._name)
+
+    def __exit__(self, *_: object) -> None:
+        with held():
+            self._remove()
+            forget(self._remove)
+
+    def _remove(self) -> None:
+        import shutil
+
+        shutil.rmtree(self._name, ignore_errors=True)
+
+
+def called(words: Sequence[str], seconds: float, **how: Any) -> subprocess.CompletedProcess[bytes]:
+    """Call a program and catch what it prints; where it is left, it ends with all that it has started.
+
+    Raises OSError where there is no such program, subprocess.TimeoutExpired after so many seconds.
+    """
+    import subprocess
+
+    pipe = subprocess.PIPE
+    with held():
+        program = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, process_group=0, **how
+        )
+
+        def kill() -> None:
+            try:
+                os.killpg(program.pid, signal.SIGKILL)
+            except AttributeError:
+                program.kill()  # on Windows
+            except OSError:
+                return
+
+        takes(kill)
+    try:
+        out, err = program.communicate(timeout=seconds)
+    except BaseException:
+        kill()
+        for stream in (program.stdout, program.stderr):
+            if stream is not None:
+                stream.close()
+        program.wait()
+        raise
+    finally:
+        forget(kill)
+    return subprocess.CompletedProcess(words, program.returncode, out, err)
 
 
 def _raise(number: int, frame: object) -> None:

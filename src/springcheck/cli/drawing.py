@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck import store
+from springcheck import interrupts, store
 from springcheck.cli import inspect
 from springcheck.errors import SpringcheckError, plain
 from springcheck.figures import folder
@@ -43,10 +42,10 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
         held = " and ".join(study.name for study, _ in studies)
         raise SpringcheckError(f"{path}: {what} {whose}, and it holds {held}")
     notes: list[str] = []
-    with tempfile.TemporaryDirectory() as name:
+    with interrupts.folder() as made:
         written: list[Path] = []
         for study, found in drawn:
-            written += study.draw(found, Path(name), **chosen)
+            written += study.draw(found, made, **chosen)
             notes += getattr(found, "notes", ())
         if not written:
             raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
@@ -81,7 +80,7 @@ def draw_foreign(
         if particle is None and left
         else []
     )
-    with style(), tempfile.TemporaryDirectory() as made:
+    with style(), interrupts.folder() as made:
         figure = Figure(figsize=(9.2, 4.2), layout="constrained")
         portrait, motion = figure.subplots(1, 2)
         for i in chosen.tolist() or [0]:
@@ -93,4 +92,4 @@ def draw_foreign(
         motion.set_xlabel("t")
         motion.set_ylabel("q")
         figure.suptitle(plain(f"{path.name}: {count(len(found.t), 'frame')}"))
-        return folder.put(save(figure, Path(made), "states"), into, path), notes
+        return folder.put(save(figure, made, "states"), into, path), notes

@@ -11,14 +11,13 @@ import re
 import shlex
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck import formats, schemes
+from springcheck import formats, interrupts, schemes
 from springcheck.doors.function import UNKNOWN
 from springcheck.engines import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
@@ -132,14 +131,12 @@ class _Command:
         self._row = int(rows[-1])
 
     def _run(self, every: int) -> tuple[Floats, Floats]:
-        with tempfile.TemporaryDirectory(prefix="springcheck-") as folder:
-            scene, out = Path(folder) / "scene.json", Path(folder) / "out"
+        with interrupts.folder(prefix="springcheck-") as folder:
+            scene, out = folder / "scene.json", folder / "out"
             scene.write_text(json.dumps(as_json(self._scene, self._h, every)))
             words = [word.replace("{scene}", str(scene)).replace("{out}", str(out)) for word in self._words]
             try:
-                done = subprocess.run(
-                    words, capture_output=True, timeout=self._seconds, check=False, stdin=subprocess.DEVNULL
-                )
+                done = interrupts.called(words, self._seconds)
             except subprocess.TimeoutExpired as error:
                 raise MethodError(
                     f"command {self._name} did not end within {self._seconds:g} s; --timeout gives it more"

@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 
 from springcheck.errors import StoreError
+from springcheck.interrupts import called
 from springcheck.store import files, seal
 
 OURS, FOREIGN = "ours", "foreign"
@@ -79,13 +80,10 @@ def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     limit = LIMIT + path.stat().st_size / SPEED
     try:
-        done = subprocess.run(
+        done = called(
             [sys.executable, "-P", "-m", MODULE, kind, str(path), str(int(limit) + 1), str(MEMORY)],
-            capture_output=True,
             # on a busy machine it waits longer than it works, and work is what is limited
-            timeout=6 * limit,
-            check=False,
-            stdin=subprocess.DEVNULL,
+            6 * limit,
             env={**os.environ, **threads, "PYTHONPATH": paths},
         )
     except subprocess.TimeoutExpired:

@@ -35,6 +35,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, 
                 ours, theirs = get_context("spawn").Pipe()
                 process = get_context("spawn").Process(target=_work, args=(theirs,), daemon=True)
                 process.start()
+                interrupts.takes(process.kill)
                 theirs.close()
                 team[ours] = process
             ours.send(ahead.pop())
@@ -46,13 +47,13 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, 
                     ours.send(ahead.pop())
                 else:
                     ours.close()
-                    team.pop(ours).join()
+                    _ended(team.pop(ours))
     finally:
         with interrupts.held():
             for process in team.values():
                 process.kill()
             for ours, process in team.items():
-                process.join()
+                _ended(process)
                 ours.close()
 
 
@@ -67,6 +68,11 @@ def _answer(ours: Any, team: dict[Any, Any]) -> Any:
     if not good:
         raise found
     return found
+
+
+def _ended(process: Any) -> None:
+    process.join()
+    interrupts.forget(process.kill)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck import checks, engines, simulate
+from springcheck import checks, engines, interrupts, simulate
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
@@ -325,7 +325,6 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
 
     `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
     """
-    import tempfile
 
     known = {run.label: run for run in keeper.summary(path).runs}
     chosen = [label for label in known if not methods or any(fnmatchcase(label, m) for m in methods)]
@@ -344,8 +343,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
     beside = path.absolute().parent
     # where there was room for the store there is room for its repetition, unless it is kept read-only
     place = beside if os.access(beside, os.W_OK) else None
-    with tempfile.TemporaryDirectory(dir=place, prefix=".springcheck-") as folder:
-        again = Path(folder) / "again.h5"
+    with interrupts.folder(dir=place, prefix=".springcheck-") as folder:
+        again = folder / "again.h5"
         with keeper.kept(again, "repeat") as kept:
             bar = _Bar(progress, len(chosen))
             for name in chosen:
