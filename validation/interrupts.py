@@ -1,6 +1,6 @@
 """Ctrl-C and SIGTERM at random moments of every command: no result, no traceback, nothing left behind.
 
-    python validation/interrupts.py [interrupts] [seed]
+    python validation/interrupts.py [interrupts] [seed] [commands, with commas between them]
 
 Every command is started in an empty folder, with an empty folder for temporary files and a session of its
 own, and gets SIGINT or SIGTERM at a random moment between its start and its usual end; every third one gets
@@ -13,10 +13,11 @@ a second signal shortly after.  Then:
 
 In the end each command is given once more in the folder of its last interrupt, and must end as it does
 undisturbed, with the same files.  Every fourth command is a process of its own from its first instruction
-on; the others are forked from one that has imported NumPy, h5py, Matplotlib and springcheck, so that their
-moments lie in the work and not in imports.  Signals before the first line of springcheck meet the
-interpreter, whose own way with them is a traceback or death by the signal: nothing that is ours runs yet.
-They are counted apart, as are those that came too late.
+on, every other one of these without any compiled module, kernel or table of fonts; the others are forked from
+one that has imported NumPy, h5py, Matplotlib and springcheck, so that their moments lie in the work and not
+in imports.  Signals before the first line of springcheck meet the interpreter, whose own way with them is a
+traceback or death by the signal: nothing that is ours runs yet.  They are counted apart, as are those that
+came too late.
 
 Expected for 500 interrupts: every line ends in "0 wrong".
 
@@ -36,6 +37,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,6 +51,14 @@ WITHIN = 2.0
 
 LONGEST = 6.0
 """Seconds of a command in which it is interrupted."""
+
+EULER = Path(__file__).parents[1] / "tests" / "command-examples" / "euler.sh"
+COMMAND = f"awk=sh -c 'sleep 1; sh {EULER} $0 $1' {{scene}} {{out}}"
+
+STEPPER = """def step(q, p, h, force, mass):
+    p = p + h * force(q)
+    return q + h * p / mass, p
+"""
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "run": ("run", "spring-uneven"),
@@ -79,6 +89,23 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "check": ("check", "input.h5"),
     "export": ("export", "input.h5", "own:euler", "out.h5md"),
     "list": ("list",),
+    "ensemble": ("ensemble", "spring", "--vary", "spring.0.stiffness=1:9:60000", "--method", "own:*euler"),
+    "precision --workers": ("precision", "spring-uneven", "--method", "own:*", "--workers", "2"),
+    "stability --workers": ("stability", "spring-uneven", "--method", "own:*", "--workers", "2"),
+    "faults --workers": ("faults", "--workers", "2"),
+    "run --command": ("run", "spring-uneven", "--method", "command:*", "--command", COMMAND),
+    "run --stepper": ("run", "spring-uneven", "--method", "*step", "--stepper", "mine.py:step", "--thorough"),
+    "run --cluster": ("extremes", "--quick", "--method", "own:*", "--cluster", "scheduler.json"),
+    "report": ("report", "input.h5"),
+    "judge": (
+        *("judge", "input.h5", "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"),
+        *("--trajectory", "own:semi-implicit-euler"),
+    ),
+    "identify --stepper": ("identify", "--stepper", "mine.py:step"),
+    "identify --workers": ("identify", *["input.h5"] * 6, "--workers", "2"),
+    "plot of a table": ("plot", "input.csv", "-o", "figures"),
+    "show": ("show", "spring", "-o", "my.toml"),
+    "explain": ("explain", "velocity-verlet"),
 }
 
 
@@ -137,17 +164,21 @@ def _known(name: str) -> bool:
     path = Path(name)
     if ".new" in name:
         return False
-    return name.startswith(("figures", "out.h5md")) or path.suffix == ".h5" or ".h5.parts" in name
+    return (
+        name.startswith(("figures", "out.h5md", "input.html", "my.toml"))
+        or path.suffix == ".h5"
+        or ".h5.parts" in name
+    )
 
 
 class Fresh:
     """A command in a process of its own."""
 
-    def __init__(self, command: tuple[str, ...], folder: Path, temporary: str) -> None:
+    def __init__(self, command: tuple[str, ...], folder: Path, temporary: str, **env: str) -> None:
         self._process = subprocess.Popen(
             [sys.executable, "-m", "springcheck", *command],
             cwd=folder,
-            env=os.environ | {"TMPDIR": temporary},
+            env=os.environ | {"TMPDIR": temporary} | env,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -167,6 +198,22 @@ class Fresh:
             os.killpg(self.pid, signal.SIGKILL)
             out, err = self._process.communicate()
         return self._process.returncode, out, err
+
+
+class Cold(Fresh):
+    """One that finds nothing compiled: no module, no kernel, no table of fonts."""
+
+    def __init__(self, command: tuple[str, ...], folder: Path, temporary: str) -> None:
+        self._caches = tempfile.mkdtemp(prefix="cold-")
+        names = ("PYTHONPYCACHEPREFIX", "NUMBA_CACHE_DIR", "MPLCONFIGDIR")
+        empty = {name: str(Path(self._caches) / name) for name in names}
+        super().__init__(command, folder, temporary, **empty)
+
+    def wait(self) -> tuple[int, str, str]:
+        """Exit status, output, errors."""
+        found = super().wait()
+        shutil.rmtree(self._caches, ignore_errors=True)
+        return found
 
 
 def interrupted(
@@ -246,23 +293,23 @@ def names(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def campaign(name: str, count: int, store: Path, rng: random.Random, warm: Warm) -> list[str]:
+def campaign(name: str, count: int, given: Path, rng: random.Random, warm: Warm) -> list[str]:
     """So many interrupts of one command; prints a line, returns what was wrong."""
     command, wrong, counts = COMMANDS[name], [], {"interrupted": 0, "before": 0, "too late": 0}
     slowest = 0.0
     with tempfile.TemporaryDirectory() as home:
-        whole = _fresh(Path(home) / "whole", store)
+        whole = _fresh(Path(home) / "whole", given)
         status, usual = undisturbed(command, whole, warm)
         folder, late = whole, True
         for i in range(count):
-            folder = _fresh(Path(home) / str(i), store)
+            folder = _fresh(Path(home) / str(i), given)
             trial = interrupted(
                 command,
                 folder,
                 rng.uniform(0, min(usual, LONGEST)),
                 number=rng.choice([signal.SIGINT, signal.SIGTERM]),
                 again=0.0 if i % 3 else rng.uniform(0.001, 0.3),
-                start=warm if i % 4 else Fresh,
+                start=warm if i % 4 else Cold if i % 8 else Fresh,
             )
             counts["before" if trial.before else "too late" if trial.too_late else "interrupted"] += 1
             if not trial.before and not trial.too_late:
@@ -284,24 +331,58 @@ def campaign(name: str, count: int, store: Path, rng: random.Random, warm: Warm)
     return wrong
 
 
-def _fresh(folder: Path, store: Path) -> Path:
-    folder.mkdir()
-    shutil.copy(store, folder / "input.h5")
+def _fresh(folder: Path, given: Path) -> Path:
+    shutil.copytree(given, folder)
     return folder
+
+
+@contextlib.contextmanager
+def cluster(folder: Path) -> Iterator[Path]:
+    """A dask scheduler with two workers -> its file."""
+    file, processes = folder / "scheduler.json", []
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    for what in ("scheduler", "worker", "worker"):
+        more = (
+            ["--nthreads", "1", "--no-nanny"] if what == "worker" else ["--port", "0", "--host", "127.0.0.1"]
+        )
+        words = ["--scheduler-file", str(file), "--no-dashboard", *more]
+        processes.append(
+            subprocess.Popen(
+                [sys.executable, "-m", "dask", what, *words],
+                cwd=folder,
+                env=env,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        )
+        while not file.is_file():
+            time.sleep(0.05)
+    try:
+        yield file
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 def main() -> int:
     """Run the campaign."""
-    given = arguments(__doc__, interrupts=500, seed=11)
+    given = arguments(__doc__, interrupts=500, seed=11, only="")
     # a shell starts a command in the background with SIGINT ignored, and every child would inherit that
     signal.signal(signal.SIGINT, signal.default_int_handler)
     rng = random.Random(given.seed)
     wrong: list[str] = []
-    with tempfile.TemporaryDirectory() as home:
-        warm = Warm()
-        undisturbed(("run", "spring-uneven", "-o", "input.h5"), Path(home), warm)
-        for name in COMMANDS:
-            wrong += campaign(name, -(-given.interrupts // len(COMMANDS)), Path(home) / "input.h5", rng, warm)
+    chosen = [name for name in COMMANDS if not given.only or name in given.only.split(",")]
+    with tempfile.TemporaryDirectory() as home, tempfile.TemporaryDirectory() as farm:
+        warm, folder = Warm(), Path(home) / "given"
+        folder.mkdir()
+        undisturbed(("run", "spring-uneven", "-o", "input.h5"), folder, warm)
+        (folder / "mine.py").write_text(STEPPER)
+        (folder / "input.csv").write_text("t,q,v\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(500)))
+        with cluster(Path(farm)) as file:
+            shutil.copy(file, folder)
+            for name in chosen:
+                wrong += campaign(name, -(-given.interrupts // len(chosen)), folder, rng, warm)
         warm.close()
     print(f"{given.interrupts} interrupts, {len(wrong)} wrong")
     return 1 if wrong else 0
