@@ -17,7 +17,7 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
-from springcheck.engines.contract import Label, Method, Simulation
+from springcheck.engines.contract import Label, Method
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
@@ -66,27 +66,20 @@ class Springs(Calculator):  # type: ignore[misc]
             self.results["energy"] = energy * self._of_force * self._length
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """Atoms with a calculator, and the dynamics."""
-    length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
-    positions = np.zeros((scene.n, 3))
-    positions[:, 0] = scene.q * length
-    momenta = np.zeros((scene.n, 3))
-    momenta[:, 0] = scene.p * (length / time)
-    atoms = Atoms(numbers=np.zeros(scene.n, dtype=int), positions=positions, masses=scene.m, momenta=momenta)
-    atoms.calc = Springs(scene.system, length, time)
-    return _Dynamics(atoms, VelocityVerlet(atoms, timestep=step * time), length, length / time)
-
-
 class _Dynamics:
     """ASE's dynamics in motion."""
 
-    def __init__(self, atoms: Atoms, dynamics: VelocityVerlet, length: float, momentum: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+        length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
+        positions, momenta = np.zeros((2, scene.n, 3))
+        positions[:, 0] = scene.q * length
+        momenta[:, 0] = scene.p * (length / time)
+        numbers = np.zeros(scene.n, dtype=int)
+        self._atoms = Atoms(numbers=numbers, positions=positions, masses=scene.m, momenta=momenta)
+        self._atoms.calc = Springs(scene.system, length, time)
+        self._dynamics = VelocityVerlet(self._atoms, timestep=step * time)
+        self._length, self._momentum = length, length / time
         self.off_axis = 0.0
-        self._atoms = atoms
-        self._dynamics = dynamics
-        self._length = length
-        self._momentum = momentum
 
     @property
     def force_calls(self) -> int:
@@ -106,3 +99,6 @@ class _Dynamics:
                 q /= self._length
                 p /= self._momentum
         self.off_axis = max(self.off_axis, float(np.max(np.abs(atoms.positions[:, 1:]), initial=0.0)))
+
+
+start = _Dynamics

@@ -28,9 +28,9 @@ import numpy as np
 import openmm as mm
 
 from springcheck.engines import bonds, quiet
-from springcheck.engines.contract import Label, Method, Simulation, Stopped
+from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats, Force
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
 
@@ -105,40 +105,6 @@ def convention(method: Method) -> str:
     if method.name == "leapfrog":
         return "as OpenMM stores them, taken for synchronised"
     return "synchronised"
-
-
-def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """Build system, integrator and context.
-
-    Raises MethodError where the platform is not here, and for friction backwards in time: OpenMM takes no
-    negative step, and friction is not undone by reflecting the momenta.
-    """
-    if step < 0 and scene.system.is_damped:
-        raise MethodError(f"{label}: OpenMM takes no negative step, so friction runs forwards in time only")
-    if arithmetic(label).parameters == "single":
-        # the half kicks below must be those of the springs that OpenMM feels
-        scene = scene.system.in_single
-    origins = bonds.origins(scene, method.scheme)
-    system, positions = _system(scene, origins)
-    integrator = _integrator(scene, method.name, step)
-    context = _context(system, integrator, label)
-    force = _pull(scene)
-    early = 0.5 * step if method.name in SHIFTED else 0.0
-    m = np.copysign(scene.m, step)
-    velocities = np.zeros_like(positions)
-    with np.errstate(all="ignore"):
-        velocities[: scene.n, 0] = (scene.p - early * force(scene.q, scene.p)) / m
-    _warm_up(context, integrator, positions)
-    context.setPositions(positions)
-    context.setVelocities(velocities)
-    return _Context(
-        m=m, origins=origins, context=context, integrator=integrator, force=force, half_kick=early
-    )
-
-
-def _pull(scene: Scene) -> Force:
-    """The force that OpenMM computes: all but friction."""
-    return scene.system.potential_force
 
 
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
@@ -240,7 +206,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
 def _friction_rate(scene: Scene, name: str) -> float:
     """The one friction rate of all particles [1/T].  MethodError where they differ."""
     rate = scene.system.friction_rates.astype(np.float64)
-    if np.ptp(rate) > 2.0**-52 * np.max(rate):
+    if not scene.system.has_one_friction_rate:
         raise MethodError(
             f"openmm:{name} has one friction rate for all particles, and damping/mass of scene "
             f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}"
@@ -277,26 +243,29 @@ def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) 
 class _Context:
     """A context in motion.  Reads go to one buffer: the public accessors wrap units, 20 us a frame."""
 
-    def __init__(
-        self,
-        *,
-        m: Floats,
-        origins: Floats,
-        context: mm.Context,
-        integrator: mm.Integrator,
-        force: Force,
-        half_kick: float,
-    ) -> None:
-        self.force_calls = 0
-        self.off_axis = 0.0
-        self._context = context
-        self._integrator = integrator
-        self._m = m
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+        if step < 0 and scene.system.is_damped:
+            raise MethodError(f"{label}: no negative step is taken, so friction runs forwards in time only")
+        if arithmetic(label).parameters == "single":
+            # the half kicks below must be those of the springs that OpenMM feels
+            scene = scene.system.in_single
+        self.force_calls, self.off_axis = 0, 0.0
+        origins = bonds.origins(scene, method.scheme)
+        system, positions = _system(scene, origins)
+        self._integrator = _integrator(scene, method.name, step)
+        self._context = _context(system, self._integrator, label)
         self._origins = origins if np.any(origins) else None
-        self._force = force
-        self._half_kick = half_kick
-        self._x = np.zeros((context.getSystem().getNumParticles(), 3))
-        self._v = np.zeros_like(self._x)
+        # what OpenMM computes: all but friction
+        self._force = scene.system.potential_force
+        self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
+        self._m = np.copysign(scene.m, step)
+        self._x, self._v = np.zeros_like(positions), np.zeros_like(positions)
+        velocities = np.zeros_like(positions)
+        with np.errstate(all="ignore"):
+            velocities[: scene.n, 0] = (scene.p - self._half_kick * self._force(scene.q, scene.p)) / self._m
+        _warm_up(self._context, self._integrator, positions)
+        self._context.setPositions(positions)
+        self._context.setVelocities(velocities)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         take, get = self._integrator.step, self._context.getState
@@ -330,3 +299,6 @@ class _Context:
             p *= self._m
             if self._half_kick:
                 p += self._half_kick * self._force(q, p)
+
+
+start = _Context

@@ -90,7 +90,7 @@ def prepare(
     with np.errstate(all="ignore"):
         plan = program(found, scene, float(step))
         if any(term.key not in layout.KINDS for term in scene.terms):
-            return Own(vectors.Vectors(plan, scene), plan.evaluations, compiled=False)
+            return Own(vectors.Vectors(found, scene, step), plan.evaluations, compiled=False)
         job = _one(plan, scene) or _many(plan, scene)
     ahead = job.work * scene.steps >= WORTH if compiled is None else compiled
     if ahead:

@@ -1,70 +1,46 @@
-"""The same operations on whole arrays, for scenes with a term that the compiled loops do not have."""
+"""Explicit schemes by NumPy, for scenes with a term that the compiled loops do not have."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from springcheck.engines.own.kernels import DRIFT, EULER, FRICTION, KICK, KICK_DRIFT
-from springcheck.engines.own.operations import Program, terms_of
-from springcheck.physics.arrays import Floats, Force
+from springcheck import schemes
+from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.physics.scene import Scene
+from springcheck.schemes import Scheme
 
 
 class Vectors:
-    """A scene carried through the explicit operations of a program, its forces those of its own terms."""
+    """A scene carried through the steps of a scheme, its forces those of its own terms."""
 
-    def __init__(self, plan: Program, scene: Scene) -> None:
-        self._plan = plan
-        self._m = scene.m
+    def __init__(self, scheme: Scheme, scene: Scene, step: float) -> None:
+        system = scene.system
+        self._scheme, self._h, self._m = scheme, step, scene.m
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
-        self._forces: list[Force] = [scene.system.force_of(terms_of(name, scene)) for name in plan.forces]
-        self._kept: list[Floats | None] = [None, None]
-        rates = scene.system.friction_rates.astype(np.float64)
-        self._decays = [np.exp(-x * rates) for x in plan.decays]
+        self._rate = system.friction_rates if system.is_damped else None
+        self._force = _kept(system.force, system.is_damped)
+        self._parts = _kept(system.parts[0], system.is_damped), _kept(system.parts[1], system.is_damped)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
         with np.errstate(all="ignore"):
             for row in range(len(q)):
                 for _ in range(every):
-                    if self._plan.b is None:
-                        self._operations()
-                    else:
-                        self._tableau()
+                    a, b = schemes.step(
+                        self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
+                        rate=self._rate, parts=self._parts,
+                    )  # fmt: skip
+                    self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
                 q[row], p[row] = self._q, self._p
 
-    def _operations(self) -> None:
-        for o, slot in zip(self._plan.operations, self._plan.slots, strict=True):
-            old = self._p
-            if o.code == FRICTION:
-                self._p = old * self._decays[slot]
-            elif o.code != DRIFT:
-                self._p = old + self._force(slot) * o.x
-            if o.code in (DRIFT, KICK_DRIFT, EULER):
-                self._q = self._q + ((old if o.code == EULER else self._p) / self._m) * o.y
-            moved = o.code not in (FRICTION, KICK)
-            damped = self._plan.damped
-            self._kept = [None if moved or damped[i] else kept for i, kept in enumerate(self._kept)]
 
-    def _force(self, slot: int) -> Floats:
-        found = self._kept[slot]
-        if found is None:
-            found = self._kept[slot] = np.asarray(self._forces[slot](self._q, self._p), np.float64)
-        return found
+def _kept(force: Force, damped: bool) -> Force:
+    """A force that is evaluated again only where the state that it depends on is another one."""
+    last: list[Reals] = []
 
-    def _tableau(self) -> None:
-        a, b = self._plan.a, self._plan.b
-        assert a is not None
-        assert b is not None
-        forces: list[Floats] = []
-        velocities: list[Floats] = []
-        for row in a:
-            q, p = self._q, self._p
-            for c, v, f in zip(row, velocities, forces, strict=False):
-                if c:
-                    q, p = q + c * v, p + c * f
-            forces.append(np.asarray(self._forces[0](q, p), np.float64))
-            velocities.append(p / self._m)
-        for c, v, f in zip(b, velocities, forces, strict=True):
-            if c:
-                self._q, self._p = self._q + c * v, self._p + c * f
+    def again(q: Reals, p: Reals) -> Reals:
+        if not last or last[0] is not q or (damped and last[1] is not p):
+            last[:] = q, p, force(q, p)
+        return last[2]
+
+    return again

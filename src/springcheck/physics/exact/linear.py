@@ -4,14 +4,14 @@ w2 < 0, a parabola for w2 = 0; with friction the same, decaying.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.exact.normal import Modes
+from springcheck.physics.exact.well import Well
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -20,7 +20,7 @@ ROUNDINGS = 32
 """Roundings of a motion in extended precision, of each of its summands and of its phase."""
 
 
-def motion(scene: Scene, _: None, t: Extended) -> tuple[Extended, Extended]:
+def motion(scene: Scene, _: Any, t: Extended) -> tuple[Extended, Extended]:
     """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
     found = scene.system.modes
     start, centre = found.start, found.centre()
@@ -36,23 +36,12 @@ def motion(scene: Scene, _: None, t: Extended) -> tuple[Extended, Extended]:
             ((w2 == 0) & (rate != 0), _dragged),
         ):
             if np.any(kind):
-                y[:, kind], v[:, kind] = law(
-                    u0[kind],
-                    start.v[kind],
-                    t,
-                    _Law(
-                        w2=w2[kind],
-                        rate=rate[kind],
-                        pull=found.pull[kind],
-                        slow=start.slow[kind],
-                        fast=start.fast[kind],
-                    ),
-                )
+                parts = (w2, rate, found.pull, start.slow, start.fast)
+                y[:, kind], v[:, kind] = law(u0[kind], start.v[kind], t, _Law(*(x[kind] for x in parts)))
     return found.out_of(y + centre, v)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Law:
+class _Law(NamedTuple):
     """u'' = -w2 u - rate u' + pull, the pull only where w2 = 0 (elsewhere u counts from the centre)."""
 
     w2: Extended
@@ -133,7 +122,7 @@ def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended
     return u + v * gone + law.pull * t * t * fallen, v * np.exp(-x) + law.pull * gone
 
 
-def doubt(scene: Scene, _: None, t: np.longdouble) -> tuple[Extended, Extended]:
+def doubt(scene: Scene, _: Any, t: np.longdouble) -> tuple[Extended, Extended]:
     """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
 
     A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken from.
@@ -189,3 +178,13 @@ def _reach(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extended
     reach = reach + np.where(falls, late + early, 0)
     speed = speed + np.where(falls, up * late + down * early, 0)
     return np.asarray(reach), np.asarray(speed), np.asarray(phase), np.asarray(hold)
+
+
+LINEAR = Well(
+    key="",
+    terms=frozenset(),
+    prepare=lambda scene: scene.system.has_modes or None,
+    motion=motion,
+    doubt=doubt,
+)
+"""Whatever has normal modes, which the system keeps."""

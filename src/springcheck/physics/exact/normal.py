@@ -50,7 +50,7 @@ class Modes:
     pull: Extended
     rate: Extended
     root_m: Extended
-    vectors: Extended | None
+    vectors: Extended | None = None
     waves: bool = False
     """Whether V is of sines, sqrt(2/(n+1)) sin(pi r j/(n+1)): a fast Fourier transform takes its place."""
     start: Start
@@ -124,12 +124,11 @@ def normal_modes(system: System) -> Modes:
     pull: Extended = np.asarray(system.force(zero, zero) / root_m, np.longdouble)
     rate, none = system.friction_rates, np.zeros_like(zero)
     if system.is_separate:
-        found = _Basis(w2=system.hessian_diagonal(zero) / system.m, pull=pull, root_m=root_m, rate=rate)
-        return found.modes(system, doubt=np.asarray(system.rigidity * np.longdouble(EPS) / system.m))
+        w2, doubt = system.hessian_diagonal(zero) / system.m, system.rigidity * np.longdouble(EPS) / system.m
+        return _modes(system, w2=w2, pull=pull, root_m=root_m, rate=rate, doubt=np.asarray(doubt))
     if system.n > SMALL and system.is_uniform_chain:
         w2 = _wave_frequencies(system)
-        found = _Basis(w2=w2, pull=_sines(pull), root_m=root_m, rate=rate, waves=True)
-        return found.modes(system, doubt=none)
+        return _modes(system, w2=w2, pull=_sines(pull), root_m=root_m, rate=rate, waves=True, doubt=none)
     scaled = np.asarray(system.hessian(zero) / root_m[:, None] / root_m, np.longdouble)
     w2, vectors = _eigen(scaled)
     largest = np.max(np.abs(w2))
@@ -141,30 +140,18 @@ def normal_modes(system: System) -> Modes:
         return _precise(system)
     w2 = np.where(is_zero, 0, w2)
     pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
-    found = _Basis(w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors)
     # translations of free groups have w2 = 0 exactly, where no other mode is taken for one
     known = is_zero & (np.count_nonzero(is_zero) == len(system.free_groups))
-    return found.modes(system, doubt=np.where(known, none, 4 * system.n * EPS * largest))
+    doubt = np.where(known, none, 4 * system.n * EPS * largest)
+    return _modes(system, w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors, doubt=doubt)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Basis:
-    """Modes as they are found, before the start is taken apart into them."""
-
-    w2: Extended
-    pull: Extended
-    rate: Extended
-    root_m: Extended
-    vectors: Extended | None = None
-    waves: bool = False
-
-    def modes(self, system: System, *, doubt: Extended, start: Start | None = None) -> Modes:
-        """With their start, from that of the scene where it is not given."""
-        parts = {name: getattr(self, name) for name in self.__slots__}
-        nothing = np.zeros_like(self.w2)
-        blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
-        found = Modes(**parts, doubt=doubt, start=start or blank)
-        return found if start else replace(found, start=_start(system, found))
+def _modes(system: System, *, start: Start | None = None, **parts: Any) -> Modes:
+    """Modes as they are found; their start is taken from that of the scene where it is not given."""
+    nothing = np.zeros_like(parts["w2"])
+    blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
+    found = Modes(**parts, start=start or blank)
+    return found if start else replace(found, start=_start(system, found))
 
 
 def _start(system: System, modes: Modes) -> Start:
@@ -231,14 +218,12 @@ def _precise(system: System) -> Modes:
         u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
         slow, fast, _ = _split(u, v, w2, np.max(rates))
         parts = tuple(extended(x) for x in (u, v, slow, fast))
-        found = _Basis(
-            w2=extended(w2), pull=extended(pull), rate=system.friction_rates,
-            root_m=extended(root), vectors=extended(vectors),
-        )  # fmt: skip
+        found = {"w2": extended(w2), "pull": extended(pull), "vectors": extended(vectors)}
     u, v, slow, fast = parts
     sizes = (np.abs(u), np.abs(v), np.abs(slow), np.abs(fast))
     start = Start(u=u, v=v, slow=slow, fast=fast, sizes=sizes)
-    return found.modes(system, doubt=np.zeros_like(u), start=start)
+    found |= {"root_m": extended(root), "rate": system.friction_rates, "doubt": np.zeros_like(u)}
+    return _modes(system, start=start, **found)
 
 
 LEFT = Decimal(10) ** (12 - ENOUGH)

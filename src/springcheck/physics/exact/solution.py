@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact import linear
+from springcheck.physics.exact.well import Well
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -23,9 +23,8 @@ class _Group:
     particles: Integers
     scene: Scene
     found: Any
-    """What was worked out once (see `Well.prepare`); modes are kept by the system."""
-    motion: Callable[[Scene, Any, Extended], tuple[Extended, Extended]]
-    doubt: Callable[[Scene, Any, np.longdouble], tuple[Extended, Extended]]
+    """What was worked out once (see `Well.prepare`)."""
+    law: Well
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,11 +42,11 @@ class Solution:
         t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
         if len(self.groups) == 1:
             with np.errstate(all="ignore"):
-                return self.groups[0].motion(self.groups[0].scene, self.groups[0].found, t)
+                return self.groups[0].law.motion(self.groups[0].scene, self.groups[0].found, t)
         q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
-                q[:, group.particles], p[:, group.particles] = group.motion(group.scene, group.found, t)
+                q[:, group.particles], p[:, group.particles] = group.law.motion(group.scene, group.found, t)
         return q, p
 
     def doubt(self, duration: float) -> tuple[Extended, Extended]:
@@ -55,7 +54,7 @@ class Solution:
         q, p = np.empty((2, self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
-                q[group.particles], p[group.particles] = group.doubt(
+                q[group.particles], p[group.particles] = group.law.doubt(
                     group.scene, group.found, np.longdouble(duration)
                 )
         # infinite where the motion itself is; never no number
@@ -64,11 +63,8 @@ class Solution:
 
 def solution(system: System) -> Solution | None:
     """The exact motion of a system, None where some particles have no closed form here."""
-    everything = np.arange(system.n)
     if system.has_modes:
-        whole = _Group(
-            particles=everything, scene=system.scene, found=None, motion=linear.motion, doubt=linear.doubt
-        )
+        whole = _Group(particles=np.arange(system.n), scene=system.scene, found=True, law=linear.LINEAR)
         return Solution(n=system.n, groups=(whole,))
     from springcheck.physics.exact import wells
 
@@ -76,25 +72,16 @@ def solution(system: System) -> Solution | None:
     nothing = np.zeros(system.n, dtype=bool)
     left = ~nothing
     with np.errstate(all="ignore"):
-        for well in wells.WELLS:
-            others = (here for key, here in system.acting.items() if key not in well.terms)
+        for law in (*wells.WELLS, linear.LINEAR):
+            others = (here for key, here in system.acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
-            chosen = np.flatnonzero(system.acting.get(well.key, nothing) & ~other)
+            mine = left if law is linear.LINEAR else system.acting.get(law.key, nothing) & ~other
+            chosen = np.flatnonzero(mine)
             if len(chosen):
                 part = system.part(chosen)
-                ready = well.prepare(part)
+                ready = law.prepare(part)
                 if ready is None:
                     return None
-                found.append(
-                    _Group(particles=chosen, scene=part, found=ready, motion=well.motion, doubt=well.doubt)
-                )
+                found.append(_Group(particles=chosen, scene=part, found=ready, law=law))
                 left[chosen] = False
-        chosen = np.flatnonzero(left)
-        if len(chosen):
-            part = system.part(chosen)
-            if not part.system.has_modes:
-                return None
-            found.append(
-                _Group(particles=chosen, scene=part, found=None, motion=linear.motion, doubt=linear.doubt)
-            )
     return Solution(n=system.n, groups=tuple(found))

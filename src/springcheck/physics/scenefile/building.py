@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,8 +144,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
 
 
 def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator[Term]:
-    walls: dict[bool, list[tuple[int, float, float]]] = {False: [], True: []}
-    pairs: dict[bool, list[tuple[int, int, float, float]]] = {False: [], True: []}
+    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, spring in enumerate(springs):
         field = f"spring[{j}].ends"
         for end in spring.ends:
@@ -155,21 +154,24 @@ def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator
             case ("wall", "wall"):
                 raise MistakeError(f"{field}: a spring between two walls moves nothing")
             case ("wall", int(particle)):
-                walls[spring.fast].append((particle, spring.stiffness, spring.wall + spring.rest))
+                row: tuple[float, ...] = (particle, spring.stiffness, spring.wall + spring.rest)
             case (int(particle), "wall"):
-                walls[spring.fast].append((particle, spring.stiffness, spring.wall - spring.rest))
+                row = (particle, spring.stiffness, spring.wall - spring.rest)
             case (int(one), int(other)):
                 _two_ends(one, other, field)
                 if spring.wall:
                     raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
-                pairs[spring.fast].append((one, other, spring.stiffness, spring.rest))
-    for fast in (False, True):
-        if walls[fast]:
-            i, k, at = zip(*walls[fast], strict=True)
-            yield WallSpring(i=np.array(i), k=np.array(k), at=np.array(at), fast=fast)
-        if pairs[fast]:
-            a, b, k, rest = zip(*pairs[fast], strict=True)
-            yield Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.array(rest), fast=fast)
+                row = (one, other, spring.stiffness, spring.rest)
+        rows.setdefault((WallSpring if len(row) == 3 else Spring, spring.fast), []).append(row)
+    yield from _of_rows(rows)
+
+
+def _of_rows(rows: Mapping[tuple[type[Term], bool], Sequence[tuple[float, ...]]]) -> Iterator[Term]:
+    """Terms, fast or not, of rows of their ends and columns."""
+    for (term, fast), several in rows.items():
+        names = (*term.ends, *(column.field for column in term.columns))
+        fields: Any = dict(zip(names, map(np.array, zip(*several, strict=True)), strict=True))
+        yield term(**fields, **({"fast": True} if fast else {}))
 
 
 def _two_ends(one: int, other: int, field: str) -> None:
@@ -181,21 +183,14 @@ def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
     """A capacitor is a spring of stiffness 1/C: in one loop towards 0, between two towards each other."""
     if (table.capacitor or table.resistor) and bodies.kind != "circuit":
         raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
-    single: list[tuple[int, float]] = []
-    shared: list[tuple[int, int, float]] = []
+    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, capacitor in enumerate(table.capacitor):
         loops = [_number(loop, bodies, f"capacitor[{j}].loops") for loop in capacitor.loops]
-        if len(loops) == 1:
-            single.append((loops[0], 1 / capacitor.capacitance))
-        else:
+        if len(loops) == 2:
             _two_ends(loops[0], loops[1], f"capacitor[{j}].loops")
-            shared.append((loops[0], loops[1], 1 / capacitor.capacitance))
-    if single:
-        i, k = zip(*single, strict=True)
-        yield WallSpring(i=np.array(i), k=np.array(k), at=np.zeros(len(i)))
-    if shared:
-        a, b, k = zip(*shared, strict=True)
-        yield Spring(a=np.array(a), b=np.array(b), k=np.array(k), rest=np.zeros(len(a)))
+        kind = WallSpring if len(loops) == 1 else Spring
+        rows.setdefault((kind, False), []).append((*loops, 1 / capacitor.capacitance, 0.0))
+    yield from _of_rows(rows)
 
 
 def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
@@ -234,6 +229,5 @@ def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
 def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:
     rows = [(row.particle, row.coefficient, f"damping[{j}].particle") for j, row in enumerate(table.damping)]
     rows += [(row.loop, row.resistance, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
-    if rows:
-        i = np.array([_number(particle, bodies, field) for particle, _, field in rows])
-        yield Damping(i=i, c=np.array([c for _, c, _ in rows]))
+    found = [(_number(particle, bodies, field), c) for particle, c, field in rows]
+    yield from _of_rows({(Damping, False): found} if found else {})

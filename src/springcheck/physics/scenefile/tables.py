@@ -210,19 +210,10 @@ CHOICES: dict[str, tuple[str, ...]] = {
 
 def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
-    found = {
-        "": scene_table(),
-        "particle": ParticleTable,
-        "rotor": RotorTable,
-        "inductor": InductorTable,
-        "capacitor": CapacitorTable,
-        "resistor": ResistorTable,
-        "chain": ChainTable,
-        "spring": SpringTable,
-        "damping": DampingTable,
-        "time": TimeTable,
-        "methods": MethodsTable,
-        "record": RecordTable,
-        **{key: table for key, (_, table) in of_terms().items()},
-    }
-    return found.get(name)
+    given = (
+        ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
+        DampingTable, TimeTable, MethodsTable, RecordTable,
+    )  # fmt: skip
+    found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
+    found |= {key: table for key, (_, table) in of_terms().items()}
+    return scene_table() if name == "" else found.get(name)
