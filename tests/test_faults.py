@@ -17,7 +17,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies.faults import measure as trial
 from springcheck.studies.faults.measure import examine
 from springcheck.studies.faults.result import Clean, FaultReport, Result
-from springcheck.studies.faults.seeded import Fault, stiffer
+from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 
 Need = Callable[[str], None]
@@ -59,7 +59,7 @@ def test_relative_errors_from_1e12_up_are_rejected_by_the_step_and_the_motion(na
 def test_an_engine_that_was_given_a_spring_1e12_too_stiff_is_rejected(label: str, need: Need) -> None:
     need(label)
     scene = scenes.load_scene("spring-uneven")
-    run = simulate.run(stiffer(scene, 1 + 1e-12), label)
+    run = simulate.run(scene.system.scaled(1 + 1e-12), label)
     failed = {v.check for v in checks.judge(scene, run) if v.passed is False}
     # the energies stored are those of the stiffer spring
     assert "step-defect" in failed

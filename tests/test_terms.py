@@ -145,7 +145,7 @@ def test_a_new_term_is_hardened_and_judged(dent: Path, need: Need) -> None:
     scene = scenes.load_scene(dent)
     gauss = next(term for term in scene.terms if isinstance(term, Gauss))
     for size in (0.0, 1e-9):
-        harder = seeded.stiffer(scene, 1 + size)
+        harder = scene.system.scaled(1 + size)
         changed = next(term for term in harder.terms if isinstance(term, Gauss))
         assert changed.zeta.tolist() == (gauss.zeta * (1 + size)).tolist()
         run = simulate.run(harder, "ase:velocity-verlet")

@@ -113,59 +113,33 @@ class Study:
 
 
 def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:
-    """The options of every study that is kept in a store."""
+    """The options of every study that is kept in a store: where, which methods, what runs beside them."""
     parser.add_argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})")
+    label = "engine:method[@platform[-precision]] or a glob such as 'own:*'"
+    repeatable(parser, "--method", "LABEL", label)
+    engine_option(parser)
+    function = "your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION"
+    repeatable(parser, "--stepper", "MODULE:FUNCTION", function)
+    program = "a program in any language, as 'name=./engine {scene} {out}'"
+    repeatable(parser, "--command", "NAME=COMMAND", program, dest="program")
+    scheme = "the scheme of your functions and programs, or of one of them"
+    repeatable(parser, "--scheme", "SCHEME|NAME=SCHEME", scheme)
     parser.add_argument(
-        "--method",
-        action="append",
-        default=[],
-        metavar="LABEL",
-        help="engine:method[@platform[-precision]] or a glob such as 'own:*'; repeatable",
+        "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
     )
-    door_options(parser)
     parser.add_argument("--force", action="store_true", help="write an existing store anew")
     report_options(parser)
 
 
+def repeatable(parser: ArgumentParser, name: str, metavar: str, about: str, **more: Any) -> None:
+    """An option that may be given more than once."""
+    about = f"{about}; repeatable"
+    parser.add_argument(name, action="append", default=[], metavar=metavar, help=about, **more)
+
+
 def engine_option(parser: ArgumentParser) -> None:
     """Engines that a call brings."""
-    parser.add_argument(
-        "--engine",
-        action="append",
-        default=[],
-        metavar="FILE.py",
-        help="an engine of your own, for this call; repeatable",
-    )
-
-
-def door_options(parser: ArgumentParser) -> None:
-    """Functions and programs that run beside the methods."""
-    engine_option(parser)
-    parser.add_argument(
-        "--stepper",
-        action="append",
-        default=[],
-        metavar="FILE.py:FUNCTION",
-        help="your function step(q, p, h, force, mass) -> (q, p), also as MODULE:FUNCTION; repeatable",
-    )
-    parser.add_argument(
-        "--command",
-        dest="program",
-        action="append",
-        default=[],
-        metavar="NAME=COMMAND",
-        help="a program in any language, as 'name=./engine {scene} {out}'; repeatable",
-    )
-    parser.add_argument(
-        "--scheme",
-        action="append",
-        default=[],
-        metavar="SCHEME|NAME=SCHEME",
-        help="the scheme of your functions and programs, or of one of them; repeatable",
-    )
-    parser.add_argument(
-        "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
-    )
+    repeatable(parser, "--engine", "FILE.py", "an engine of your own, for this call")
 
 
 Argument = tuple[tuple[str, ...], dict[str, Any]]

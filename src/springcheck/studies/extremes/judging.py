@@ -58,12 +58,19 @@ class Cell:
     bound: float
 
 
-def parameters(spec: Spec) -> dict[str, float]:
-    """What makes a cell, for the document."""
-    return {
+def cell(
+    label: Label, spec: Spec, outcome: Outcome, reason: str, value: float = np.nan, bound: float = np.nan,
+    **more: float,
+) -> Cell:  # fmt: skip
+    """The cell of a spring, with `more` of its parameters."""
+    parameters = {
         "m": spec.m, "k": spec.k, "q": spec.q, "p": spec.p, "h": spec.h, "steps": spec.steps,
-        "h_w": spec.turn, "force": spec.force,
+        "h_w": spec.turn, "force": spec.force, **more,
     }  # fmt: skip
+    return Cell(
+        method=str(label), block=spec.block, parameters=parameters, outcome=outcome, reason=reason,
+        value=float(value), bound=float(bound),
+    )  # fmt: skip
 
 
 def range_of(how: Arithmetic) -> tuple[float, float]:
@@ -157,12 +164,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
                 outcome, reason = "unstable, as theory says", f"grown out of range by step {j + 1}: {named}"
             else:
                 outcome, reason = "engine's limit", named
-        cells.append(
-            Cell(
-                method=str(label), block=spec.block, parameters=parameters(spec), outcome=outcome,
-                reason=reason, value=value, bound=bound,
-            )
-        )  # fmt: skip
+        cells.append(cell(label, spec, outcome, reason, value, bound))
     return cells
 
 

@@ -13,8 +13,6 @@ from functools import partial
 from itertools import groupby
 from pathlib import Path
 
-import numpy as np
-
 from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError
@@ -24,6 +22,7 @@ from springcheck.studies import team as teams
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
+from springcheck.studies.extremes.planes import decade
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import Keeper, Piece, each
 from springcheck.studies.stability import propagators
@@ -218,9 +217,9 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
                 and cell.block == "force"
                 and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
             ):
-                calm.setdefault(_decade(cell), []).append(cell.outcome in RIGHT)
+                calm.setdefault(decade(cell), []).append(cell.outcome in RIGHT)
         decades = sorted(calm)
-        middle = [j for j, decade in enumerate(decades) if 0 <= decade <= 6 and all(calm[decade])]
+        middle = [j for j, x in enumerate(decades) if 0 <= x <= 6 and all(calm[x])]
         if not middle:
             continue
         low = high = middle[0]
@@ -242,8 +241,3 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
 
 RIGHT = ("right", "unstable, as theory says")
 """Outcomes that are no fault of an engine's arithmetic."""
-
-
-def _decade(cell: Cell) -> int:
-    k, q = cell.parameters["k"], cell.parameters["q"]
-    return int(np.round(np.log10(k) + np.log10(q)))

@@ -35,16 +35,16 @@ def planes(cells: Sequence[Cell]) -> list[Plane]:
 
 
 def _plane(method: str, cells: Sequence[Cell]) -> Plane:
-    placed = {(_turn(cell), _decade(cell)): cell for cell in cells}
+    placed = {(_turn(cell), decade(cell)): cell for cell in cells}
     turns = sorted({turn for turn, _ in placed})
-    decades = sorted({decade for _, decade in placed})
+    decades = sorted({x for _, x in placed})
     return Plane(
         method=method,
         decades=tuple(decades),
         turns=tuple(
             next(cell.parameters["h_w"] for (of, _), cell in placed.items() if of == turn) for turn in turns
         ),
-        cells=tuple(tuple(placed.get((turn, decade)) for decade in decades) for turn in turns),
+        cells=tuple(tuple(placed.get((turn, x)) for x in decades) for turn in turns),
     )
 
 
@@ -53,6 +53,7 @@ def _turn(cell: Cell) -> float:
     return round(float(np.log10(cell.parameters["h_w"])), 3)
 
 
-def _decade(cell: Cell) -> int:
+def decade(cell: Cell) -> int:
+    """Power of ten of the largest force at the start."""
     # of the logarithms: the product itself may leave the range
     return int(np.round(np.log10(cell.parameters["k"]) + np.log10(cell.parameters["q"])))

@@ -39,7 +39,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     try:
         q, p, said = raw(scene, label)
     except MethodError as error:
-        return [_own_refusal(label, spec, str(error)) for spec in specs]
+        return [judging.cell(label, spec, "engine's limit", f"it refuses: {error}") for spec in specs]
     found = judging.judge(label, specs, scene, q, p, said)
     if len(specs) == 1:
         return found
@@ -61,10 +61,3 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         return cells(label, specs[:half]) + cells(label, specs[half:])
     rest = iter(cells(label, [spec for spec, done in zip(specs, over, strict=True) if not done]))
     return [cell if done else next(rest) for cell, done in zip(found, over, strict=True)]
-
-
-def _own_refusal(label: Label, spec: Spec, message: str) -> Cell:
-    return Cell(
-        method=str(label), block=spec.block, parameters=judging.parameters(spec), outcome="engine's limit",
-        reason=f"it refuses: {message}", value=float("nan"), bound=float("nan"),
-    )  # fmt: skip

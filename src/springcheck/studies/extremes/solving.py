@@ -41,15 +41,15 @@ def solve(label: Label, spec: Spec) -> Cell:
             if whole:
                 value, bound, untold = _distance(label, scene, done)
         reason = _reason(scene, spec)
+    outcome: Outcome = "silently wrong"
+    why = f"off by {value:.3g} where {bound:.3g} is allowed"
     if whole and value <= bound:
-        return _cell(label, spec, "right", "", value, bound)
-    if reason or not whole:
-        return _cell(label, spec, "engine's limit", (reason or "it gives up") + said, value, bound)
-    if untold:
-        return _cell(label, spec, "not measured", untold, value, bound)
-    return _cell(
-        label, spec, "silently wrong", f"off by {value:.3g} where {bound:.3g} is allowed", value, bound
-    )
+        outcome, why = "right", ""
+    elif reason or not whole:
+        outcome, why = "engine's limit", (reason or "it gives up") + said
+    elif untold:
+        outcome, why = "not measured", untold
+    return judging.cell(label, spec, outcome, why, value, bound, tolerance=spec.tolerance)
 
 
 def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]:
@@ -126,7 +126,7 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
             outcome, reason = "not measured", verdict.why
         elif judged and not value <= bound:
             outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
-        found.append(_cell(label, spec, outcome, reason, value, bound))
+        found.append(judging.cell(label, spec, outcome, reason, value, bound, tolerance=spec.tolerance))
     return found
 
 
@@ -143,15 +143,3 @@ def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
     before = replace(run, t=run.t[held], q=run.q[held], p=run.p[held], energy=energy)
     reason = f"grown out of range after step {case.steps[held][-1]}: {overflows(run.arithmetic)}"
     return checks.Case(trajectory=before, scene=case.scene), reason
-
-
-def _cell(label: Label, spec: Spec, outcome: Outcome, reason: str, value: float, bound: float) -> Cell:
-    return Cell(
-        method=str(label),
-        block=spec.block,
-        parameters=judging.parameters(spec) | {"tolerance": spec.tolerance},
-        outcome=outcome,
-        reason=reason,
-        value=float(value),
-        bound=float(bound),
-    )

@@ -110,36 +110,16 @@ def reach(scene: Scene) -> float:
     return float(np.sqrt(2 * energy * stiff)) or 1.0
 
 
-def stiffer(scene: Scene, factor: float) -> Scene:
-    """Every stiffness or coefficient times a factor."""
-    return scene.system.scaled(factor)
-
-
 def shifted(scene: Scene, size: float) -> Scene:
     """Rest points moved by a fraction of the amplitude."""
     reach = float(np.max(np.abs(scene.q)) + np.max(np.abs(scene.p)))
     return replace(scene, terms=tuple(term.shifted(size * reach) for term in scene.terms))
 
 
-def mass_of_drift(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """dq/dt = p: a velocity taken for a momentum."""
+def verlet(scene: Scene, *, first: float = 0.5, second: float = 0.5, mass: float = 0.0) -> Step:
+    """Velocity Verlet with other coefficients, or another mass in its drift."""
     force = scene.system.force
-    h = scene.step
-
-    def step(i: int, q: Floats, p: Floats) -> State:
-        p = p + h / 2 * force(q, p)
-        q = q + h * p
-        return q, np.asarray(p + h / 2 * force(q, p), np.float64)
-
-    return step
-
-
-def verlet(
-    scene: Scene, *, first: float = 0.5, second: float = 0.5
-) -> Callable[[int, Floats, Floats], State]:
-    """Velocity Verlet with other coefficients."""
-    force = scene.system.force
-    h, m = scene.step, scene.m
+    h, m = scene.step, mass or scene.m
 
     def step(i: int, q: Floats, p: Floats) -> State:
         p = p + first * h * force(q, p)
@@ -231,11 +211,6 @@ def doubled(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     return lambda i, q, p: right(i, *right(i, q, p)) if i % 1000 == 999 else right(i, q, p)
 
 
-def unsigned(scene: Scene, size: float) -> Scene:
-    """The step's sign is lost."""
-    return replace(scene, step=abs(scene.step))
-
-
 def single_state(scene: Scene, size: float, i: int, state: State) -> State:
     """Both q and p rounded to single precision."""
     return tuple(x.astype(np.float32).astype(np.float64) for x in state)  # type: ignore[return-value]
@@ -304,12 +279,8 @@ def accumulated(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 
 def half_step_energy(scene: Scene, size: float, run: Trajectory) -> Trajectory:
     """Energies are those of momenta half a step early."""
-    return replace(run, energy=_early_energy(scene, run))
-
-
-def _early_energy(scene: Scene, run: Trajectory) -> Floats:
-    force = scene.system.force(run.q, run.p)
-    return energies(scene, run.q, np.asarray(run.p - scene.step / 2 * force, np.float64))
+    early = run.p - scene.step / 2 * scene.system.force(run.q, run.p)
+    return replace(run, energy=energies(scene, run.q, np.asarray(early, np.float64)))
 
 
 def late_start(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:

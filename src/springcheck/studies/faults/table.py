@@ -18,7 +18,7 @@ MOTION = ("step-defect", "closed-form", "frequency", "propagator")
 
 PARAMETERS = (
     Fault("stiffness", "every spring is too stiff",
-          MOTION, seeded.moving(lambda s, x: seeded.stiffer(s, 1 + x)), size=1e-12),
+          MOTION, seeded.moving(lambda s, x: s.system.scaled(1 + x)), size=1e-12),
     Fault("mass", "every mass is too large",
           MOTION, seeded.moving(lambda s, x: replace(s, m=s.m * (1 + x))), size=1e-12),
     Fault("step", "every step is too long",
@@ -33,13 +33,13 @@ PARAMETERS = (
           ("step-defect", "closed-form"),
           seeded.reported_start(lambda s, x: replace(s, q=s.q * (1 + x))), size=1e-12),
     Fault("kcal", "kJ per kcal written 4.814 for 4.184",
-          (*MOTION, "order"), seeded.moving(lambda s, x: seeded.stiffer(s, 4.814 / 4.184))),
+          (*MOTION, "order"), seeded.moving(lambda s, x: s.system.scaled(4.814 / 4.184))),
     Fault("time-unit", "time unit 48.89 for 48.88821 (fs in units of A, u and kcal/mol)",
           MOTION, seeded.moving(lambda s, x: replace(s, step=s.step * 48.89 / 48.88821))),
     Fault("stiffness-in-single", "stiffness kept in single precision: 2.9 becomes 2.9000000954",
           STEP, seeded.moving(lambda s, x: s.system.in_single)),
     Fault("unsigned-step", "the size of the step is taken: backward runs go forward",
-          ("mirror",), seeded.moving(seeded.unsigned)),
+          ("mirror",), seeded.moving(lambda s, x: replace(s, step=abs(s.step)))),
 )  # fmt: skip
 
 FORCES = (
@@ -95,7 +95,7 @@ STEPS = (
           ("step-defect", "propagator", "determinant"),
           seeded.stepping(seeded.one_iteration), scheme="implicit-euler"),
     Fault("momentum-for-velocity", "dq/dt = p; a mass of 1 hides it",
-          (*MOTION, "order"), seeded.stepping(seeded.mass_of_drift)),
+          (*MOTION, "order"), seeded.stepping(lambda s, c, x: seeded.verlet(s, mass=1.0))),
     Fault("swapped-halves", "h/2 where h*h/2 belongs",
           ("step-defect", "determinant", "order"), seeded.stepping(seeded.swapped_halves)),
     Fault("lost-half", "0*5 for 0.5: the first half kick is none",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser
 
 from springcheck.studies import team
-from springcheck.studies.study import Study, scene_option, store_options
+from springcheck.studies.ensemble import vary_options
+from springcheck.studies.study import Study, repeatable, scene_option, store_options
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -13,32 +14,14 @@ def _options(parser: ArgumentParser) -> None:
     store_options(parser)
     parser.add_argument("--step", type=float, metavar="H", help="another step than the scene's")
     parser.add_argument("--steps", type=int, metavar="N", help="another number of steps")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="FIELD=NUMBER",
-        help="another number in a field of the scene file, as spring.0.stiffness=2; repeatable",
-    )
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="NAME[=SIZE]",
-        help="an engine broken on purpose among the others, as `springcheck faults` tells; repeatable",
-    )
+    number = "another number in a field of the scene file, as spring.0.stiffness=2"
+    repeatable(parser, "--set", "FIELD=NUMBER", number)
+    fault = "an engine broken on purpose among the others, as `springcheck faults` tells"
+    repeatable(parser, "--fault", "NAME[=SIZE]", fault)
     parser.add_argument(
         "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
     )
-    parser.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="FIELD=LOW:HIGH:COUNT[:log]",
-        help="one scene over many parameters instead, as `springcheck ensemble` does",
-    )
-    parser.add_argument("--samples", type=int, metavar="N", help="with --vary FIELD=LOW:HIGH: N at random")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the samples (default 0)")
+    vary_options(parser)
     team.options(parser)
     parser.add_argument("--verdicts", action="store_true", help="print every verdict with its reason")
     parser.add_argument(
