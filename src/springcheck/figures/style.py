@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -22,6 +24,9 @@ from springcheck.store import files
 
 LONGEST_LINE = 120
 """Characters of a line of text, and of a file's name."""
+
+DPI = 200.0
+"""Of a PNG."""
 
 _RC: dict[Any, Any] = {
     "font.size": 9.0,
@@ -38,7 +43,6 @@ _RC: dict[Any, Any] = {
     "lines.linewidth": 1.3,
     "lines.markersize": 4.5,
     "figure.dpi": 100.0,
-    "savefig.dpi": 200.0,
     "svg.fonttype": "none",
     "svg.hashsalt": "springcheck",
 }
@@ -67,26 +71,30 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for ending in ("png", "svg"):
+        try:
+            drawn = _drawn(figure)
+        except ValueError:
+            # a title with dollars that is no formula
+            for text in texts:
+                text.set_parse_math(False)
+            drawn = _drawn(figure)
+        for ending, content in drawn.items():
             path = folder / f"{safe}.{ending}"
-            try:
-                drawn = _drawn(figure, ending)
-            except ValueError:
-                # a title with dollars that is no formula
-                for text in texts:
-                    text.set_parse_math(False)
-                drawn = _drawn(figure, ending)
-            files.put_bytes(drawn, path)
+            files.put_bytes(content, path)
             written.append(path)
     except OSError as error:
         raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error
     return written
 
 
-def _drawn(figure: Figure, ending: str) -> bytes:
-    drawn = BytesIO()
+def _drawn(figure: Figure) -> dict[str, bytes]:
+    """The figure as PNG, and as SVG of the same layout, by ending; `savefig` draws and lays out each twice."""
+    png, svg = BytesIO(), BytesIO()
     with warnings.catch_warnings():
         # a title may be in any script: what the font has not is drawn as boxes
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(drawn, format=ending, metadata={"Date": None} if ending == "svg" else None)
-    return drawn.getvalue()
+        figure.set_dpi(DPI)
+        FigureCanvasAgg(figure).print_png(png)
+        figure.set_layout_engine("none")
+        FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None})
+    return {"png": png.getvalue(), "svg": svg.getvalue()}
