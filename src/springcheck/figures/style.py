@@ -88,13 +88,13 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def _drawn(figure: Figure) -> dict[str, bytes]:
-    """The figure as PNG, and as SVG of the same layout, by ending; `savefig` draws and lays out each twice."""
+    """The figure as PNG, and as SVG of the same layout, by ending; `savefig` would draw each twice."""
     png, svg = BytesIO(), BytesIO()
     with warnings.catch_warnings():
         # a title may be in any script: what the font has not is drawn as boxes
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.set_dpi(DPI)
-        FigureCanvasAgg(figure).print_png(png)
+        FigureCanvasAgg(figure).print_png(png)  # type: ignore[no-untyped-call]
         figure.set_layout_engine("none")
-        FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None})
+        FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None})  # type: ignore[no-untyped-call]
     return {"png": png.getvalue(), "svg": svg.getvalue()}
