@@ -110,12 +110,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
     )
-    parser.add_argument(
-        "--version",
-        action="version",
-        version=f"springcheck {springcheck.__version__}",
-        help="print the version and exit",
-    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
     known: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
@@ -128,6 +123,14 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         else:
             parser_of.set_defaults(command=one.perform)
     return parser
+
+
+class _Version(argparse.Action):
+    """As argparse has it, but that a disk that is full is a mistake."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"springcheck {springcheck.__version__}", flush=True)
+        parser.exit()
 
 
 def _study(study: Study, options: argparse.Namespace) -> int:
