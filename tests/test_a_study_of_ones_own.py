@@ -44,10 +44,9 @@ def perform(options, progress):
         kept.commit("squares", found.document())
     return found
 
-def stored(path):
-    def build(kept):
-        return Squares(rows=tuple(x for i in range(4) for x in kept.found(FORM, str(i))))
-    return keeper.restored(path, "squares", build)
+@keeper.restoring("squares")
+def stored(kept):
+    return Squares(rows=tuple(x for i in range(4) for x in kept.found(FORM, str(i))))
 """
 TEXT = """
 from springcheck.text.lines import table

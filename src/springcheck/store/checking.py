@@ -85,7 +85,9 @@ def check_file(path: Path, most: int | None = None) -> list[Finding]:
                 )
             )
     try:
-        said = [Finding(place=place, what=what) for place, what in json.loads(_said(path))]
+        said = [
+            Finding(place=place, what=what) for place, what in json.loads(trust.guarded(path, trust.OURS))
+        ]
         # of what is no store nothing else needs to be said
         found = said if said and NO_STORE in said[0].what else found + said
     except StoreError as error:
@@ -93,10 +95,6 @@ def check_file(path: Path, most: int | None = None) -> list[Finding]:
     except ValueError:
         found.append(Finding(place="/", what="it is damaged, reading it crashes the HDF5 library"))
     return found
-
-
-def _said(path: Path) -> str:
-    return trust.guarded(path, trust.OURS)
 
 
 def structure(path: Path, *, arrays: bool = True) -> list[Finding]:

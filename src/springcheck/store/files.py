@@ -16,7 +16,6 @@ import warnings
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from springcheck.errors import StoreError, StoreWarning
@@ -257,14 +256,6 @@ class Lock:
         if not self._file.closed and not self._system:
             self._write(b"")
         self._file.close()
-
-    def __enter__(self) -> Lock:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.release()
 
 
 def _holder(content: bytes) -> dict[str, Any]:

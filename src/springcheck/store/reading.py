@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -75,6 +76,14 @@ def _datasets(file: Any, label: str, known: Record) -> dict[str, Any]:
     return found
 
 
+@contextlib.contextmanager
+def _held(path: str | Path, label: str) -> Iterator[tuple[Record, dict[str, Any], dict[str, Any]]]:
+    """What is known of a trajectory of a store (see `known_of`), and its arrays (see `_datasets`)."""
+    with opened(source_of(Path(path), label)) as file:
+        known, rest = known_of(file, label)
+        yield known, rest, _datasets(file, label, known)
+
+
 def _whole(path: Path, dataset: Any) -> Floats:
     size = dataset.size * dataset.dtype.itemsize
     if size > MAPPED:
@@ -107,8 +116,7 @@ def read_one(path: str | Path, label: str) -> Trajectory:
 
 def digest(path: str | Path, label: str) -> str:
     """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
-    with opened(source_of(Path(path), label)) as file:
-        datasets = _datasets(file, label, known_of(file, label)[0])
+    with _held(path, label) as (_, _, datasets):
         columns = {name: layout.Column(path=name, shape=x.shape) for name, x in datasets.items()}
         return digests.combined({name: digests.of_array(x) for name, x in datasets.items()}, columns)
 
@@ -118,9 +126,7 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
 
     With a stride only every stride-th piece is read, and the last.
     """
-    with opened(source_of(Path(path), label)) as file:
-        known, rest = known_of(file, label)
-        datasets = _datasets(file, label, known)
+    with _held(path, label) as (known, rest, datasets):
         starts = range(0, max(1, known.frames - 1), rows)
         for start in sorted({*starts[::stride], starts[-1]}):
             piece = records.trajectory(label, known, rest, _rows(datasets, slice(start, start + rows + 1)))
@@ -133,9 +139,7 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
 
 def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, int]:
     """Every stride-th frame, at most `max_frames` of them, and the stride."""
-    with opened(source_of(Path(path), label)) as file:
-        known, rest = known_of(file, label)
-        datasets = _datasets(file, label, known)
+    with _held(path, label) as (known, rest, datasets):
         stride = max(1, -(-known.frames // max_frames))
         kept = _rows(datasets, slice(None, None, stride))
         return records.trajectory(label, known, rest, kept, stride), stride
@@ -143,11 +147,8 @@ def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, 
 
 def end(path: str | Path, label: str, rows: int) -> Trajectory:
     """The last `rows` frames of a trajectory."""
-    with opened(source_of(Path(path), label)) as file:
-        known, rest = known_of(file, label)
-        return records.trajectory(
-            label, known, rest, _rows(_datasets(file, label, known), slice(-rows, None))
-        )
+    with _held(path, label) as (known, rest, datasets):
+        return records.trajectory(label, known, rest, _rows(datasets, slice(-rows, None)))
 
 
 def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +25,7 @@ from springcheck.studies.tables import Form
 from springcheck.studies.team import ALONE, Team
 
 __all__ = [
-    "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restored",
+    "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restoring",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -241,13 +241,24 @@ class Kept:
         return stored_scene(self.path)
 
 
-def restored(path: str | Path, name: str, build: Callable[[Kept], T]) -> T:
-    """A study of a store.  StoreError where the file holds none, or a part of it is missing."""
-    try:
-        kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.tables_of(path))
-        return build(kept)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
+def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path], T]]:
+    """Makes of a function that builds a study from what is kept of it one that reads it from a store.
+
+    That raises StoreError where the file holds none, or a part of it is missing.
+    """
+
+    def reader(build: Callable[[Kept], T]) -> Callable[[str | Path], T]:
+        @wraps(build)
+        def stored(path: str | Path) -> T:
+            try:
+                kept = Kept(path=Path(path), document=store.decoded(path, name), tables=store.tables_of(path))
+                return build(kept)
+            except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+                raise StoreError(f"{path}: its study of {name} lacks {error}; measure it anew") from error
+
+        return stored
+
+    return reader
 
 
 def tables(path: Path) -> Mapping[str, Table]:

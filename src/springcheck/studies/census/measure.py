@@ -105,12 +105,9 @@ def perform(options: Namespace, progress: Progress | None) -> Census:
     return replace(found, path=path)
 
 
-def stored(path: str | Path) -> Census:
+@keeper.restoring("census")
+def stored(kept: keeper.Kept) -> Census:
     """The census that `record` has kept.  StoreError where the file holds none."""
-    return keeper.restored(path, "census", _restored)
-
-
-def _restored(kept: keeper.Kept) -> Census:
     return Census(
         entries=tuple(kept.found(ENTRIES, one["method"]) for one in kept.document["entries"]),
         left_out=tuple(LeftOut(**one) for one in kept.document["left_out"]),
@@ -135,7 +132,7 @@ def entry(label: Label) -> Entry:
         agrees=_agrees(uneven, method.scheme, name),
         substeps=0 if found is None or found.stride is None else found.stride,
         velocity_offset=np.nan if found is None else float(found.velocity_offset),
-        area=np.nan if method.adaptive else _determinant(run) - 1,
+        area=np.nan if method.adaptive else float(np.linalg.det(_map(run))) - 1,
         friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
@@ -165,10 +162,6 @@ def _map(run: Trajectory) -> np.ndarray:
     """The one-step matrix (2, 2) on (q, p) that fits the states best."""
     z = np.stack([run.q[:, 0], run.p[:, 0]])
     return np.asarray(z[:, 1:] @ np.linalg.pinv(z[:, :-1]))
-
-
-def _determinant(run: Trajectory) -> float:
-    return float(np.linalg.det(_map(run)))
 
 
 def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:

@@ -100,12 +100,9 @@ def record(
     return ensemble
 
 
-def stored(path: str | Path) -> Ensemble:
+@keeper.restoring("ensemble")
+def stored(kept: keeper.Kept) -> Ensemble:
     """The ensemble that `record` has kept.  StoreError where the file holds none."""
-    return keeper.restored(path, "ensemble", _restored)
-
-
-def _restored(kept: keeper.Kept) -> Ensemble:
     known = kept.document
     return Ensemble(
         scene=kept.scene,

@@ -272,12 +272,7 @@ def together(scene: Scene, changes: Mapping[Place, Floats], chosen: np.ndarray) 
             arrays[place[0]][:, place[1]] = values[chosen]
         else:
             grid[place[0]] = type(getattr(scene, place[0]))(values[chosen[0]])
-    terms = tuple(
-        _replaced(term, {name: x.ravel() for (j, name), x in columns.items() if j == t})
-        for t, term in enumerate(many.terms)
-    )
-    return scene.derived(terms=terms, **{name: x.ravel() for name, x in arrays.items()}, **grid)
-
-
-def _replaced(term: Any, values: Mapping[str, np.ndarray]) -> Any:
-    return replace(term, **values) if values else term
+    terms: list[Any] = list(many.terms)
+    for (t, name), whole in columns.items():
+        terms[t] = replace(terms[t], **{name: whole.ravel()})
+    return scene.derived(terms=tuple(terms), **{name: x.ravel() for name, x in arrays.items()}, **grid)

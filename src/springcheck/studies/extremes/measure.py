@@ -170,12 +170,9 @@ def perform(options: Namespace, progress: Progress | None) -> Atlas:
     return replace(atlas, path=path)
 
 
-def stored(path: str | Path) -> Atlas:
+@keeper.restoring("extremes")
+def stored(kept: keeper.Kept) -> Atlas:
     """The atlas that `record` has kept.  StoreError where the file holds none."""
-    return keeper.restored(path, "extremes", _restored)
-
-
-def _restored(kept: keeper.Kept) -> Atlas:
     known = kept.document
     return Atlas(
         cells=tuple(cell for name in known["tables"] for cell in CELLS.found(kept.tables[name])),

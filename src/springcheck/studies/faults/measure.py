@@ -21,7 +21,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.faults import clean, steppers
-from springcheck.studies.faults.result import SEEN, Clean, FaultReport, Result, restored, seen
+from springcheck.studies.faults.result import SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.study import Progress
@@ -217,9 +217,25 @@ def record(kept: keeper.Keeper, found: FaultReport) -> None:
     kept.commit("faults", found.document())
 
 
-def stored(path: str | Path) -> FaultReport:
-    """The study that a store holds.  StoreError where it holds none."""
-    return keeper.restored(path, "faults", restored)
+@keeper.restoring("faults")
+def stored(kept: keeper.Kept) -> FaultReport:
+    """The study that a store holds: its document has everything."""
+    known = kept.document
+    results = tuple(
+        Result(
+            name=one["name"],
+            about=one["about"],
+            size=one["size"],
+            rejected_by=tuple(one["rejected_by"]),
+            missed_by=tuple(one["missed_by"]),
+            limits=dict(known["limits"].get(one["name"], {})),
+        )
+        for one in known["faults"]
+    )
+    clean = Clean(
+        runs=known["clean_runs"], verdicts=known["clean_verdicts"], alarms=tuple(known["false_alarms"])
+    )
+    return FaultReport(results=results, clean=clean, path=kept.path)
 
 
 def study(
@@ -235,13 +251,14 @@ def study(
     """
     parts: list[Callable[[], Result | Clean]] = [partial(_examine, fault.name) for fault in FAULTS]
     parts += [partial(clean_laws, name) for name in _FIXED]
-    parts += [partial(_clean_scenes, first) for first in range(0, CLEAN, _BATCH)]
+    batches = [(clean_scene, first) for first in range(0, CLEAN, _BATCH)]
     if run is not None:
-        parts += [
-            partial(_clean_engine, run, label, first)
+        batches += [
+            (partial(clean_engine, run, label), first)
             for label in labels
             for first in range(0, BY_ENGINES, _BATCH)
         ]
+    parts += [partial(_batch, judged, first) for judged, first in batches]
     done: list[Result | Clean] = []
     with closing(team.carried_out(parts)) as found:
         for _, part in found:
@@ -261,12 +278,8 @@ def _examine(name: str) -> Result:
     return examine(next(fault for fault in FAULTS if fault.name == name))
 
 
-def _clean_scenes(first: int) -> Clean:
-    return _together([clean_scene(seed) for seed in range(first, first + _BATCH)])
-
-
-def _clean_engine(run: Run, label: str, first: int) -> Clean:
-    return _together([clean_engine(run, label, seed) for seed in range(first, first + _BATCH)])
+def _batch(judged: Callable[[int], Clean], first: int) -> Clean:
+    return _together([judged(seed) for seed in range(first, first + _BATCH)])
 
 
 def _together(parts: Sequence[Clean]) -> Clean:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from springcheck.studies.keeper import Kept, document
+from springcheck.studies.keeper import document
 from springcheck.studies.tables import Rows
 
 
@@ -83,23 +83,3 @@ def seen(report: FaultReport) -> list[Seen]:
         for result in report.results
         for check, size in result.limits.items()
     ]
-
-
-def restored(kept: Kept) -> FaultReport:
-    """The study that a store holds: its document has everything."""
-    known = kept.document
-    results = tuple(
-        Result(
-            name=one["name"],
-            about=one["about"],
-            size=one["size"],
-            rejected_by=tuple(one["rejected_by"]),
-            missed_by=tuple(one["missed_by"]),
-            limits=dict(known["limits"].get(one["name"], {})),
-        )
-        for one in known["faults"]
-    )
-    clean = Clean(
-        runs=known["clean_runs"], verdicts=known["clean_verdicts"], alarms=tuple(known["false_alarms"])
-    )
-    return FaultReport(results=results, clean=clean, path=kept.path)

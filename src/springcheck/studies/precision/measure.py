@@ -282,12 +282,9 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
     return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
 
 
-def stored(path: str | Path) -> PrecisionStudy:
+@keeper.restoring("precision")
+def stored(kept: keeper.Kept) -> PrecisionStudy:
     """The study that `record` has kept.  StoreError where the file holds none."""
-    return keeper.restored(path, "precision", _restored)
-
-
-def _restored(kept: keeper.Kept) -> PrecisionStudy:
     scene, known = kept.scene, kept.document
     points: list[Point] = []
     methods = []

@@ -25,28 +25,23 @@ def banks(study: PrecisionStudy) -> list[Bank]:
         log=True,
         shown=(least / 2, min(MOST_SHOWN, 2 * max(x.error for x in points))),
     )
+    time = "the run time of the engine alone, its smallest of several"
+    calls = "force calls, which any machine counts alike"
     ways: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
-        (
-            "Error against the run time of the engine alone, its smallest of several.",
-            "run time [s]",
-            _run_time,
-        ),
-        ("Error against force calls, which any machine counts alike.", "force calls", _force_calls),
+        (time, "run time [s]", lambda x: x.seconds),
+        (calls, "force calls", lambda x: float(x.force_calls or 0)),
     )
     charts = [
-        Chart(title=title, x=Scale(name=name, log=True), y=error, curves=_curves(study, known, cost))
+        Chart(
+            title=f"Error against {title}.",
+            x=Scale(name=name, log=True),
+            y=error,
+            curves=_curves(study, known, cost),
+        )
         for title, name, cost in ways
         if (known := [x for x in points if cost(x) > 0])
     ]
     return [Bank(title="Methods drawn", charts=charts)] if charts else []
-
-
-def _run_time(x: Point) -> float:
-    return x.seconds
-
-
-def _force_calls(x: Point) -> float:
-    return float(x.force_calls or 0)
 
 
 def _curves(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:

@@ -216,7 +216,9 @@ def judge(
         if len(pieces) == len(sources):
             parts.append(compare.compare(scene, pieces))
         else:
-            parts.append(_incomplete(parts[-1]))
+            # where some run has ended early nothing more can be said of the pairs
+            nothing = np.full_like(parts[-1].max_difference, np.nan)
+            parts.append(replace(parts[-1], max_difference=nothing))
     comparison = compare.merge(parts)
     runs = tuple(_line(last[name], tallies[name]) for name in sources)
     worst = {name: checks.worst(verdicts[name]) for name in sources}
@@ -265,11 +267,6 @@ def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str,
         if not pieces:
             return
         yield pieces
-
-
-def _incomplete(before: Comparison) -> Comparison:
-    """Where some run has ended early nothing more can be said of the pairs."""
-    return replace(before, max_difference=np.full_like(before.max_difference, np.nan))
 
 
 class _Tally:

@@ -119,12 +119,10 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
     return replace(study, path=path)
 
 
-def stored(path: str | Path) -> Stability:
+@keeper.restoring("stability")
+def stored(kept: keeper.Kept) -> Stability:
     """The study that `record` has kept.  StoreError where the file holds none."""
-    return keeper.restored(path, "stability", _restored)
 
-
-def _restored(kept: keeper.Kept) -> Stability:
     def under(form: Form[Any], name: str) -> tuple[Any, ...]:
         # the document knows the order in which they were measured
         methods = dict.fromkeys(one["method"] for one in kept.document[name])
