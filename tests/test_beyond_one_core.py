@@ -55,7 +55,7 @@ def test_what_workers_have_finished_is_taken_up_by_one_alone(tmp_path: Path) -> 
     kept = values(path)
     assert len(kept) == 1
     atlas = extremes.record(path, OWN, quick=True)
-    assert atlas.taken_up == 1
+    assert atlas.resumed == 1
     whole = values(path)
     assert {name: whole[name] for name in kept} == kept
 

@@ -146,7 +146,7 @@ def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:
     assert t[left] == pytest.approx(1, abs=0.5)
     # a value that differs by roundings is one value, not a picture of its roundings
     flat = overlay.frame([np.array([7.0, 7 + 1e-14])], np.array([7.0, 7.0]))
-    assert flat.room > 0.1
+    assert flat.half > 0.1
 
 
 def test_errors_are_distances_from_the_exact_solution() -> None:

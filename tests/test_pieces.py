@@ -62,7 +62,7 @@ def test_more_pieces_than_a_store_may_have_tables_are_one_table(
     assert store.summary(path).tables == ("squares/own",)
     with keeper.kept(path, "squares") as kept:
         found = kept.results(pieces(40))
-        assert kept.taken_up >= 24
+        assert kept.resumed >= 24
         assert [x for one in found for x in one] == [x for i in range(40) for x in squares(i)]
         kept.commit("squares", {})
     assert store.check(path) == []
@@ -123,7 +123,7 @@ def test_a_damaged_piece_alone_is_measured_again(tmp_path: Path) -> None:
     with journal:
         kept = keeper.Keeper(journal)
         kept.results(pieces(5))
-        assert kept.taken_up == 4
+        assert kept.resumed == 4
         kept.commit("squares", {})
     assert rows(store.read_tables(path)["squares/own"]) == WANTED[: sum(i % 3 + 1 for i in range(5))]
 

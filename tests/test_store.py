@@ -334,7 +334,7 @@ def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
 def test_a_recording_that_would_not_fit_is_told_before_it_starts(tmp_path: Path) -> None:
     s = scene(steps=10**13, every=1)
     with pytest.raises(StoreError, match=r"would take 960 TB; .* are free in"):
-        store.room(tmp_path / "s.h5", store.size(s))
+        store.need_space(tmp_path / "s.h5", store.size(s))
 
 
 def test_importing_the_store_imports_no_engine_and_no_plots() -> None:

@@ -138,7 +138,7 @@ def test_an_interrupted_study_of_precision_goes_on(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"another command, or of other versions"):
         precision.record(scene, labels[:2], path, budget=2.0)
     second = precision.record(scene, labels, path, budget=2.0)
-    assert second.taken_up == len(done) > 0
+    assert second.resumed == len(done) > 0
     assert set(done) < set(second.points)
     assert store.summary(path).complete
     assert store.check(path) == []
@@ -207,7 +207,7 @@ def test_work_of_another_version_or_machine_is_not_taken_up(
                 extremes.record(path, OWN, quick=True)
     with pytest.raises(StoreError, match="another command"):
         extremes.record(path, OWN)
-    assert extremes.record(path, OWN, quick=True).taken_up == 1
+    assert extremes.record(path, OWN, quick=True).resumed == 1
 
 
 def test_runs_of_another_version_are_not_taken_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -245,7 +245,7 @@ def test_a_study_of_stability_can_be_forced_to_start_over(tmp_path: Path) -> Non
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     with pytest.raises(KeyboardInterrupt):
         stability.record(scene, path, OWN, progress=raising(3))
-    assert stability.record(scene, path, OWN, force=True).taken_up == 0
+    assert stability.record(scene, path, OWN, force=True).resumed == 0
 
 
 def test_a_forced_study_goes_on_with_what_it_has_finished_itself(tmp_path: Path) -> None:
@@ -257,7 +257,7 @@ def test_a_forced_study_goes_on_with_what_it_has_finished_itself(tmp_path: Path)
             stability.record(scene, path, OWN, force=True, progress=raising(piece))
         assert path.read_bytes() == before
     whole = stability.record(scene, path, OWN, force=True)
-    assert whole.taken_up >= 2
+    assert whole.resumed >= 2
     assert len(whole.limits) > len(old.limits)
     # finished: the next one starts over
-    assert stability.record(scene, path, OWN, force=True).taken_up == 0
+    assert stability.record(scene, path, OWN, force=True).resumed == 0

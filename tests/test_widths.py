@@ -163,7 +163,7 @@ def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys:
     )  # fmt: skip
     left = (LeftOut(method="dart:joint-spring", reason="its library cannot be loaded here"),)
     on_terminals(
-        census_text.lines(census_result.Census(entries=entries, left_out=left, taken_up=1)),
+        census_text.lines(census_result.Census(entries=entries, left_out=left, resumed=1)),
         monkeypatch,
         capsys,
     )

@@ -33,7 +33,7 @@ def run(
     """The whole job, as `springcheck run` does it: run, store, compare, judge.
 
     `methods` are labels or globs such as ``"own:*"``; left out: those of the scene.  The store is `path`, by
-    default SCENE.h5 in the current folder; what an interrupted call has finished is taken up.
+    default SCENE.h5 in the current folder; what an interrupted call has finished is reused.
 
     Raises SpringcheckError for everything that a user can mend.
     """

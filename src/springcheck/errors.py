@@ -83,7 +83,7 @@ def nearest(word: str, known: Iterable[str], before: str = "") -> str:
 
 
 class StoreWarning(UserWarning):
-    """A store is written or taken up all the same, but not as it should be."""
+    """A store is written or resumed all the same, but not as it should be."""
 
     def __str__(self) -> str:
         return plain(super().__str__(), LONGEST_MESSAGE)

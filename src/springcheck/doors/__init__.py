@@ -96,7 +96,7 @@ def _labels(found: engines.Engine) -> list[str]:
 
 
 def _digest(*paths: str) -> str:
-    """What stands for the version of code: runs of an older one are not taken up."""
+    """What stands for the version of code: runs of an older one are not resumed."""
     found = sha256()
     for path in paths:
         if Path(path).is_file():

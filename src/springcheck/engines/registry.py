@@ -204,7 +204,7 @@ def from_file(path: Path) -> Engine | None:
     if found is None:
         raise MethodError(f"{path} has no engine: a springcheck.engines.Engine named ENGINE")
     try:
-        # the file's digest stands for its version: runs of an older one are not taken up
+        # the file's digest stands for its version: runs of an older one are not resumed
         return bring(found, str(path), sha256(path.read_bytes()).hexdigest()[:12])
     except MethodError as error:
         text = str(error)

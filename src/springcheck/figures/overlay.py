@@ -34,7 +34,7 @@ GROWS = 1.3
 """Ratio of the second half's reach to the first half's from which a run grows."""
 
 FAR = 1e6
-"""How many times the room outside a line is drawn to: far enough to leave the picture in its direction."""
+"""Half widths of a picture that a line is drawn beyond it: far enough to leave it in its direction."""
 
 ROUNDINGS = 1e-9
 """Relative difference of values below which a picture shows them as equal."""
@@ -150,7 +150,7 @@ class Frame:
         return self.low / 2 + self.high / 2
 
     @property
-    def room(self) -> float:
+    def half(self) -> float:
         """From its middle to its edge."""
         return self.high / 2 - self.low / 2
 
@@ -164,7 +164,7 @@ class Frame:
     def within(self, values: Floats) -> Floats:
         """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
         end = self.leaves(values)
-        near = np.clip(values, self.centre - FAR * self.room, self.centre + FAR * self.room)
+        near = np.clip(values, self.centre - FAR * self.half, self.centre + FAR * self.half)
         return near if end is None else np.where(np.arange(len(near)) <= end, near, np.nan)
 
 
@@ -213,12 +213,12 @@ def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
     if not ends:
         return x, y
     x, y = x[: min(ends) + 1], y[: min(ends) + 1]
-    # in extended precision: 1e300 over a room of 1e-200 overflows
+    # in extended precision: 1e300 over a half width of 1e-200 overflows
     u, v = (
-        (np.asarray(one, np.longdouble) - its.centre) / its.room for one, its in ((x, a), (y, b))
+        (np.asarray(one, np.longdouble) - its.centre) / its.half for one, its in ((x, a), (y, b))
     )  # fmt: skip
     scale = np.maximum(1, np.maximum(np.abs(u), np.abs(v)) / FAR)
-    return tuple(np.asarray(w / scale * its.room + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
+    return tuple(np.asarray(w / scale * its.half + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
 
 
 def note(axes: Axes, leaving: Mapping[str, float], factor: float, unit: str) -> None:

@@ -21,7 +21,7 @@ EQUAL = 2.5
 """Ratio of two ranges up to which equal scales on both axes help."""
 
 PERIODS, SHOWN = 14, 6
-"""Periods from which the first and the last ones are shown apart, and how many of each."""
+"""Periods from which the first and the last ones are shown separately, and how many of each."""
 
 FRAMES = 7
 """Frames of a period below which lines between them are chords: they are drawn as dots."""

@@ -8,7 +8,7 @@ from springcheck.errors import StoreError, StoreWarning
 from springcheck.store.checking import Finding, check, doubts
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
-from springcheck.store.files import room
+from springcheck.store.files import need_space
 from springcheck.store.foreign import is_foreign, is_h5md, read_arrays, read_foreign
 from springcheck.store.journal import Journal, open_new
 from springcheck.store.layout import machine, size
@@ -38,7 +38,7 @@ from springcheck.store.tables import Table
 __all__ = [
     "Draft", "Finding", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "is_foreign", "is_h5md", "measured_by", "open_new", "read", "read_arrays", "read_foreign", "read_one",
-    "read_tables", "room", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
+    "is_foreign", "is_h5md", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
+    "read_one", "read_tables", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
     "windows",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: locks, room, fsync, and errors in one line."""
+"""Files that are written whole or not at all: locks, free space, fsync, and errors in one line."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def told(path: Path, doing: str) -> Iterator[None]:
         raise StoreError(f"cannot {doing} {shown(path)}: {cause(error)}") from error
 
 
-def room(path: Path, size: int) -> None:
+def need_space(path: Path, size: int) -> None:
     """Raise StoreError when `size` bytes [B] would not fit beside `path`."""
     folder = path.absolute().parent
     with told(folder, "look into"):
@@ -118,7 +118,7 @@ def readable(size: float) -> str:
 def reserve(file: BinaryIO, size: int) -> None:
     """Take up `size` bytes on the disk now, so that no later write can find it full.
 
-    libhdf5 cannot close a file whose last write failed; with the room taken beforehand none fails.  Where
+    libhdf5 cannot close a file whose last write failed; with the space reserved beforehand none fails.  Where
     the system cannot reserve, zeros are written.
     """
     if hasattr(os, "posix_fallocate"):

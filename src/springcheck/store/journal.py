@@ -35,11 +35,11 @@ COLLECTION = "collection.new"
 
 
 def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
-    """Start to write a store, or take up one that the same command left unfinished.
+    """Start to write a store, or resume one that the same command left unfinished.
 
     `command` says all that decides the results (scene text, methods, options): it is how a journal is
     recognised.  Raises StoreError when the path exists and is no unfinished store of this command
-    (`force` starts over, or takes up what it has started over itself; the old file stays until the new one is
+    (`force` starts over, or resumes what it has started over itself; the old file stays until the new one is
     complete), when another process is writing it, and when the folder is missing or cannot be written.
     """
     path = Path(path)
@@ -112,7 +112,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
-    """The run id of the journal that is taken up or started."""
+    """The run id of the journal that is resumed or started."""
     known = claim(parts)
     if known is not None and (not force or known["forced"]):
         if known["command"] == command:

@@ -43,7 +43,7 @@ LIBVER = ("v110", "v110")
 """Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
 
 MARGIN = 1 << 16
-"""Bytes taken up beyond the arrays, for groups and attributes."""
+"""Bytes reserved beyond the arrays, for groups and attributes."""
 CHUNK = 1 << 20
 """Bytes of a chunk of an exported array."""
 
@@ -154,12 +154,12 @@ def _empty() -> bytes:
 
 @contextlib.contextmanager
 def fresh(path: Path, size: int) -> Iterator[Any]:
-    """A new HDF5 file, open for writing, with room for `size` bytes taken up on the disk beforehand.
+    """A new HDF5 file, open for writing, with `size` bytes of the disk reserved beforehand.
 
     libhdf5 cannot close a file whose last write failed, and crashes the interpreter at its end: so it is
     never the one to find the disk full.
     """
-    files.room(path, size)
+    files.need_space(path, size)
     with files.created(path) as raw:
         raw.write(_empty())
     with reopened(path, size) as file:
@@ -168,7 +168,7 @@ def fresh(path: Path, size: int) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def reopened(path: Path, size: int) -> Iterator[Any]:
-    """A file of ours, open for writing, with room for `size` more bytes taken up beforehand."""
+    """A file of ours, open for writing, with `size` more bytes reserved beforehand."""
     with path.open("rb+") as raw:
         files.reserve(raw, raw.seek(0, os.SEEK_END) + size + MARGIN)
     with h5py.File(path, "r+", libver=LIBVER, locking=False) as file:

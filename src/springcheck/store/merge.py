@@ -40,7 +40,7 @@ def collection(
         kept: tuple[seal.Extent, ...] = ()
         made = layout.fresh(path, total + margin)
     else:
-        files.room(path, total + margin)
+        files.need_space(path, total + margin)
         kept = adopt.adopt(base, path)
         made = layout.reopened(path, total + margin)
     with made as file:

@@ -81,7 +81,7 @@ class Keeper:
         self._by: dict[str, list[dict[str, str]]] = {}
         self.names: list[str] = []
         """Names of the tables of the pieces, in the order in which they were asked for."""
-        self.taken_up = 0
+        self.resumed = 0
         """Pieces that were not measured again."""
 
     def finished(self, form: Form[Any], key: str) -> Any:
@@ -120,7 +120,7 @@ class Keeper:
             self._journal.add(table)
 
     def results(self, pieces: Sequence[Piece]) -> list[Any]:
-        """The results of these pieces, in their order: taken up where finished, else measured and kept."""
+        """The results of these pieces, in their order: an earlier call's, else measured and saved."""
         found = {piece.name: result for piece, result in self.stream(pieces)}
         return [found[piece.name] for piece in pieces]
 
@@ -130,7 +130,7 @@ class Keeper:
         left = []
         for piece in pieces:
             if piece.name in self._finished:
-                self.taken_up += 1
+                self.resumed += 1
                 yield piece, self.finished(piece.form, piece.key)
             else:
                 left.append(piece)
@@ -168,9 +168,9 @@ class Keeper:
         """Label of each finished trajectory -> the file that holds it."""
         return self._writing.sources()
 
-    def room(self, scene: Scene, runs: int) -> None:
+    def need_space(self, scene: Scene, runs: int) -> None:
         """StoreError where there is no space for so many trajectories of a scene."""
-        store.room(self._writing.path, store.size(scene) * runs)
+        store.need_space(self._writing.path, store.size(scene) * runs)
 
     @contextmanager
     def draft(self, label: Label, scene: Scene) -> Iterator[Draft]:
@@ -215,7 +215,7 @@ def kept(
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Iterator[Keeper]:
-    """A study that is kept in a store; an unfinished one of the same command is taken up.
+    """A study that is kept in a store; an unfinished one of the same command is resumed.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """

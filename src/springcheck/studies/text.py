@@ -18,7 +18,7 @@ def left_out(left: Sequence[LeftOut]) -> Lines:
     return [plain(), *said] if said else []
 
 
-def taken_up(pieces: int, what: str) -> Lines:
+def resumed(pieces: int, what: str) -> Lines:
     """A line on what an interrupted call had finished, where there was one."""
     if not pieces:
         return []

@@ -59,10 +59,10 @@ class Table:
                 else:
                     yield from self._lines(row, widths, block)
 
-    def _free(self, widths: Sequence[int], j: int, room: int) -> int:
+    def _free(self, widths: Sequence[int], j: int, width: int) -> int:
         """Columns for the prose: what the others leave, or what the first does where that is too little."""
-        others = room - sum(widths) + widths[j] - GAP * (len(widths) - 1)
-        return others if others >= PROSE or j == 0 else room - widths[0] - GAP
+        others = width - sum(widths) + widths[j] - GAP * (len(widths) - 1)
+        return others if others >= PROSE or j == 0 else width - widths[0] - GAP
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
         return Measurement(1, options.max_width)
@@ -88,11 +88,11 @@ class Table:
             yield _line(out)
 
 
-def _blocks(widths: Sequence[int], room: int) -> list[list[int]]:
+def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
     """Columns that fit beside each other, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
-        if used + GAP + widths[j] > room and len(blocks[-1]) > 1:
+        if used + GAP + widths[j] > width and len(blocks[-1]) > 1:
             blocks.append([0])
             used = widths[0]
         blocks[-1].append(j)

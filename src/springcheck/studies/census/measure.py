@@ -58,7 +58,7 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
     # workers have ended: nothing of ours runs beside what is timed
     entries = [_timed(label, one, kept) for label, one in zip(usable, found, strict=True)]
-    return Census(entries=tuple(entries), left_out=tuple(left), taken_up=kept.taken_up)
+    return Census(entries=tuple(entries), left_out=tuple(left), resumed=kept.resumed)
 
 
 def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
@@ -88,7 +88,7 @@ def record(
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Census:
-    """Like `measure`, kept in a store; an unfinished census of the same command is taken up."""
+    """Like `measure`, kept in a store; an unfinished census of the same command is resumed."""
     labels = engines.match(tuple(methods) or (EVERY,))
     with keeper.kept(
         path, keeper.command("census", labels), force=force, progress=progress, team=team
@@ -116,7 +116,7 @@ def stored(kept: keeper.Kept) -> Census:
 
 
 def entry(label: Label) -> Entry:
-    """What one method is, by its states; its time is measured apart."""
+    """What one method is, by its states; its time is measured separately."""
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
     orbit, run = simulate.run(blog, label), simulate.run(uneven, label)
     method = engines.method(label)

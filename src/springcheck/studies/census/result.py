@@ -58,7 +58,7 @@ class Census:
 
     entries: tuple[Entry, ...]
     left_out: tuple[LeftOut, ...]
-    taken_up: int = 0
+    resumed: int = 0
     path: Path | None = None
 
     @property

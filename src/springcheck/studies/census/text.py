@@ -7,7 +7,7 @@ from argparse import Namespace
 import numpy as np
 
 from springcheck.studies.census.result import Census, Entry, title
-from springcheck.studies.text import left_out, taken_up
+from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, plain, table
 from springcheck.text.wording import seconds
 
@@ -21,7 +21,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
     out: Lines = [
         plain("What every engine runs, by its states", "bold"),
         plain("Amplitude: of the blog's spring after 200 steps, exactly 1.  All else: spring-uneven."),
-        *taken_up(census.taken_up, "method"),
+        *resumed(census.resumed, "method"),
         plain(),
     ]
     rows: list[Row] = []

@@ -63,7 +63,7 @@ def record(
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Ensemble:
-    """Run every cell by every method and keep its numbers; chunks that are finished are taken up.
+    """Run every cell by every method and keep its numbers; chunks that are finished are reused.
 
     Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
     """
@@ -93,7 +93,7 @@ def record(
             grid=cells.samples is None,
             tallies=tuple(tallies.values()),
             left_out=tuple(left),
-            taken_up=kept.taken_up,
+            resumed=kept.resumed,
             path=path,
         )
         kept.commit("ensemble", ensemble.document(), scene)

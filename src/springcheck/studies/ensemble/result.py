@@ -83,7 +83,7 @@ class Ensemble:
     grid: bool
     tallies: tuple[Tally, ...]
     left_out: tuple[LeftOut, ...]
-    taken_up: int = 0
+    resumed: int = 0
     """Chunks that an interrupted call had finished."""
     path: Path | None = None
 

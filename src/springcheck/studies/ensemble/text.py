@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.ensemble.result import Ensemble, Tally
-from springcheck.studies.text import left_out, taken_up
+from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
@@ -21,7 +21,7 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
     titles = ("method", "cells", "complete", "error from", "to", "energy from", "to")
     out: Lines = [
         plain(f"{found.scene.title}: {count(cells, 'cell')}, {how} over {', '.join(found.fields)}", "bold"),
-        *taken_up(found.taken_up, "chunk"),
+        *resumed(found.resumed, "chunk"),
         plain(),
         table(titles, rows),
         plain(

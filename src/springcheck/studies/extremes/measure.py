@@ -50,7 +50,7 @@ def measure(
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 
     With `cells` the plane of forces is made finer until there are about so many in all.  What an earlier call
-    has finished (`kept`) is taken up.
+    has finished (`kept`) is reused.
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
@@ -87,7 +87,7 @@ def measure(
         cells=tuple(found),
         windows=tuple(windows(found)),
         left_out=tuple(left_out),
-        taken_up=kept.taken_up,
+        resumed=kept.resumed,
     )
 
 
@@ -140,7 +140,7 @@ def record(
 ) -> Atlas:
     """Like `measure`, kept in a store: one table of cells for each method as it is finished, the document.
 
-    An unfinished atlas of the same command is taken up.  Raises StoreError, before anything is measured,
+    An unfinished atlas of the same command is resumed.  Raises StoreError, before anything is measured,
     when the file exists or cannot be written.
     """
     labels = engines.match(tuple(methods) or everything())

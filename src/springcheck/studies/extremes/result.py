@@ -33,7 +33,7 @@ class Atlas:
     cells: tuple[Cell, ...]
     windows: tuple[Window, ...]
     left_out: tuple[LeftOut, ...]
-    taken_up: int = 0
+    resumed: int = 0
     """Methods that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""

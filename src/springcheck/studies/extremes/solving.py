@@ -29,7 +29,7 @@ def solve(label: Label, spec: Spec) -> Cell:
     """One cell by an adaptive solver, judged at its end."""
     scene = grid.scene([spec], label, frozenset())
     solver = engines.internal_steps(label)
-    said, value, bound, whole, untold = "", np.nan, np.nan, False, ""
+    said, value, bound, whole, unmeasured = "", np.nan, np.nan, False, ""
     with np.errstate(all="ignore"):
         try:
             done = solver(scene, engines.method(label), most=MOST)
@@ -39,7 +39,7 @@ def solve(label: Label, spec: Spec) -> Cell:
             whole = abs(done.t) >= abs(scene.step * scene.steps)
             said = "" if whole else f"; {MOST} internal steps end at t = {done.t:.3g}"
             if whole:
-                value, bound, untold = _distance(label, scene, done)
+                value, bound, unmeasured = _distance(label, scene, done)
         reason = _reason(scene, spec)
     outcome: Outcome = "silently wrong"
     why = f"off by {value:.3g} where {bound:.3g} is allowed"
@@ -47,8 +47,8 @@ def solve(label: Label, spec: Spec) -> Cell:
         outcome, why = "right", ""
     elif reason or not whole:
         outcome, why = "engine's limit", (reason or "it gives up") + said
-    elif untold:
-        outcome, why = "not measured", untold
+    elif unmeasured:
+        outcome, why = "not measured", unmeasured
     return judging.cell(label, spec, outcome, why, value, bound, tolerance=spec.tolerance)
 
 
@@ -112,10 +112,10 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         if run.outcome.status != "complete":
             # the driver ends a run at the last finite frame; the next one is out of range by theory
             high = judging.RANGES["double"][1]
-            room = (0.5 if engines.engine(label.engine).squares_lengths else 1) * np.log(high) - np.log(
+            most = (0.5 if engines.engine(label.engine).squares_lengths else 1) * np.log(high) - np.log(
                 max(abs(spec.q), abs(spec.p))
             )
-            left = growth * (run.outcome.step + scene.every) > room
+            left = growth * (run.outcome.step + scene.every) > most
             quantum = case.trajectory.arithmetic.overflow
             gone = growth * run.outcome.step > np.log(quantum / spec.force) if np.isfinite(quantum) else False
             reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"

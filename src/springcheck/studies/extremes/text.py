@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.extremes.result import Atlas
-from springcheck.studies.text import left_out, taken_up
+from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
@@ -29,7 +29,7 @@ def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:
     verdict = f"{count(len(wrong), 'cell')} silently wrong" if wrong else "no cell is silently wrong"
     out: Lines = [
         plain(f"{len(atlas.cells)} extreme cases", "bold"),
-        *taken_up(atlas.taken_up, "table"),
+        *resumed(atlas.resumed, "table"),
         plain(),
         table(("method", "cells", *SHORT.values()), rows),
         plain(),

@@ -72,7 +72,7 @@ def study(
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
     A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with
-    their reason.  Points that an earlier call has finished (`kept`) are taken up, and what they took counts
+    their reason.  Points that an earlier call has finished (`kept`) are reused, and what they took counts
     for the budget.
 
     Raises:
@@ -84,7 +84,7 @@ def study(
     able = _open(sweeps)
     ahead: Ahead = {}
     before = [_take_up(sweep, kept, ahead) for sweep in able]
-    taken_up = sum(len(sweep.points) for sweep in able)
+    resumed = sum(len(sweep.points) for sweep in able)
     spent = max(before, default=0.0)
     if kept.team.workers > 1:
         spent += _errors_first(scene, able, kept, ahead, budget, spent)
@@ -114,7 +114,7 @@ def study(
         seconds=perf_counter() - began,
         machine=keeper.origin([sweep.label for sweep in sweeps]),
         tick=tick(),
-        taken_up=taken_up,
+        resumed=resumed,
     )
 
 
@@ -198,7 +198,7 @@ def record(
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
-    Points are kept as they are finished, and an unfinished study of the same command is taken up.
+    Points are kept as they are finished, and an unfinished study of the same command is resumed.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """

@@ -75,7 +75,7 @@ class PrecisionStudy:
     machine: dict[str, str]
     tick: float
     """The smallest difference that the clock shows [s]."""
-    taken_up: int = 0
+    resumed: int = 0
     """Points that an interrupted call had finished."""
     left_out: tuple[LeftOut, ...] = ()
     path: Path | None = None

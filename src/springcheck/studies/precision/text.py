@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
-from springcheck.studies.text import left_out, taken_up
+from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, Table, plain, table
 from springcheck.text.wording import count, duration, seconds
 
@@ -19,7 +19,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     out: Lines = [
         plain(f"{scene.title}: error against run time over {scene.steps * scene.step:g} of time", "bold"),
         plain(f"  {count(done, 'point')} in {study.seconds:.0f} s on {study.machine['processor']}"),
-        *taken_up(study.taken_up, "point"),
+        *resumed(study.resumed, "point"),
         plain(),
         _methods(study.methods),
     ]

@@ -101,7 +101,7 @@ def run(
     faults: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Report:
-    """Run, compare, store, judge.  Work that an interrupted call has stored is taken up.
+    """Run, compare, store, judge.  Work that an interrupted call has stored is reused.
 
     `thorough` adds the experiments, whose runs are made on the side and not stored; `faults` engines broken
     on purpose, as NAME or NAME=SIZE.
@@ -125,7 +125,7 @@ def run(
     command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
     with keeper.kept(path, command, force=force) as kept:
         resumed = kept.runs()
-        kept.room(scene, len(labels) + len(wrong) - len(resumed))
+        kept.need_space(scene, len(labels) + len(wrong) - len(resumed))
         for label in tuple(labels):
             if str(label) in resumed:
                 continue

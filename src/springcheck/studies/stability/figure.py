@@ -178,7 +178,7 @@ def _cost(axes: Axes, rows: Sequence[Cost], field: str, scheme: str, line: bool)
     done = np.array([cost.outcome == "complete" for cost in rows])
     x = np.array([cost.ratio for cost in rows])
     y = np.array([float(getattr(cost, field)) for cost in rows])
-    # an error above the room of the motion, and force calls of a part of a run, say nothing
+    # an error above the size of the motion, and force calls of a part of a run, say nothing
     seen = (y > 0) & (y < ROOM if field == "error" else done | (field == "steps"))
     if line:
         axes.plot(x[seen], y[seen], color=look.color, linestyle=look.linestyle)

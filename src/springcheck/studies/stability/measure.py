@@ -39,7 +39,7 @@ def measure(
 ) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
 
-    What an earlier call has finished (`kept`) is taken up.
+    What an earlier call has finished (`kept`) is reused.
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
@@ -83,7 +83,7 @@ def measure(
         resonances=tuple(of_resonances),
         costs=tuple(row for rows in of_costs for row in rows),
         left_out=tuple(left_out),
-        taken_up=kept.taken_up,
+        resumed=kept.resumed,
     )
 
 
@@ -98,7 +98,7 @@ def record(
 ) -> Stability:
     """Like `measure`, kept in a store: tables under /stability as they are finished, and the document.
 
-    An unfinished study of the same command is taken up.  Raises StoreError, before anything is measured,
+    An unfinished study of the same command is resumed.  Raises StoreError, before anything is measured,
     when the file exists or cannot be written.
     """
     labels = engines.match(tuple(methods) or ("*",))

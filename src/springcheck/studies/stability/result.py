@@ -36,7 +36,7 @@ class Stability:
     resonances: tuple[Resonance, ...]
     costs: tuple[Cost, ...]
     left_out: tuple[LeftOut, ...]
-    taken_up: int = 0
+    resumed: int = 0
     """Limits, regions, resonances and costs that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""

@@ -7,7 +7,7 @@ from argparse import Namespace
 import numpy as np
 
 from springcheck.studies.stability.result import Stability
-from springcheck.studies.text import left_out, taken_up
+from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 
 
@@ -16,7 +16,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
     out: Lines = [
         plain(f"{study.scene.title}: limits of stability, measured on one step", "bold"),
         *_of_scene(study),
-        *taken_up(study.taken_up, "measurement"),
+        *resumed(study.resumed, "measurement"),
         plain(),
     ]
     if study.limits:
