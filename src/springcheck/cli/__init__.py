@@ -103,7 +103,7 @@ def _mistake(error: SpringcheckError | OSError) -> int:
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Every command, with its options where these words name it: setting up all of them takes long."""
+    """The command that these words begin with, or all of them: to set up each with its options takes long."""
     parser = slips.Parser(
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
@@ -113,8 +113,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
-    known: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
-    for one in known:
+    every: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
+    for one in [one for one in every if one.name in words[:1]] or every:
         parser_of = commands.add_parser(one.name, help=one.about)
         if one.name in words:
             one.options(parser_of)

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, schemes, store
-from springcheck.engines import Arithmetic
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.formats import States, is_hdf5, read, read_hdf5
 from springcheck.identify.files import identify_states, of_arrays
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
