@@ -182,26 +182,26 @@ def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]
     base = file.create_group(f"observables/{label}")
     if scene.units == "reduced":
         write_attributes(base, {"units_are": REDUCED})
-    offsets = {name: _contiguous(file, column) for name, column in found.items()}
-    time, step = file[found["time"].path], file[found["step"].path]
+    arrays = {name: _contiguous(file, column) for name, column in found.items()}
+    time, step = arrays["time"], arrays["step"]
     write_attributes(
         time, {"unit": unit["time"], "units": unit["time"], "long_name": _named("t", unit["time"], scene)}
     )
-    for name in found:
+    for name, array in arrays.items():
         if name in {"time", "step"}:
             continue
-        element = file[f"observables/{label}/{name}"]
+        element = base[name]
         two = len(found[name].shape) == 2
         axes = ["time", "."] if two else ["time"]
         write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
         if two:
             write_attributes(element, {"default_slice": [".", "0"]})
         shown = _named(f"{name} of {label}", unit[name], scene)
-        write_attributes(element["value"], {"unit": unit[name], "units": unit[name], "long_name": shown})
+        write_attributes(array, {"unit": unit[name], "units": unit[name], "long_name": shown})
         _link(element, time, step)
     if scene.kind == "particles" and ("q" in found or "p" in found):
-        _particles(file, label, scene, found, frames)
-    return offsets
+        _particles(file, label, scene, found, time, step)
+    return {name: int(array.id.get_offset()) for name, array in arrays.items()}
 
 
 def _named(text: str, unit: str, scene: Scene) -> str:
@@ -209,17 +209,16 @@ def _named(text: str, unit: str, scene: Scene) -> str:
     return text if scene.units == "reduced" or unit == "1" else f"{text} ({unit})"
 
 
-def _contiguous(file: Any, column: Column) -> int:
+def _contiguous(file: Any, column: Column) -> Any:
+    """A dataset whose bytes lie in one piece, not yet written."""
     group, name = column.path.rsplit("/", 1)
-    file.require_group(group)
     how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     how.set_layout(h5py.h5d.CONTIGUOUS)
     how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
     kind = h5py.h5t.py_create(np.dtype(column.dtype))
     space = h5py.h5s.create_simple(column.shape)
-    made = h5py.h5d.create(file[group].id, name.encode(), kind, space, how)
-    return int(made.get_offset())
+    return h5py.Dataset(h5py.h5d.create(file.require_group(group).id, name.encode(), kind, space, how))
 
 
 def _link(element: Any, time: Any, step: Any) -> None:
@@ -227,23 +226,23 @@ def _link(element: Any, time: Any, step: Any) -> None:
         element["time"], element["step"] = time, step
 
 
-def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column], frames: int) -> None:
+def _particles(
+    file: Any, label: str, scene: Scene, found: Mapping[str, Column], time: Any, step: Any
+) -> None:
     unit = units(scene)
     group = file.create_group(f"particles/{label}")
     write_box(group)
-    time, step = file[found["time"].path], file[found["step"].path]
     for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
         if source not in found:
             continue
         element = group.create_group(name)
-        view = h5py.VirtualLayout((frames, scene.n, 3), "<f8")
-        view[:, :, 0] = h5py.VirtualSource(".", found[source].path, found[source].shape, "<f8")
-        element.create_virtual_dataset("value", view, fillvalue=0.0)
-        text = unit["q"] if name == "position" else unit["velocity"]
-        write_unit(element["value"], text)
+        shape = found[source].shape
+        view = h5py.VirtualLayout((*shape, 3), "<f8")
+        view[:, :, 0] = h5py.VirtualSource(".", found[source].path, shape, "<f8")
+        made = element.create_virtual_dataset("value", view, fillvalue=0.0)
+        write_unit(made, unit["q"] if name == "position" else unit["velocity"])
         _link(element, time, step)
-    group["mass"] = scene.m.astype("<f8")
-    write_unit(group["mass"], unit["mass"])
+    write_unit(group.create_dataset("mass", data=scene.m.astype("<f8")), unit["mass"])
 
 
 def write_unit(dataset: Any, unit: str) -> None:

@@ -149,7 +149,9 @@ def _plots(file: Any) -> None:
     if not observables and drawn is None:
         return
     plots = file.create_group("plots")
-    made = [name for name in ("q", "p", "energy") if _plot(file, observables, plots, name)]
+    runs = {label: file[f"parameters/{label}"].attrs.get("sequence", 0) for label in observables}
+    order = {label: observables[label] for label in sorted(runs, key=lambda label: runs[label])}
+    made = [name for name in ("q", "p", "energy") if _plot(order, plots, name)]
     if drawn is not None and not made:
         made = [drawn.replace("/", " ")]
         plots[made[0]] = h5py.SoftLink(f"/{drawn}")
@@ -157,29 +159,26 @@ def _plots(file: Any) -> None:
     layout.write_attributes(file, {"default": "plots"})
 
 
-def _plot(file: Any, observables: Any, plots: Any, name: str) -> bool:
-    kept = {label: group[name] for label, group in observables.items() if name in group}
+def _plot(runs: Mapping[str, Any], plots: Any, name: str) -> bool:
+    kept = {label: run[name]["value"] for label, run in runs.items() if name in run}
     if not kept:
         return False
-    order = sorted(kept, key=lambda label: file[f"parameters/{label}"].attrs.get("sequence", 0))
-    frames = max(len(kept[label]["value"]) for label in order)
-    curves = [label for label in order if len(kept[label]["value"]) == frames]
+    frames = max(map(len, kept.values()))
+    curves = [label for label, value in kept.items() if len(value) == frames]
     group = plots.create_group(name)
-    first = kept[curves[0]]
     title = {"q": "q of the first particle", "p": "p of the first particle", "energy": "total energy"}[name]
     layout.write_attributes(group, {"NX_class": "NXdata", "signal": curves[0], "axes": ["time"]})
     group.create_dataset("title", data=title, dtype=h5py.string_dtype("utf-8"))
     if len(curves) > 1:
         layout.write_attributes(group, {"auxiliary_signals": curves[1:]})
-    group["time"] = h5py.SoftLink(f"{first.name}/time")
+    group["time"] = h5py.SoftLink(f"{kept[curves[0]].parent.name}/time")
     for label in curves:
-        value = kept[label]["value"]
+        value = kept[label]
         if value.ndim == 1:
             group[label] = h5py.SoftLink(value.name)
             continue
         view = h5py.VirtualLayout((frames,), "<f8")
         view[:] = h5py.VirtualSource(".", value.name, value.shape, "<f8")[:, 0]
-        group.create_virtual_dataset(label, view)
         shown = {key: value.attrs[key] for key in ("units", "long_name")}
-        layout.write_attributes(group[label], shown)
+        layout.write_attributes(group.create_virtual_dataset(label, view), shown)
     return True
