@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from springcheck import engines, simulate
+from springcheck.figures import style
 from springcheck.store import __main__ as trial
 from springcheck.store import trust
 from springcheck.studies.precision import measure, sweeps
@@ -75,11 +75,11 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
     """A figure is written as the numbers of its lines: most of a picture's time is its pixels."""
 
-    def save(figure: Figure, file: BytesIO, **how: Any) -> None:
+    def drawn(figure: Figure) -> dict[str, bytes]:
         lines: list[Any] = figure.findobj(Line2D)
-        file.write(b"".join(np.asarray(line.get_xydata()).tobytes() for line in lines))
+        return dict.fromkeys(("png", "svg"), b"".join(np.asarray(x.get_xydata()).tobytes() for x in lines))
 
-    monkeypatch.setattr(Figure, "savefig", save)
+    monkeypatch.setattr(style, "_drawn", drawn)
 
 
 @pytest.fixture

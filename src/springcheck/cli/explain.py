@@ -135,11 +135,7 @@ def meaning_lines(meaning: Meaning) -> Iterator[str]:
 
 
 def _method(name: str) -> Iterator[str]:
-    label = engines.parse(name)
-    method = engines.engine(label.engine).methods.get(label.method)
-    if method is None:
-        there = ", ".join(engines.engine(label.engine).methods)
-        raise SpringcheckError(f"{name!r} names no method; {label.engine} has {there}")
+    method = engines.method(engines.parse(name))
     yield f"{name}: {method.about}"
     yield ""
     yield from scheme_lines(schemes.scheme(method.scheme))

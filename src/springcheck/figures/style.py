@@ -60,8 +60,6 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
     Its texts may come from any file: control characters are escaped, and what is no formula stays text.
     """
-    if folder.exists() and not folder.is_dir():
-        raise StoreError(f"{folder} is a file: figures need a folder, name another one with -o")
     texts = figure.findobj(Text)
     for text in texts:
         shown = "\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n"))
