@@ -209,13 +209,13 @@ def test_a_store_in_a_folder_that_is_read_only_is_run_again(
 ) -> None:
     assert main(["run", "spring", "--method", "own:euler", "--quiet"]) == 0
     made: list[str | None] = []
-    folder = tempfile.TemporaryDirectory
+    folder = tempfile.mkdtemp
 
-    def noted(dir: str | None = None, prefix: str | None = None) -> tempfile.TemporaryDirectory[str]:
+    def noted(dir: Path | None = None, prefix: str | None = None) -> str:
         made.append(dir and str(dir))
         return folder(prefix=prefix)
 
-    monkeypatch.setattr(tempfile, "TemporaryDirectory", noted)
+    monkeypatch.setattr(tempfile, "mkdtemp", noted)
     assert main(["run", "--from", "spring.h5"]) == 0
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert main(["run", "--from", "spring.h5"]) == 0
