@@ -49,6 +49,12 @@ class Bench:
         """The scheme that the method claims to run."""
         return schemes.scheme(self.forwards.scheme)
 
+    @property
+    def stiffness(self) -> Floats:
+        """What holds each particle (n,) [M/T2], that of one radian a step where nothing does."""
+        k = np.abs(self.scene.system.hessian_diagonal(self.scene.q)).astype(np.float64)
+        return np.where(k > 0, k, self.scene.m / self.scene.step**2)
+
     @cached_property
     def copies(self) -> tuple[Case, Floats]:
         """One step of 2n+1 copies of the scene side by side, and by how much each was pushed (2n,).
@@ -58,11 +64,8 @@ class Bench:
         scene, n = self.scene, self.scene.n
         modes = exact.modes(scene)
         rest, _ = modes.out_of(modes.centre(), np.zeros(n, dtype=np.longdouble))
-        k = np.abs(np.diag(scene.system.hessian(scene.q))).astype(np.float64)
         unit = float(scene.system.norm.unit) or 1.0
-        momentum = np.sqrt(2 * scene.m) * unit
-        k = np.where(k > 0, k, scene.m / scene.step**2)
-        pushes = np.concatenate([np.sqrt(2 / k) * unit, momentum])
+        pushes = np.concatenate([np.sqrt(2 / self.stiffness) * unit, np.sqrt(2 * scene.m) * unit])
         state = np.zeros((2 * n + 1, 2 * n))
         state[:, :n] = rest.astype(np.float64)
         state[1:] += np.diag(pushes)

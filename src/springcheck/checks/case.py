@@ -266,9 +266,7 @@ class Case:
 
         Of any one spring, or of all on a particle; 0 where modes take many steps at once.
         """
-        peak = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble)
-
-        system = self.judged.system
+        peak, system = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble), self.judged.system
 
         def watched(terms: Iterable[Term]) -> Force:
             parts = tuple(terms)
@@ -280,8 +278,7 @@ class Case:
 
             return force
 
-        q, p = (x[:-1].astype(np.longdouble) for x in (self.trajectory.q, self.trajectory.p))
-        advance(self, q, p, self.trajectory.every, forces=watched)
+        advance(self, *self._starts, self.trajectory.every, forces=watched)
         return peak
 
     @cached_property
@@ -313,11 +310,6 @@ class Case:
     @cached_property
     def norm(self) -> Norm:
         return self.judged.system.norm
-
-    @cached_property
-    def rounding(self) -> float:
-        """The largest allowance of a step in the norm of errors, up to each frame (f-1,)."""
-        return float(np.max(self.norm(*self.allowance)))
 
     @property
     def roundings(self) -> int:

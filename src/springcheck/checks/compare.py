@@ -69,7 +69,8 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
             return float(np.max((bound * unit)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
     steps = float(case.steps[-1])
-    return case.roundings * case.rounding * steps * (1 + steps * fastest(case) * abs(trajectory.step) / 2)
+    rounding = float(np.max(case.norm(*case.allowance)))
+    return case.roundings * rounding * steps * (1 + steps * fastest(case) * abs(trajectory.step) / 2)
 
 
 def _telling(scene: Scene, trajectory: Trajectory) -> float:

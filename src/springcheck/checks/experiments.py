@@ -74,9 +74,7 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     """
     case, pushes = bench.copies
     n = bench.scene.n
-    k = np.abs(np.diag(bench.scene.system.hessian(bench.scene.q))).astype(np.float64)
-    k = np.where(k > 0, k, bench.scene.m / bench.scene.step**2)
-    root = (bench.scene.m * k) ** 0.25
+    root = (bench.scene.m * bench.stiffness) ** 0.25
     scale = np.concatenate([1 / root, root])
 
     def columns(q: Extended, p: Extended, sign: int) -> Floats:

@@ -110,7 +110,7 @@ def exact_end(where: str) -> tuple[Extended, Extended]:
     return extrapolated(WELL, DURATION)
 
 
-def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extended, Extended]:
+def extrapolated(scene: Scene, duration: float) -> tuple[Extended, Extended]:
     """The state of any scene without friction after a time, in extended precision: (n,) and (n,).
 
     Velocity Verlet with 24, 48, 72 ... steps; its error has even powers of the step alone, and
@@ -118,7 +118,7 @@ def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extend
     """
     force = scene.system.force
     rows: list[tuple[Extended, Extended]] = []
-    counts = [24 * (j + 1) for j in range(levels)]
+    counts = [24 * (j + 1) for j in range(7)]
     for count in counts:
         q, p = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
         h = np.longdouble(duration) / count
@@ -126,8 +126,8 @@ def extrapolated(scene: Scene, duration: float, levels: int = 7) -> tuple[Extend
             a, b = schemes.step(schemes.SCHEMES["velocity-verlet"], q, p, h=h, m=scene.m, force=force)
             q, p = np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
         rows.append((q, p))
-    for level in range(1, levels):
-        for j in range(levels - 1, level - 1, -1):
+    for level in range(1, len(counts)):
+        for j in range(len(counts) - 1, level - 1, -1):
             ratio = (np.longdouble(counts[j]) / counts[j - level]) ** 2 - 1
             fine, coarse = rows[j], rows[j - 1]
             rows[j] = (fine[0] + (fine[0] - coarse[0]) / ratio, fine[1] + (fine[1] - coarse[1]) / ratio)

@@ -7,8 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Floats
+from springcheck.engines.contract import Label
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
+
+
+def single(label: Label) -> Arithmetic:
+    """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
+    force = 16 * 2.0**-24 if label.method.endswith("-joint") else 2.0**-24
+    return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
 
 
 class Bodies(ABC):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from springcheck.engines.bodies import Bodies
+from springcheck.engines.bodies import Bodies, single
 from springcheck.engines.bonds import far, walls
 from springcheck.engines.contract import (
     EVERY_FORCE,
@@ -21,7 +21,6 @@ from springcheck.engines.contract import (
     named,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 FURTHEST = 2.0
@@ -33,12 +32,6 @@ def version() -> dict[str, str]:
     from importlib.metadata import version
 
     return {"box2d": version("box2d")}
-
-
-def arithmetic(label: Label) -> Arithmetic:
-    """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
-    force = 16 * 2.0**-24 if label.method == "distance-joint" else 2.0**-24
-    return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
 
 
 class _World(Bodies):
@@ -109,6 +102,6 @@ ENGINE = Engine(
     ),
     start=_World,
     version=version,
-    arithmetic=arithmetic,
+    arithmetic=single,
     step_seconds=5e-6,
 )

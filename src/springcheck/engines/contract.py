@@ -37,6 +37,8 @@ EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 
+EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
@@ -104,16 +106,6 @@ class Stopped(Exception):  # noqa: N818 - an outcome, not an error
         self.rows = rows
 
 
-def _double(label: Label) -> Arithmetic:
-    """IEEE double precision throughout."""
-    return Arithmetic()
-
-
-def _synchronised(method: Method) -> str:
-    """Velocities of the same times as the positions."""
-    return "synchronised"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Engine:
     """An engine, declared without its library being imported: only `start` and `version` may do that."""
@@ -127,8 +119,9 @@ class Engine:
     """start(scene, method, label, step): the engine at the scene's start.  The step may be negative."""
     version: Callable[[], Mapping[str, str]]
     """Versions of the library and of what it stands on, by name."""
-    arithmetic: Callable[[Label], Arithmetic] = _double
-    convention: Callable[[Method], str] = _synchronised
+    arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
+    """How the library rounds: double precision throughout by default."""
+    convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
@@ -162,11 +155,14 @@ class Engine:
         return self.module or self.distribution.replace("-", "_")
 
 
-def by_name(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need) -> Method:
+def by_name(
+    name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, adaptive: bool = False
+) -> Method:
     """A method that is run by its name alone, never by default."""
     return Method(
-        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False
-    )
+        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False,
+        adaptive=adaptive,
+    )  # fmt: skip
 
 
 def named(*methods: Method) -> dict[str, Method]:

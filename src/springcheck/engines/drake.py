@@ -86,16 +86,13 @@ ENGINE = Engine(
             "PrismaticSpring in a discrete plant",
             frozenset({"wall-spring"}),
         ),
-        Method(
-            name="joint-damping",
-            scheme="semi-implicit-euler-implicit-friction",
-            about="PrismaticSpring and damping of the joint in a discrete plant",
-            terms=frozenset({"wall-spring", "damping"}),
-            requires=frozenset({Need.DAMPING}),
-            default=False,
+        by_name(
+            "joint-damping", "semi-implicit-euler-implicit-friction",
+            "PrismaticSpring and damping of the joint in a discrete plant",
+            frozenset({"wall-spring", "damping"}), Need.DAMPING,
         ),
     ),
     start=_Plant,
     version=version,
     step_seconds=3e-5,
-)
+)  # fmt: skip

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import Engine, Label, Method, Stopped, named, version_of
+from springcheck.engines.contract import Engine, Label, Method, Stopped, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
-from springcheck.schemes import Scheme
+from springcheck.schemes import solver
 
 SMALLEST_TOLERANCE = float(np.finfo(np.float64).eps)
 """heyoka takes no tolerance below the spacing of double precision at 1."""
@@ -85,34 +85,24 @@ class _Series:
             self.force_calls += steps
 
 
-SCHEMES = (
-    Scheme(
-        name="heyoka-taylor",
-        title="Taylor series, adaptive order and step",
-        order=0,
-        limit=np.inf,
-        symplectic=False,
-        source="Biscani & Izzo, MNRAS 504 (2021) 2614; Jorba & Zou, Exp. Math. 14 (2005) 99",
-    ),
-)
-
 ENGINE = Engine(
     name="heyoka",
     title="heyoka",
     distribution="heyoka",
     extra="heyoka",
     methods=named(
-        Method(
-            name="taylor",
-            scheme="heyoka-taylor",
-            about="taylor_adaptive of the scene's equations, propagate_until each frame",
-            adaptive=True,
-            default=False,
-            terms=frozenset({"wall-spring", "spring", "quartic", "cosine", "damping"}),
+        by_name(
+            "taylor", "heyoka-taylor", "taylor_adaptive of the scene's equations, propagate_until each frame",
+            frozenset({"wall-spring", "spring", "quartic", "cosine", "damping"}), adaptive=True,
         ),
     ),
-    schemes=SCHEMES,
+    schemes=(
+        solver(
+            "heyoka-taylor", "Taylor series, adaptive order and step",
+            "Biscani & Izzo, MNRAS 504 (2021) 2614; Jorba & Zou, Exp. Math. 14 (2005) 99",
+        ),
+    ),
     start=_Series,
     version=version_of("heyoka"),
     step_seconds=1e-5,
-)
+)  # fmt: skip

@@ -135,29 +135,24 @@ class _Steps:
         self._force = scene.system.force if how.motor else None
         self._substeps = how.substeps
         self._bad_control = int(mujoco.mjtWarning.mjWARN_BADCTRL)
-        self._each = 4 if how.integrator == "RK4" else 1
+        self._each = 4 if how.integrator == "RK4" and not how.motor else 1
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         step, model, data, v_now, q_now = self._step, self._model, self._data, self._v, self._q
-        if self._force is None:
+        dropped = data.warning[self._bad_control :]
+        with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
-                step(model, data, every)
-                q[row] = q_now
-                p[row] = v_now
-            p *= self._m
-            self.force_calls += every * len(q) * self._each
-        else:
-            dropped = data.warning[self._bad_control :]
-            with np.errstate(over="ignore", invalid="ignore"):
-                for row in range(len(q)):
+                if self._force is None:
+                    step(model, data, every)
+                else:
                     for _ in range(every):
                         self._control[:] = self._force(q_now, v_now * self._m)
                         step(model, data, self._substeps)
                     if dropped[0].number:
                         raise Stopped(row, "MuJoCo sets controls to 0 where one is beyond 1e10")
-                    q[row] = q_now
-                    p[row] = v_now * self._m
-            self.force_calls += every * len(q)
+                q[row] = q_now
+                p[row] = v_now * self._m
+        self.force_calls += every * len(q) * self._each
 
 
 def arithmetic(label: Label) -> Arithmetic:
@@ -205,4 +200,4 @@ ENGINE = Engine(
     arithmetic=arithmetic,
     convention=lambda method: "velocities of the joints, synchronised",
     step_seconds=3e-6,
-)
+)  # fmt: skip

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from springcheck.engines.bodies import Bodies
+from springcheck.engines.bodies import Bodies, single
 from springcheck.engines.bonds import far, walls
 from springcheck.engines.contract import (
     EVERY_FORCE,
@@ -22,14 +22,7 @@ from springcheck.engines.contract import (
     version_of,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
-
-
-def arithmetic(label: Label) -> Arithmetic:
-    """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
-    force = 16 * 2.0**-24 if label.method == "spring-joint" else 2.0**-24
-    return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
 
 
 class _World(Bodies):
@@ -93,6 +86,6 @@ ENGINE = Engine(
     ),
     start=_World,
     version=version_of("rapier3d"),
-    arithmetic=arithmetic,
+    arithmetic=single,
     step_seconds=2e-5,
 )

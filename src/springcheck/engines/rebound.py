@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, named, version_of
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, by_name, named, version_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.schemes import Scheme
+from springcheck.schemes import solver
 
 
 @contextmanager
@@ -98,38 +98,26 @@ def _columns(sim: Any, first: int, n: int) -> dict[str, Floats]:
     }
 
 
-SCHEMES = (
-    Scheme(
-        name="rebound-ias15",
-        title="IAS15, Gauss-Radau of order 15, adaptive",
-        order=0,
-        limit=np.inf,
-        symplectic=False,
-        source="Rein & Spiegel, MNRAS 446 (2015) 1424; step: Aarseth 1985, in Pham, Rein & Spiegel 2023",
-    ),
-)
-
-
-def _method(name: str, scheme: str, about: str, *, adaptive: bool = False) -> Method:
-    return Method(
-        name=name, scheme=scheme, about=about, adaptive=adaptive, terms=EVERY_POTENTIAL, default=False
-    )
-
-
 ENGINE = Engine(
     name="rebound",
     title="REBOUND",
     distribution="rebound",
     extra="rebound",
     methods=named(
-        _method("leapfrog", "position-verlet", "additional_forces, integrator leapfrog"),
-        _method("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0"),
-        _method(
-            "ias15", "rebound-ias15", "additional_forces, integrator IAS15, Aarseth's step", adaptive=True
+        by_name("leapfrog", "position-verlet", "additional_forces, integrator leapfrog", EVERY_POTENTIAL),
+        by_name("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0", EVERY_POTENTIAL),
+        by_name(
+            "ias15", "rebound-ias15", "additional_forces, integrator IAS15, Aarseth's step", EVERY_POTENTIAL,
+            adaptive=True,
         ),
     ),
-    schemes=SCHEMES,
+    schemes=(
+        solver(
+            "rebound-ias15", "IAS15, Gauss-Radau of order 15, adaptive",
+            "Rein & Spiegel, MNRAS 446 (2015) 1424; step: Aarseth 1985, in Pham, Rein & Spiegel 2023",
+        ),
+    ),
     start=_Simulation,
     version=version_of("rebound"),
     step_seconds=8e-6,
-)
+)  # fmt: skip

@@ -11,10 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, Stopped, named, version_of
+from springcheck.engines.contract import (
+    EVERY_FORCE,
+    EVERY_KIND,
+    Engine,
+    Label,
+    Method,
+    Stopped,
+    named,
+    version_of,
+)
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.schemes import Scheme
+from springcheck.schemes import Scheme, solver
 
 SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
 
@@ -72,7 +81,7 @@ class _Solver:
 
 
 def _scheme(name: str, title: str, source: str) -> Scheme:
-    return Scheme(name=f"scipy-{name}", title=title, order=0, limit=np.inf, symplectic=False, source=source)
+    return solver(f"scipy-{name}", title, source)
 
 
 SCHEMES = (
@@ -98,7 +107,7 @@ ENGINE = Engine(
                 adaptive=True,
                 default=False,
                 terms=EVERY_FORCE,
-                kinds=frozenset({"particles", "circuit", "rotor"}),
+                kinds=EVERY_KIND,
             )
             for name, solver in SOLVERS.items()
         )

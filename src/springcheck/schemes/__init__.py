@@ -8,6 +8,7 @@ from springcheck.schemes.catalogue import (
     SCHEMES,
     Scheme,
     number,
+    solver,
 )
 from springcheck.schemes.linear import (
     amplification,
@@ -22,7 +23,7 @@ from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "ATTACHED", "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "title", "number", "step",
+    "ATTACHED", "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "solver", "title", "number", "step",
     "magnitude_step", "roundings", "amplification", "condition", "invariant", "matrix", "propagate",
     "rotation",
 ]  # fmt: skip

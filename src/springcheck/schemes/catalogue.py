@@ -127,13 +127,15 @@ def _tableau(
     )  # fmt: skip
 
 
-def _solver(name: str, title: str, convergence: Fraction | None = None) -> Scheme:
+def solver(name: str, title: str, source: str, convergence: Fraction | None = None) -> Scheme:
+    """An adaptive solver, which has no step of its own."""
     return Scheme(
         name=name, title=title, order=0, limit=np.inf, symplectic=False, convergence=convergence,
-        source="Hindmarsh et al., ACM TOMS 31 (2005) 363",
+        source=source,
     )  # fmt: skip
 
 
+_SUNDIALS = "Hindmarsh et al., ACM TOMS 31 (2005) 363"
 _HLW = "Hairer, Lubich & Wanner, I.1.2"
 _TUCKERMAN = "Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990"
 _ZHANG = "Zhang et al., J. Phys. Chem. A 123 (2019) 6056"
@@ -183,9 +185,9 @@ _ALL = (
               f"{_ZHANG}; as OpenMM's integrator stores it"),
     Scheme(name="exact", title="exact flow", order=0, limit=np.inf, symplectic=True, flow=True,
            source="the solution of the equation of motion"),
-    _solver("adams", "CVODE Adams-Moulton, orders 1-12", Fraction(12, 13)),
-    _solver("bdf", "CVODE BDF, orders 1-5", Fraction(5, 6)),
-    _solver("ida", "IDA BDF, orders 1-5, of a circuit's equations"),
+    solver("adams", "CVODE Adams-Moulton, orders 1-12", _SUNDIALS, Fraction(12, 13)),
+    solver("bdf", "CVODE BDF, orders 1-5", _SUNDIALS, Fraction(5, 6)),
+    solver("ida", "IDA BDF, orders 1-5, of a circuit's equations", _SUNDIALS),
 )  # fmt: skip
 
 SCHEMES: dict[str, Scheme] = {scheme.name: scheme for scheme in _ALL}

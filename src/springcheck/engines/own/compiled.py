@@ -26,29 +26,11 @@ than a step of a few hundred particles."""
 
 FLAGS: dict[str, Any] = {**HELP, "nogil": True}
 
-HELPERS: tuple[Callable[..., Any], ...] = (
-    forces.sine,
-    forces.exponential,
-    forces.indexed,
-    forces.held,
-    forces.tensions,
-    forces.pulled,
-    forces.pulled_too,
-    forces.slowed,
-    forces.force_at,
-    updates.kick,
-    updates.drift,
-    updates.kick_drift,
-    updates.euler,
-    updates.held_kick_drift,
-    updates.held_euler,
-    updates.chain_kick_drift,
-    updates.chain_euler,
-    updates.solve,
-    updates.held_implicit,
-    updates.chain_implicit,
-    updates.implicit,
-    updates.add,
+HELPERS: tuple[Callable[..., Any], ...] = tuple(
+    thing
+    for module in (forces, updates)
+    for thing in vars(module).values()
+    if inspect.isfunction(thing) and thing.__module__ == module.__name__
 )
 """What the kernels call."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Method, deferred, named
+from springcheck.engines.contract import EVERY_FORCE, EVERY_KIND, SPRINGS, Engine, Method, deferred, named
 
 
 def _method(name: str, about: str) -> Method:
@@ -14,7 +14,7 @@ def _method(name: str, about: str) -> Method:
         about=about,
         adaptive=True,
         terms=EVERY_FORCE,
-        kinds=frozenset({"particles", "circuit", "rotor"}),
+        kinds=EVERY_KIND,
     )
 
 

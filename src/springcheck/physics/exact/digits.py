@@ -55,9 +55,9 @@ def extended(x: Wide) -> Extended:
 
 
 @cache
-def pi(count: int = DIGITS) -> Decimal:
+def pi() -> Decimal:
     """Machin (1706): pi = 16 atan(1/5) - 4 atan(1/239)."""
-    with digits(count + 10):
+    with digits(DIGITS + 10):
         return 16 * _arctangent(5) - 4 * _arctangent(239)
 
 
