@@ -274,6 +274,27 @@ def test_a_bond_that_has_broken_is_followed_however_far() -> None:
         assert off <= 1, t
 
 
+@pytest.mark.parametrize("speed", [0.0, 1.7, -1.7])
+def test_a_bond_whose_exponential_overflows_goes_straight_on_and_bounces(speed: float) -> None:
+    """Nothing pulls there; a motion inwards comes back to the same stretch as fast as it went."""
+    a, m, far = 17.5, np.array([1.5, 2.5]), 2e4
+    ends = np.array([0]), np.array([1])
+    bond = Morse(a=ends[0], b=ends[1], depth=np.ones(1), steepness=np.array([a]), rest=np.zeros(1))
+    mass = m.prod() / m.sum()
+    scene = made(m.tolist(), (bond,), [0.0, far], [-mass * speed, mass * speed], 1.0)
+    q, p = exact.true_motion(scene, np.arange(3), 1.0)
+    assert np.max(np.abs(q[:, 1] - q[:, 0] - far - speed * np.arange(3))) < 1e3 * exact.EPS * far
+    assert np.max(np.abs(p - scene.p)) < 1e3 * exact.EPS
+    if speed < 0:
+        # of s = exp(a u), s'' = w**2 (excess s + 1): the time to the inner turning point and back
+        w, excess = a * np.sqrt(2 / mass), mass * speed**2 / 2
+        phase = a * far + np.log(2 * excess / np.sqrt(1 + excess))
+        back = 2 * phase / (w * np.sqrt(excess))
+        q, p = exact.true_motion(scene, np.array([1]), float(back))
+        assert abs(q[0, 1] - q[0, 0] - far) < 1e-15 * far
+        assert np.max(np.abs(p[0] + scene.p)) < 1e-15
+
+
 def test_the_stated_error_is_small_enough_to_see_a_mistake_of_the_exact_solution() -> None:
     scene = exact_check.pendulum(np.random.default_rng([3, 0]))
     solution = scene.system.solution

@@ -115,7 +115,7 @@ def test_a_file_is_an_engine_for_one_call_and_runs_beside_the_others(
 
 
 MINIMAL = """
-from springcheck.engines import Engine, Method, named
+from springcheck.engines import Arithmetic, Engine, Method, named
 class S:
     force_calls = 0
     def advance(self, every, q, p):
@@ -123,14 +123,14 @@ class S:
 def start(scene, method, label, step):
     {start}
 ENGINE = Engine(name={name}, title="bad", methods=named(Method(name="m", scheme={scheme}, about="")),
-                start=start, version=lambda: {version})
+                start=start, version=lambda: {version}, arithmetic={arithmetic})
 """
 
 
 def bad(path: Path, **parts: str) -> Path:
     plain = {
         "advance": "pass", "start": "return S()", "name": "'bad'", "scheme": "'explicit-euler'",
-        "version": "{}",
+        "version": "{}", "arithmetic": "lambda label: Arithmetic()",
     }  # fmt: skip
     path.write_text(MINIMAL.format(**plain | parts))
     return path
@@ -148,6 +148,13 @@ def bad(path: Path, **parts: str) -> Path:
         ),
         ({"advance": "q[0] = 1 / 0"}, "ZeroDivisionError: division by zero (bad.py, line 6)"),
         ({"version": "1 / 0"}, "ZeroDivisionError"),
+        ({"advance": "q[:] = p[:] = 0", "version": "1 / 0"}, "ZeroDivisionError: division by zero (bad.py"),
+        ({"advance": "q[:] = p[:] = 0", "version": "[]"}, "has no attribute 'items'"),
+        (
+            {"advance": "q[:] = p[:] = 0", "arithmetic": "lambda: Arithmetic()"},
+            "bad:m failed: TypeError: <lambda>() takes 0 positional arguments",
+        ),
+        ({"advance": "q[:] = p[:] = 0", "arithmetic": "str"}, "its arithmetic is of type str"),
         ({"start": "return None"}, "NoneType"),
         ({"advance": "return ("}, "SyntaxError"),
     ],

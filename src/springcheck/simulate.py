@@ -68,7 +68,6 @@ def play(
     if reason:
         raise MethodError(f"{label}: {reason}")
     method = engines.method(label)
-    driver = engines.load(label.engine)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
     simulation = engines.start(ahead, label)
@@ -113,15 +112,10 @@ def play(
         outcome=outcome,
         timing=Timing(start=start_seconds, run=run_seconds),
         force_calls=simulation.force_calls,
-        arithmetic=driver.arithmetic(label),
+        arithmetic=engines.arithmetic(label),
         rebuilds_velocity=method.rebuilds_velocity,
         off_axis=getattr(simulation, "off_axis", None),
-        origin={
-            **driver.version(),
-            "engine": engines.engine(label.engine).title,
-            "method": method.about,
-            "velocity": driver.convention(method),
-        },
+        origin=engines.origin_of(label),
     )
 
 

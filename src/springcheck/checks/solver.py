@@ -28,6 +28,8 @@ def tolerance(case: Case) -> Finding | str:
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
     bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
+    if not np.isfinite(bound) or not np.isfinite([q, p]).all():
+        return "the exact flow leaves the range of numbers"
     moved = np.max(case.norm(q - case.scene.q, p - case.scene.p))
     if value <= bound and 0 < moved <= bound:
         return "standing still would pass: it allows all of the motion"
@@ -99,12 +101,15 @@ def flow_growth(case: Case) -> float:
     if maps is None:
         return 1.0 + fastest(case) * duration / 2
     with np.errstate(all="ignore"):
-        back = np.linalg.inv(maps)
-        # from every time to every later one
-        growth = [
-            float(np.max(np.linalg.norm(maps[j:] @ back[j], 2, axis=(-2, -1)))) for j in range(len(maps))
-        ]
-    found = max(growth)
+        try:
+            back = np.linalg.inv(maps)
+            # from every time to every later one
+            found = max(
+                float(np.max(np.linalg.norm(maps[j:] @ back[j], 2, axis=(-2, -1)))) for j in range(len(maps))
+            )
+        except np.linalg.LinAlgError:
+            # the flow leaves the range of numbers
+            return np.inf
     return max(1.0, found) if np.isfinite(found) else np.inf
 
 

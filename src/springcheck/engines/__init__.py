@@ -119,6 +119,29 @@ def start(scene: Scene, label: Label) -> Simulation:
     return found
 
 
+def arithmetic(label: Label) -> Arithmetic:
+    """How the engine of a label says that it rounds.  MethodError where its own code fails."""
+    found: object = guarded(label, load(label.engine).arithmetic, label)
+    if not isinstance(found, Arithmetic):
+        raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
+    return found
+
+
+def origin_of(label: Label) -> dict[str, str]:
+    """Where a run comes from, in words: the engine's versions, title, method, and how it stores velocities.
+
+    MethodError where the engine's own code fails.
+    """
+    driver, run_by = load(label.engine), method(label)
+    versions = guarded(label, lambda: {str(key): str(value) for key, value in driver.version().items()})
+    return {
+        **versions,
+        "engine": driver.title,
+        "method": run_by.about,
+        "velocity": str(guarded(label, driver.convention, run_by)),
+    }
+
+
 def parse(text: str) -> Label:
     """Read ``engine:method[@platform[-precision]]``; says what is known where a part is not."""
     head, _, place = text.partition("@")

@@ -24,6 +24,9 @@ def _bonds(scene: Scene) -> list[tuple[Morse, _Bond]] | None:
     return [(term, _bond(scene, term)) for term in terms]
 
 
+MOST = np.log(np.finfo(np.longdouble).max) - 64
+"""Exponents whose exponential, times what stands beside it here, is a number."""
+
 FAR = 64.0
 """A phase whose exponential leaves nothing of 1 in any precision that is used here."""
 
@@ -61,7 +64,9 @@ def _bond(scene: Scene, term: Morse) -> _Bond:
     total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
     mass = m[0] * m[1] / total
     u, pull = _relative(m, q, p, term.rest)
-    x, kinetic = np.exp(-a * u), (pull / total) ** 2 / (2 * mass * depth)
+    # where exp(steepness u) leaves the range of numbers nothing pulls
+    x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
+    kinetic = (pull / total) ** 2 / (2 * mass * depth)
     excess = kinetic + x * (x - 2)
     near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
     near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
@@ -72,16 +77,19 @@ def _bond(scene: Scene, term: Morse) -> _Bond:
             *([exactly(x[end[j]]) for end in ends] for x in (scene.m, scene.q, scene.p)),
             *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
         )
-    gap, p_ = np.expm1(-a * u), pull / total
+    y = np.minimum(a * u, MOST)
+    gap, p_ = np.expm1(-y), pull / total
     energy = p_ * p_ / (2 * mass * depth) + gap * gap
     w = np.abs(a) * np.sqrt(2 * depth / mass)
-    rate, z, dz = w * np.sqrt(np.abs(excess)), np.expm1(a * u), a * p_ / mass * np.exp(a * u)
+    rate, z, dz = w * np.sqrt(np.abs(excess)), np.expm1(y), a * p_ / mass * np.exp(y)
     safe = np.where(rate > 0, rate, 1)
     root = np.sqrt(energy)
+    endless = np.arcsinh(dz * excess / (safe * np.where(root > 0, root, 1)))
     start = np.where(
         excess < 0,
         np.arctan2(-dz * excess / safe, energy + excess * z),
-        np.arcsinh(dz * excess / (safe * np.where(root > 0, root, 1))),
+        # there arcsinh is a logarithm
+        endless + np.sign(endless) * (a * u - y),
     )
     return _Bond(
         mass=mass, u=u, p=p_, share=m[0] / total, energy=energy, excess=excess, w=w, start=start, rate=rate
@@ -136,14 +144,16 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     )
     size = np.where(edge, 1, np.abs(bond.excess))
     z, dz = 2 * root * half * half / size - root / (root + 1), root * bond.rate * whole / size
-    # at the edge of dissociation a parabola
-    z0, dz0 = np.expm1(a * bond.u), a * bond.p / bond.mass * np.exp(a * bond.u)
-    z = np.where(edge, z0 + dz0 * t + bond.w**2 * t * t / 2, z)
-    dz = np.where(edge, dz0 + bond.w**2 * t, dz)
     leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
+    # at the edge of dissociation a parabola
+    fast = np.where(edge, a * bond.p / bond.mass, 0)
+    slow = np.where(edge, bond.w**2 * np.exp(np.where(edge, -a * bond.u, 0)), 0)
+    grown = fast * t + slow * t * t / 2
     return (
-        np.where(far, leaving, np.log1p(z)),
-        np.where(far, bond.rate * np.sign(endless), dz / (1 + z)),
+        np.where(edge, a * bond.u + np.log1p(grown), np.where(far, leaving, np.log1p(z))),
+        np.where(
+            edge, (fast + slow * t) / (1 + grown), np.where(far, bond.rate * np.sign(endless), dz / (1 + z))
+        ),
     )
 
 

@@ -115,7 +115,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
 
 def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
     """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there."""
-    how = engines.load(label.engine).arithmetic(label)
+    how = engines.arithmetic(label)
     with np.errstate(all="ignore"):
         case = checks.Case(trajectory=as_trajectory(label, scene, q, p, how), scene=scene)
         exact_q, exact_p = case.next_states

@@ -43,7 +43,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     found = judging.judge(label, specs, scene, q, p, said)
     if len(specs) == 1:
         return found
-    if stale := engines.load(label.engine).arithmetic(label).stale:
+    if stale := engines.arithmetic(label).stale:
         # in company of a larger motion an engine computes forces anew that it would keep for the cell alone
         with np.errstate(invalid="ignore"):
             # a state that has left all numbers is not slow

@@ -59,7 +59,7 @@ def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]
         # nothing moves, and nothing may
         return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0])), ""
     ends = replace(scene, every=scene.steps)
-    run = judging.as_trajectory(label, ends, q, p, engines.load(label.engine).arithmetic(label))
+    run = judging.as_trajectory(label, ends, q, p, engines.arithmetic(label))
     run = replace(run, tolerance=scene.tolerance, force_calls=done.force_calls)
     found = checks.tolerance(checks.Case(trajectory=run, scene=ends))
     return found.value, found.bound, found.why if found.passed is None else ""

@@ -84,7 +84,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     reason = engines.refusal(scene, label) or engines.absence(label.engine)
     if reason is None:
         try:
-            sweep.arithmetic = engines.load(label.engine).arithmetic(label)
+            sweep.arithmetic = engines.arithmetic(label)
             sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
             sweep.scene = next(sweep.scenes, None)
             if sweep.scene is None:

@@ -56,7 +56,7 @@ class Springs:
 
 def arithmetic(label: Label) -> Arithmetic:
     """How the label's platform rounds."""
-    return engines.load(label.engine).arithmetic(label)
+    return engines.arithmetic(label)
 
 
 def noise(label: Label) -> float:
