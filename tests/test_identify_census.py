@@ -88,14 +88,17 @@ _spec.loader.exec_module(census)
         # what falls off with the motion has no few bad frames
         (32917, "cause named"),
         (121679, "error seen"),
+        (107281, "cause named"),
         # states that come back after eight frames: alternating steps and a cubic force look alike
         (120026, "cause named"),
         (38303, "cause named"),
+        (124159, "cause named"),
         (35151, "cause named"),
         (100290, "error seen"),
         # friction takes the phase of a step beyond the largest that it has without
         (32607, "named"),
         (36207, "named"),
+        (121254, "named"),
         (32421, "named"),
         # steps in which large terms cancel round by the size of these
         (104125, "named"),
@@ -103,6 +106,7 @@ _spec.loader.exec_module(census)
         (113587, "named"),
         # a velocity that is added up in substeps
         (31924, "named"),
+        (119040, "named"),
         # what the roundings of one scheme explain they explain of another with the same map
         (105363, "not told apart"),
     ],

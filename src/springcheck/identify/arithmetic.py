@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,17 +137,21 @@ TOGETHER = 128
 """Matches whose defects are worked out at once, so that their arrays stay small."""
 
 
-def defects(record: Record, j: int, found: Map, matches: list[Match], *, visible: bool) -> list[Defect]:
+def defects(
+    record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
+) -> list[Defect]:
     """Defect of every step of oscillator j against each scheme, in units of double precision (2**-52).
 
     `visible` says that the scheme's own error stands far above the defect, and no other scheme has it;
     only then is more than plain rounding explained, and never to an exact flow.
     """
     chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
-    return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible=visible)]
+    return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible)]
 
 
-def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visible: bool) -> list[Defect]:
+def _defects(
+    record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
+) -> list[Defect]:
     schemes = [FAMILIES[match.family] for match in matches]
     z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
     signed = _misses(matches, found, found.slips).astype(np.float64)
@@ -177,8 +182,9 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
     position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     difference = np.zeros_like(size)
     difference[:, :, 1] = 2 * ratio[:, None] * position
-    steps = stride * [_substeps(match) for match in matches]
-    path = steps * [4 if scheme.flow else scheme.path for scheme in schemes]
+    # substeps of one force round alike
+    parts = np.array([_substeps(match) for match in matches])
+    path = stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes]
     ulp = _largest(missing, 2.0**-52 * size)
     follows = np.full(len(matches), found.slips is not None)
     if record.slips is not None and found.slips is None:
@@ -190,12 +196,12 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
         missing = np.abs(signed)
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
-    usual = 4 + 2 * np.sqrt(steps)
+    usual = 4 + 2 * np.sqrt(stride) * parts
     rounded = ulp
-    if record.slips is not None and np.any(stride > 1):
+    if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
         rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
     plain = rounded <= np.minimum(path, usual)
-    if visible:
+    if not np.all(plain) and visible():
         # an uneven clock makes roundings larger
         most = np.where(follows, path, np.minimum(path, UNUSUAL * usual))
         for i in np.flatnonzero((rounded <= most) & ~plain).tolist():
@@ -220,7 +226,7 @@ def _defects(record: Record, j: int, found: Map, matches: list[Match], *, visibl
             precision = "double"
             note = REBUILT_NOTE
         elif record.fine:
-            if visible and not schemes[i].flow:
+            if visible() and not schemes[i].flow:
                 # forces may lie beyond the range of single precision
                 with np.errstate(over="ignore", invalid="ignore"):
                     precision, note, certain = _coarse(record, j, found, match, signed[i])

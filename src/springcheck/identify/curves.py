@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
@@ -42,11 +43,12 @@ critical damping: 1.7."""
 END = 0.05
 """Room beside the end of a curve."""
 
-FRICTIONS = 0.1, 0.2, 0.3, 0.4
+FRICTIONS = 0.03, 0.1, 0.2, 0.3, 0.4
 """Values of g that have curves of their own where the phase without friction turns back."""
 
-BETWEEN = 0.3
-"""Change of the log of the determinant up to which such a curve is looked at."""
+BETWEEN = 0.05, 0.35
+"""Change of the log of the determinant up to which such a curve is looked at, half way to the next: a number,
+and a multiple of g beside it."""
 
 SMALL = 0.05
 """Size below which an entry is not asked to agree relatively."""
@@ -140,7 +142,7 @@ def _ranges(key: Key) -> tuple[tuple[Floats, Floats], ...]:
     return (np.append(0.0, first), np.append(least, x)) if first[0] > 0 else ordered[0], *ordered[1:]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Curves:
     """Curves (b,) of several families: `base` is the number of each one's family."""
 
@@ -159,6 +161,15 @@ class Curves:
     x: Floats
     loss: Floats
 
+    def next_to(self, loss: Floats) -> NDArray[np.bool_]:
+        """Whether a curve with friction is the nearest one, of these differences (b, c) of log det."""
+        return np.asarray(np.abs(loss) <= BETWEEN[0] + BETWEEN[1] * self.g)
+
+    @cached_property
+    def most(self) -> float:
+        """The most that entries bend."""
+        return float(np.max(self.bend))
+
     def near(
         self, root: Roots, error: float, *, damped: bool, growing: bool, free_scale: bool, far: bool
     ) -> tuple[Integers, Integers]:
@@ -167,36 +178,40 @@ class Curves:
         at = root.phase * (CELLS / np.pi)
         cell = np.minimum(at.astype(np.int64), CELLS - 1)
         part = at - cell
+        low = self.log_det[:, cell]
+        loss = low + (self.log_det[:, cell + 1] - low) * part - root.log_det
+        room = SIDE[0] * error + SIDE[1]
+        plain = self.g == 0
+        worth = (root.phase > self.low) & (root.phase < self.high) & (plain | self.next_to(loss))
+        if damped and not growing:
+            # friction shrinks areas
+            worth &= (loss > 0) | ~plain
+        elif not (damped or far):
+            worth &= np.abs(loss) <= 2 * (room + self.most)
+        which, index = np.nonzero(worth)
+        cell, part, loss = cell[index], part[index], loss[which, index]
 
         def between(y: Floats) -> Floats:
-            low = y[..., cell]
-            return np.asarray(low + (y[..., cell + 1] - low) * part)
+            low = y[which, cell]
+            return np.asarray(low + (y[which, cell + 1] - low) * part)
 
         size = np.exp(-root.log_det / 2)
-        one, other = root.entries[:, 0, 0] * size, root.entries[:, 0, 1] * size
-        loss = between(self.log_det) - root.log_det
-        room = SIDE[0] * error + SIDE[1] + self.bend[:, cell]
-        if damped:
-            room += DAMPING * np.abs(loss)
+        one, other = ((root.entries[:, 0, i] * size)[index] for i in (0, 1))
+        rooms = room + self.bend[which, cell] + (DAMPING * np.abs(loss) if damped else 0)
         off = np.abs(between(self.normal[0]) - one)
         if not free_scale:
             upper = between(self.normal[1])
-            least = np.minimum(np.abs(upper), np.abs(other)) + SMALL
-            off = np.maximum(off, np.abs(upper - other) / least)
+            off = np.maximum(off, np.abs(upper - other) / (np.minimum(np.abs(upper), np.abs(other)) + SMALL))
         if not damped:
             off = np.maximum(off, np.abs(loss) / 2)
-        good = off <= room
-        if damped and not growing:
-            good &= loss + self.g > -room
-        if far and len(root.s):
+        good = off <= rooms
+        if far and len(index):
             good |= off <= FAR
-            starts = np.flatnonzero(np.diff(root.s, prepend=-1.0))
             off = np.where(np.isfinite(off), off, np.inf)
-            lowest = np.minimum.reduceat(off, starts, axis=1)
-            good |= off == np.repeat(lowest, np.diff(np.append(starts, len(root.s))), axis=1)
-        good &= (self.g == 0) | (np.abs(loss) <= BETWEEN)
-        which, index = np.nonzero(good & (root.phase > self.low) & (root.phase < self.high))
-        return which, index
+            order = np.lexsort((off, root.s[index], which))
+            starts = np.diff(which[order], prepend=-1) + np.diff(root.s[index][order], prepend=-1.0) != 0
+            good[order[starts]] = True
+        return which[good], index[good]
 
     def at(self, which: Integers, phase: Floats) -> tuple[Floats, Floats]:
         """h w, and log of the determinant of a step, where these curves have these phases."""

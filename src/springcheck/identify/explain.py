@@ -230,7 +230,7 @@ def _shape(e: Evidence) -> list[Explanation]:
 KIND = {
     "drag": "depends on the velocity", "velocity": "depends on the velocity",
     "quadratic": "is anharmonic", "cubic": "is anharmonic", "anharmonic": "is anharmonic",
-    "position": "is anharmonic", "parity": "or the step alternates", "oscillation": "changes in time",
+    "position": "is anharmonic", "parity": "alternates from step to step", "oscillation": "changes in time",
     "stiffness in time": "changes in time", "friction in time": "changes in time",
     "map in time": "changes in time",
 }  # fmt: skip
@@ -248,9 +248,10 @@ FEW_TURNS = 2.0
 
 
 def _alternating(e: Evidence) -> Floats:
-    """Columns (f - 1, 4) of two maps in turn."""
+    """Columns (f - 1, c) of two maps in turn, and of the constant that was fitted."""
     z = e.found.z[:-1].astype(np.float64)
-    return np.concatenate([z, z * (-1.0) ** np.arange(len(z))[:, None]], axis=1)
+    constant = np.ones((len(z), int(e.found.drifts)))
+    return np.concatenate([z, z * (-1.0) ** np.arange(len(z))[:, None], constant], axis=1)
 
 
 def _two_maps(e: Evidence) -> tuple[str, str]:

@@ -19,7 +19,7 @@ APART = 2.0
 """Factor by which every bad pair must miss more than all others, in units of rounding."""
 
 LARGER = 10.0
-"""Size of the first frames, of the median, from which a force that is not linear shows in them alone."""
+"""Size of some frames, of the median, from which a force that is not linear shows in them alone."""
 
 
 def few_bad_frames(e: Evidence) -> list[Explanation]:
@@ -59,11 +59,13 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     elif len(runs) > 1:
         at = ", ".join(str(run[0] + 1) for run in runs[1:5])
         cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
-    size = np.sqrt(np.sum(np.square(found.z.astype(np.float64)), axis=1))
-    if bad[0] == 0 and len(bad) > 1 and float(np.max(size[bad])) > LARGER * float(np.median(size)):
+    size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
+    if len(bad) > 1 and float(np.min(size[bad])) > max(
+        float(np.max(size[kept])) / 2, LARGER * float(np.median(size))
+    ):
         cause = (
-            f"The motion is one{whose}, but not in frames 0 to {bad[-1] + 1}, where it is largest: too "
-            "few to tell whether the force is anharmonic or changes in time"
+            f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
+            "too few to tell whether the force is anharmonic or changes in time"
         )
     return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
 

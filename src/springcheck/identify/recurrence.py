@@ -318,7 +318,7 @@ def _starts(
             # the area of a frame is known, and that of a scheme without friction beside it
             room = 0.02 * np.abs(loss) * s[index] + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
             good = (g > 0) if family.damped else np.abs(loss * s[index] - found.log_det) <= room
-            good &= (curve.g[at, 0] == 0) | (np.abs(off) <= BETWEEN)
+            good &= (curve.g[at, 0] == 0) | (np.abs(off) <= BETWEEN[0] + BETWEEN[1] * curve.g[at, 0])
             parts.append(
                 (
                     np.full(np.count_nonzero(good), k), s[index][good], turns[index][good],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -172,8 +173,8 @@ def _explained(
     for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):
         if not left:
             break
-        seen = alone and visible(found, what, damped=left[0].damped)
-        new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], visible=seen)
+        seen = partial(visible, found, what, damped=left[0].damped) if alone else bool
+        new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], seen)
         # what explains one scheme's misses does not exclude the others, which miss the states by no more
         good = [x for x in new if x.precision]
         new = [

@@ -35,6 +35,9 @@ FOUND = 1e-14
 CHUNK = 4096
 """Candidates that are solved at once, so that their arrays stay in the processor's cache."""
 
+BESIDE = 0.15
+"""Friction that a guess beside a curve with friction counts as `away` from it at least."""
+
 FLOW_TURNS = 8
 """Turns between two frames that the exact flow is looked for at."""
 
@@ -109,25 +112,36 @@ def starts(
             root, error, damped=every.damped, growing=terms.growing, free_scale=terms.mass_unknown, far=far
         )  # fmt: skip
         x, loss = curve.at(at, root.phase[index])
-        a, g = np.square(x), np.zeros_like(x)
+        a, g, away = np.square(x), np.zeros_like(x), np.zeros_like(x)
         if every.damped:
             off = loss - root.log_det[index]
-            g = curve.g[at, 0] + off
+            own = curve.g[at, 0]
+            # beside a curve with friction the determinant is no straight line of it
+            g = np.where(own > 0, np.maximum(own + off, own / 4), off)
+            away = np.where(own > 0, np.maximum(np.abs(off), BESIDE), np.abs(g))
             # friction shrinks areas; what grows beyond the scheme's own growth is no friction
             good = (g > 0) | terms.growing
-            at, index, g = at[good], index[good], g[good]
+            at, index, g, away = at[good], index[good], g[good], away[good]
             a = a[good] + np.square(off[good] / 2)
         ends = np.searchsorted(curve.base[at], np.arange(len(of_curves) + 1))
         for k, own in enumerate(bases):
             for base in own:
                 mine = slice(ends[base], ends[base + 1])
-                parts.append((np.full(ends[base + 1] - ends[base], k), index[mine], a[mine], g[mine]))
+                which = np.full(ends[base + 1] - ends[base], k)
+                parts.append((which, index[mine], a[mine], g[mine], away[mine]))
     if not parts and flows:
         return joined(flows)
-    parts = parts or [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
-    which, index, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
+    parts = parts or [(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))]
+    which, index, a, g, away = (np.concatenate(x) for x in zip(*parts, strict=True))
     a, g, off = solved(
-        every, which, a, g, root.entries[index], free_scale=terms.mass_unknown, spread=spread + most
+        every,
+        which,
+        a,
+        g,
+        root.entries[index],
+        away=away,
+        free_scale=terms.mass_unknown,
+        spread=spread + most,
     )
     s = root.s[index]
     near = off <= most
@@ -142,14 +156,14 @@ def starts(
     return joined([turning, *flows])
 
 
-def _held_starts(k: int, root: Roots, room: float) -> tuple[Integers, Integers, Floats, Floats]:
+def _held_starts(k: int, root: Roots, room: float) -> tuple[Integers, Integers, Floats, Floats, Floats]:
     """Guesses for a held force, whose step moves the position by the whole velocity."""
     entries = root.entries
     off = np.maximum(np.abs(entries[:, 0, 1] - 1), np.abs(entries[:, 1, 1] - 1))
     index = np.flatnonzero(off <= room)
     a = -entries[index, 1, 0]
     g = (1 - entries[index, 0, 0]) / np.where(a == 0, 1, a)
-    return np.full(len(index), k), index, a, g
+    return np.full(len(index), k), index, a, g, np.abs(g)
 
 
 def solved(
@@ -160,15 +174,18 @@ def solved(
     wanted: Floats,
     *,
     free_scale: bool,
+    away: Floats | None = None,
     turns: int = 0,
     spread: float = 0.0,
 ) -> tuple[Floats, Floats, Floats]:
-    """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off."""
+    """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off; the
+    friction of guesses is `away` from that of their curve."""
+    away = np.abs(g) if away is None else away
     if len(a) > CHUNK:
         parts = [
             solved(
                 every, which[i : i + CHUNK], a[i : i + CHUNK], g[i : i + CHUNK], wanted[i : i + CHUNK],
-                free_scale=free_scale, turns=turns, spread=spread,
+                away=away[i : i + CHUNK], free_scale=free_scale, turns=turns, spread=spread,
             )
             for i in range(0, len(a), CHUNK)
         ]  # fmt: skip
@@ -186,7 +203,7 @@ def solved(
     alive = np.arange(len(values))
     rounds = turns or (6 if damped else 3)
     with np.errstate(all="ignore"):
-        share = np.abs(g) / np.sqrt(np.abs(a))
+        share = away / np.sqrt(np.abs(a))
         for turn in range(rounds + 1):
             x, n = values[alive], len(alive)
             # the entries, and their change with each unknown
