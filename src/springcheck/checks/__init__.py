@@ -96,9 +96,7 @@ def judge_thoroughly(
 ) -> list[Verdict]:
     """Every experiment with a method, which `run(scene, label)` carries out on scenes made here.
 
-    `progress(1)` is called after each experiment.
-
-    An experiment whose scene the method cannot serve (`run` raises MethodError) does not apply.
+    `progress(1)` is called after each; one that the method cannot serve (MethodError) does not apply.
     """
     bench = Bench(scene=scene, label=label, run=run)
     verdicts = []

@@ -12,10 +12,9 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks import rounding
 from springcheck.checks.stretch import JOINED, Stretch, follow
-from springcheck.physics import exact
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
-from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.stepping import Slope
@@ -59,6 +58,11 @@ class Case:
         scene = self.scene.system.in_single if arithmetic.parameters == "single" else self.scene
         return scene.system.scaled(1 + arithmetic.excess) if arithmetic.excess else scene
 
+    @property
+    def system(self) -> System:
+        """What follows from that scene."""
+        return self.judged.system
+
     @cached_property
     def steps(self) -> Integers:
         """The number of steps behind each frame."""
@@ -88,38 +92,24 @@ class Case:
         """What `schemes.step` needs beside the forces."""
         scene = self.judged
         stiff: Extended | Slope | None = None
-        if self.scheme.implicit and not self.straight:
+        if self.scheme.implicit and not self.system.is_linear:
             stiff = scene.system.slope
         elif self.scheme.implicit:
             stiff = scene.system.curvatures(scene.q)
         return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
 
-    @property
-    def joined(self) -> bool:
-        """Whether some term joins two particles."""
-        return not self.judged.system.is_separate
-
-    @cached_property
-    def modes(self) -> exact.Modes:
-        return exact.modes(self.judged)
-
     @cached_property
     def matrices(self) -> Extended:
         """One-step matrices of the modes, on (y, v)."""
-        one = np.ones(1, dtype=np.longdouble)
-        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=self.modes.w2, c=self.modes.rate)
+        one, modes = np.ones(1, dtype=np.longdouble), self.system.modes
+        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=modes.w2, c=modes.rate)
 
     @cached_property
     def w(self) -> Extended:
         """Frequencies that scale mode positions to velocities; a free mode takes 1/duration."""
         duration = abs(self.trajectory.step) * max(int(self.steps[-1]), 1)
-        w = np.sqrt(np.abs(self.modes.w2))
+        w = np.sqrt(np.abs(self.system.modes.w2))
         return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
-
-    @cached_property
-    def straight(self) -> bool:
-        """Whether every force is linear: one tangent map serves every step, and sizes need no place."""
-        return self.judged.system.is_linear
 
     def step(
         self,
@@ -161,7 +151,7 @@ class Case:
         None where so many steps, or so many joined particles, are only judged by the energy norm.
         """
         every, scene = self.trajectory.every, self.judged
-        if every > 1 and (every > REPEATED or (scene.n > JOINED and self.joined)):
+        if every > 1 and (every > REPEATED or (scene.n > JOINED and not self.system.is_separate)):
             return None
         return follow(self, *self._starts, every)
 
@@ -199,7 +189,7 @@ class Case:
     @property
     def placed(self) -> bool:
         """Whether it matters for rounding at which positions a step evaluates the force."""
-        return self.scheme.implicit or not self.straight
+        return self.scheme.implicit or not self.system.is_linear
 
     @cached_property
     def allowance_of_stretches(self) -> Extended:
@@ -210,14 +200,14 @@ class Case:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             ends = self.allowance, self.allowance_at(*self.next_states)
-            return np.maximum.accumulate(np.max([self.norm.size(*end) for end in ends], axis=0))
+            return np.maximum.accumulate(np.max([self.system.norm.size(*end) for end in ends], axis=0))
 
     @cached_property
     def closed_states(self) -> tuple[Extended, Extended]:
         """The scheme's closed-form motion at the frames: modes about their centres, (f, n) each."""
-        y, v = self.modes.into(self.scene.q, self.scene.p)
+        y, v = self.system.modes.into(self.scene.q, self.scene.p)
         return schemes.propagate(
-            self.matrices, y - self.modes.centre(), v, self.steps, area_preserving=self.area_preserving
+            self.matrices, y - self.system.modes.centre(), v, self.steps, area_preserving=self.area_preserving
         )
 
     @cached_property
@@ -228,14 +218,14 @@ class Case:
         splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.size`.
         """
         total, grown = schemes.amplification(self.matrices, self.w, self.steps)
-        size = self.norm.size(*self.allowance)
+        size = self.system.norm.size(*self.allowance)
         size = np.maximum.accumulate(np.concatenate([size[:1], size]))
         if self.steps[0] == 0:
             first = size[0]
         else:
             # a piece of a long run: what came before it is bounded by the envelope of the motion
             before = self.envelope, (self.scene.q, self.scene.p)
-            first = np.max([self.norm.size(*self.allowance_at(*x)) for x in before])
+            first = np.max([self.system.norm.size(*self.allowance_at(*x)) for x in before])
         bound = np.asarray(self.roundings * total)
         condition = float(np.max(schemes.condition(self.matrices, self.w)))
         if np.isfinite(condition):
@@ -266,7 +256,7 @@ class Case:
 
         Of any one spring, or of all on a particle; 0 where modes take many steps at once.
         """
-        peak, system = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble), self.judged.system
+        peak, system = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble), self.system
 
         def watched(terms: Iterable[Term]) -> Force:
             parts = tuple(terms)
@@ -288,28 +278,24 @@ class Case:
         Each mode stays within its invariant ellipse, whose axes have the ratio `schemes.condition`;
         a mode that does not turn is left at its start.
         """
-        y, v = self.modes.into(self.scene.q, self.scene.p)
-        centre = self.modes.centre()
+        y, v = self.system.modes.into(self.scene.q, self.scene.p)
+        centre = self.system.modes.centre()
         axes = schemes.condition(self.matrices, self.w)
         reach = np.hypot(self.w * (y - centre), v) * np.where(np.isfinite(axes), axes, 1)
-        rest, _ = self.modes.out_of(centre, np.zeros_like(centre))
-        q = np.abs(rest) + self.modes.spread(reach / self.w) / self.modes.root_m
-        return np.asarray(q), np.asarray(self.modes.spread(reach) * self.modes.root_m)
+        rest, _ = self.system.modes.out_of(centre, np.zeros_like(centre))
+        q = np.abs(rest) + self.system.modes.spread(reach / self.w) / self.system.modes.root_m
+        return np.asarray(q), np.asarray(self.system.modes.spread(reach) * self.system.modes.root_m)
 
     @cached_property
     def origins(self) -> Floats:
         """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
         have their rest lengths, or from the nearest place to which a term of its own ties a particle."""
-        rest = self.judged.system.rest_positions
+        rest = self.system.rest_positions
         zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
         for term in self.judged.terms:
             if term.bodies == 1 and term.origin:
                 np.minimum.at(sites, term.particles[0], np.abs(term.elongation(zero)))
         return np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
-
-    @cached_property
-    def norm(self) -> Norm:
-        return self.judged.system.norm
 
     @property
     def roundings(self) -> int:
@@ -358,12 +344,12 @@ def advance(
 
 def _leap(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, Extended]:
     """Many steps at once: the power of each mode's matrix, in its closed form."""
-    one, none = np.ones_like(case.modes.w2), np.zeros_like(case.modes.w2)
+    one, none = np.ones_like(case.system.modes.w2), np.zeros_like(case.system.modes.w2)
     powers = [
         schemes.propagate(case.matrices, y, v, np.array([steps]), area_preserving=case.area_preserving)
         for y, v in ((one, none), (none, one))
     ]
     (a, c), (b, d) = powers
-    y, v = case.modes.into(q, p)
-    u = y - case.modes.centre()
-    return case.modes.out_of(a * u + b * v + case.modes.centre(), c * u + d * v)
+    y, v = case.system.modes.into(q, p)
+    u = y - case.system.modes.centre()
+    return case.system.modes.out_of(a * u + b * v + case.system.modes.centre(), c * u + d * v)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.checks.case import Case
-from springcheck.checks.motion import growth_bound
 from springcheck.checks.solver import tolerance_bound
 from springcheck.checks.steps import fastest
 from springcheck.physics import exact
@@ -63,13 +62,14 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     if len(trajectory.t) < 2:
         return 0.0
     if case.linear:
-        bound, unit = growth_bound(case)
+        bound, unit = case.growth
         # before the first step there is nothing to round
-        with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.max((bound * unit)[case.steps > 0], initial=0.0))
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            sizes = np.asarray(unit / case.system.norm.unit, np.float64)
+            return float(np.max((bound * sizes)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
     steps = float(case.steps[-1])
-    rounding = float(np.max(case.norm(*case.allowance)))
+    rounding = float(np.max(case.system.norm(*case.allowance)))
     return case.roundings * rounding * steps * (1 + steps * fastest(case) * abs(trajectory.step) / 2)
 
 

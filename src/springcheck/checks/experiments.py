@@ -198,7 +198,7 @@ def reversibility(bench: Bench) -> Finding | str:
         state = _shifted(case.judged, scheme, state, -1)
     back = bench.run(replace(bench.scene, q=state[0], p=state[1], steps=steps, every=1), bench.label)
     # of the way out alone: a way back that explodes must not enlarge what it is judged by
-    size = np.max(case.norm.size(*case.allowance_at(out.q, out.p)))
+    size = np.max(case.system.norm.size(*case.allowance_at(out.q, out.p)))
     enlarged = _enlarged(case, steps, state, size)
     if enlarged is None:
         return "the motion grows, and rounding with it"
@@ -208,9 +208,9 @@ def reversibility(bench: Bench) -> Finding | str:
     end = back.q[-1], back.p[-1]
     if two_stage:
         end = _shifted(case.judged, scheme, end, 1)
-    off = case.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
+    off = case.system.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
     # a motion that stood still after its turning point would end there, with the momenta flipped
-    moved = case.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
+    moved = case.system.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
     if off <= bound * size and moved[-1] <= bound * size and np.any(moved > 0):
         return "standing still on the way back would pass"
     return Finding(
@@ -238,9 +238,9 @@ def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
         p = sign * p
         if two_stage:
             q, p = (x.astype(np.longdouble) for x in _shifted(case.judged, case.scheme, (q, p), sign))
-    off = case.norm.size(q - case.scene.q, p + case.scene.p)
+    off = case.system.norm.size(q - case.scene.q, p + case.scene.p)
     # beyond a small part of the motion the effect is no longer as large as the change
-    told = allowed * change < off <= case.norm.unit * SMALL_PART
+    told = allowed * change < off <= case.system.norm.unit * SMALL_PART
     return Limits(area=float(allowed * change / off)) if told else NOT_KNOWN
 
 
@@ -254,7 +254,7 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     if case.linear:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([2 * steps + 2]))
         return float(total[0]) if grown[0] < 2 else None
-    if case.joined and case.scene.n > JOINED:
+    if not case.system.is_separate and case.scene.n > JOINED:
         return None
     ways = [
         follow(case, q[None].astype(np.longdouble), p[None].astype(np.longdouble), steps + 1)
@@ -262,7 +262,7 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     ]
     if not all(np.all(known(case, way, steps)) for way in ways):
         return None
-    ends = 2 * case.norm.size(ways[1].of_q, ways[1].of_p)[0]
+    ends = 2 * case.system.norm.size(ways[1].of_q, ways[1].of_p)[0]
     return float(ends / size) if size > 0 else 0.0
 
 

@@ -152,7 +152,7 @@ def drifts(scene: Scene, run: Trajectory) -> tuple[Floats, Floats]:
     """Steps (f,) and relative change of each member's shadow energy at them (f, n)."""
     case = Case(trajectory=run, scene=scene)
     form = schemes.invariant(case.matrices, h=run.step)
-    y, v = case.modes.into(run.q, run.p)
+    y, v = case.system.modes.into(run.q, run.p)
     energy = form[:, 0] * y * y + form[:, 1] * y * v + form[:, 2] * v * v
     return case.steps[1:].astype(np.float64), np.asarray(energy[1:] / energy[0] - 1, np.float64)
 
@@ -293,7 +293,7 @@ def convergence(bench: Bench) -> Finding | str:
             return Finding(np.inf, UNRESOLVED, "", f"stopped at {tolerance:g}")
         case = Case(trajectory=run, scene=scene)
         q, p = exact.true_motion(scene, case.steps, scene.step)
-        error.append(float(np.sqrt(np.mean(case.norm(run.q - q, run.p - p) ** 2))))
+        error.append(float(np.sqrt(np.mean(case.system.norm(run.q - q, run.p - p) ** 2))))
     fit = line(np.log(np.array(DECADES)), np.log(np.maximum(np.array(error), 1e-300)))
     slope, se, law = fit.slope, fit.standard_error, float(power)
     bound = student(len(error) - 2, CHANCE) * se

@@ -15,23 +15,13 @@ from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
 
-def growth_bound(case: Case) -> tuple[Floats, Floats]:
-    """Bound on the distance from the closed form at each frame, in units of one rounding, and that unit.
-
-    One rounding a step, enlarged by the map from the step where it arises, and all of one sign.
-    """
-    bound, unit = case.growth
-    with np.errstate(divide="ignore", over="ignore"):
-        return bound, np.asarray(unit / case.norm.unit, np.float64)
-
-
 @check("closed", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
 def closed_form(case: Case) -> Finding | str:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
     y, v = case.closed_states
-    q, p = case.modes.out_of(y + case.modes.centre(), v)
-    distance = case.norm.size(case.trajectory.q - q, case.trajectory.p - p)
-    moved = case.norm.size(q - case.scene.q, p - case.scene.p)
+    q, p = case.system.modes.out_of(y + case.system.modes.centre(), v)
+    distance = case.system.norm.size(case.trajectory.q - q, case.trajectory.p - p)
+    moved = case.system.norm.size(q - case.scene.q, p - case.scene.p)
     bound, unit = case.growth
     late = (case.steps > 0) & ~_beyond(case, bound * unit, distance)
     allowed = np.where(late, bound * unit, 1)
@@ -42,7 +32,7 @@ def closed_form(case: Case) -> Finding | str:
         return f"{STILL} the motion"
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
-        return np.where(late[at], case.norm.size(*case.modes.out_of(*change)) / allowed[at], 0)
+        return np.where(late[at], case.system.norm.size(*case.system.modes.out_of(*change)) / allowed[at], 0)
 
     return Finding(
         distance[worst] / unit[worst],
@@ -89,20 +79,21 @@ def shadow_energy(case: Case) -> Finding | str:
     form = schemes.invariant(case.matrices, h=run.step)
     turn = schemes.rotation(case.matrices)
     factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
-    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
-    u0 = y0 - case.modes.centre()
+    y0, v0 = case.system.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.system.modes.centre()
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
     with np.errstate(over="ignore", invalid="ignore"):
-        y, v = case.modes.into(run.q, run.p)
-        u = y - case.modes.centre()
+        y, v = case.system.modes.into(run.q, run.p)
+        u = y - case.system.modes.centre()
         stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
         expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = case.growth
-    size = np.maximum.accumulate(case.norm.size(run.q - _rest(case), run.p))
+    size = np.maximum.accumulate(case.system.norm.size(run.q - _rest(case), run.p))
     if case.steps[0] != 0:
-        size = np.maximum(size, case.norm.size(case.envelope[0] - np.abs(_rest(case)), case.envelope[1]))
+        most_q, most_p = case.envelope
+        size = np.maximum(size, case.system.norm.size(most_q - np.abs(_rest(case)), most_p))
     with np.errstate(over="ignore", invalid="ignore"):
         scale = 2 * shape * size * unit
         off = np.max(np.abs(stored - expected), axis=1)
@@ -137,7 +128,7 @@ def shadow_energy(case: Case) -> Finding | str:
 
 
 def _rest(case: Case) -> Floats:
-    q, _ = case.modes.out_of(case.modes.centre(), np.zeros_like(case.modes.w2))
+    q, _ = case.system.modes.out_of(case.system.modes.centre(), np.zeros_like(case.system.modes.w2))
     return np.asarray(q, np.float64)
 
 
@@ -147,19 +138,19 @@ def frequency(case: Case) -> Finding | str:
     if case.scene.system.is_damped:
         return "a phase that decays is seen in the closed form"
     turn = schemes.rotation(case.matrices)
-    y0, v0 = case.modes.into(case.scene.q, case.scene.p)
-    u0 = y0 - case.modes.centre()
+    y0, v0 = case.system.modes.into(case.scene.q, case.scene.p)
+    u0 = y0 - case.system.modes.centre()
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
     j = int(np.argmax(strength))
     if strength[j] <= 0:
         return "no mode oscillates"
     form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
-    y, v = case.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
+    y, v = case.system.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
     steps = int(case.steps[-1])
     if steps == 0:
         return "nothing has moved yet"
     # in the coordinates of the invariant form a step is a plain rotation by -angle
-    phase = _phase(form, (y - case.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
+    phase = _phase(form, (y - case.system.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
     # on an inverted spring a scheme that goes back on part of its way can turn the other way
     backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)

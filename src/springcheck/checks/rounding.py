@@ -79,34 +79,28 @@ def _recorded(scheme: Scheme) -> list[bool]:
 def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
-    slow, fast = scene.system.slow, scene.system.fast
+    acting = {"slow": scene.system.slow, "fast": scene.system.fast}
     kicks = [stage for stage in scheme.stages if stage[0] not in ("drift", "held", *schemes.FRICTION)]
     kicks = kicks or [("kick", Fraction(1)) for _ in scheme.b]
-    acting = {"slow": slow, "fast": fast}
-    joined = not scene.system.is_separate
-    made: dict[tuple[str, float], Met] = {}
-    found = []
     exact = _recorded(scheme) if recorded else [False] * len(kicks)
+    found: list[Met] = []
+    made: dict[tuple[str, float], Met] = {}
     for number, (kind, part) in enumerate(kicks):
         # an engine may take a step's kick at once, and what its force lacks with it
         whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
         known = kind, whole
-        if places is None and known in made:
-            found.append(made[known])
-            continue
-        near = None if places is None else places[number]
-        stiffness = None
-        if scheme.implicit:
-            given = case.law["stiffness"]
-            stiffness = given if near is None or case.straight else scene.system.slope(near)[0]
-        made[known] = Met(
-            magnitude=_force(
-                case, acting.get(kind, scene.terms), None if case.straight else near, whole, exact[number]
-            ),
-            stiffness=stiffness,
-            joined=joined,
-            q=near,
-        )
+        if places is not None or known not in made:
+            near = None if places is None else places[number]
+            bent = None if case.system.is_linear else near
+            stiffness = None
+            if scheme.implicit:
+                stiffness = case.law["stiffness"] if bent is None else scene.system.slope(bent)[0]
+            made[known] = Met(
+                magnitude=_force(case, acting.get(kind, scene.terms), bent, whole, exact[number]),
+                stiffness=stiffness,
+                joined=not scene.system.is_separate,
+                q=near,
+            )
         found.append(made[known])
     return found
 
@@ -115,7 +109,7 @@ def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float
     """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
     quantum."""
     how = case.trajectory.arithmetic
-    plain = case.judged.system.magnitude_of(terms, near, exact=exact)
+    plain = case.system.magnitude_of(terms, near, exact=exact)
     count = case.scene.system.pulls(terms)
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)

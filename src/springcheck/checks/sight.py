@@ -156,8 +156,8 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States
     at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
-    y, v = case.modes.into(case.scene.q, case.scene.p)
-    start = y - case.modes.centre(), v
+    y, v = case.system.modes.into(case.scene.q, case.scene.p)
+    start = y - case.system.modes.centre(), v
 
     def states(matrices: Extended) -> States:
         return schemes.propagate(matrices, *start, steps, area_preserving=case.area_preserving)
@@ -176,7 +176,7 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States
 def changed_matrices(case: Case, name: str, change: float) -> Extended | None:
     """One-step matrices of the modes with one parameter larger by a fraction; None where it is none."""
     more = {key: 1 + np.longdouble(change if key == name else 0) for key in NAMES}
-    modes = case.modes
+    modes = case.system.modes
     if not (name == "step" or np.any({"stiffness": modes.w2, "friction": modes.rate}[name] != 0)):
         return None
     one = np.ones(1, dtype=np.longdouble)

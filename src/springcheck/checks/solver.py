@@ -23,14 +23,14 @@ def tolerance(case: Case) -> Finding | str:
     if not exact.has_true_motion(case.scene):
         return "the exact solution of this scene has no closed form"
     q, p = exact.true_motion(case.scene, case.steps, run.step)
-    value = float(np.max(case.norm(run.q - q, run.p - p)))
+    value = float(np.max(case.system.norm(run.q - q, run.p - p)))
     # sizes of the exact solution: those of one that explodes would excuse it
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
     bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
     if not np.isfinite(bound) or not np.isfinite([q, p]).all():
         return "the exact flow leaves the range of numbers"
-    moved = np.max(case.norm(q - case.scene.q, p - case.scene.p))
+    moved = np.max(case.system.norm(q - case.scene.q, p - case.scene.p))
     if value <= bound and 0 < moved <= bound:
         return "standing still would pass: it allows all of the motion"
     return Finding(
@@ -39,7 +39,7 @@ def tolerance(case: Case) -> Finding | str:
         "initial energy norms",
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
         f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times",
-        sight.of_exact(case, lambda change: case.norm(*change) / bound),
+        sight.of_exact(case, lambda change: case.system.norm(*change) / bound),
     )
 
 
@@ -53,7 +53,7 @@ def tolerance_bound(case: Case) -> float:
     states = case.trajectory.q, case.trajectory.p
     if case.scene.system.is_linear and case.scene.system.is_separate and case.linear:
         # what a state has grown to, an error made there no longer grows: from the start, both together
-        states = (case.scene.q[None], case.scene.p[None]) if np.any(case.modes.w2 < 0) else states
+        states = (case.scene.q[None], case.scene.p[None]) if np.any(case.system.modes.w2 < 0) else states
     local = _worst_local_error(case, *states)
     with np.errstate(over="ignore"):
         return float((case.trajectory.tolerance or 0.0) * most_steps(case) * local * flow_growth(case))
@@ -90,9 +90,9 @@ def flow_growth(case: Case) -> float:
     run, scene = case.trajectory, case.scene
     duration = abs(float(run.t[-1]))
     if scene.system.is_linear:
-        if not (case.linear and np.any(case.modes.w2 < 0)):
+        if not (case.linear and np.any(case.system.modes.w2 < 0)):
             return 1.0
-        turn = float(np.sqrt(np.max(-case.modes.w2)) * duration)
+        turn = float(np.sqrt(np.max(-case.system.modes.w2)) * duration)
         with np.errstate(over="ignore"):
             return float(np.exp(turn) * max(turn, 1.0))
     if duration == 0:
@@ -167,7 +167,7 @@ def _units(case: Case) -> tuple[Extended, Extended]:
     stiff = _stiff(case)
     fallback = scene.m * np.longdouble(fastest(case)) ** 2
     stiff = np.where(stiff > 0, stiff, fallback)
-    unit = case.norm.unit * CHANGE
+    unit = case.system.norm.unit * CHANGE
     return np.asarray(unit * np.sqrt(2 / stiff)), np.asarray(
         unit * np.sqrt(2 * scene.m.astype(np.longdouble))
     )
@@ -176,9 +176,9 @@ def _units(case: Case) -> tuple[Extended, Extended]:
 def _stiff(case: Case) -> Extended:
     """What a difference of position counts in the norm of errors, at most (n,) [M/T2]."""
     # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `Norm`
-    stiff = case.judged.system.rigidity.astype(np.longdouble)
-    for group in case.norm.groups:
-        stiff[group] += case.judged.m[group] / case.norm.duration**2
+    stiff = case.system.rigidity.astype(np.longdouble)
+    for group in case.system.norm.groups:
+        stiff[group] += case.judged.m[group] / case.system.norm.duration**2
     return stiff
 
 
@@ -192,4 +192,4 @@ def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
     if largest == 0:
         return np.longdouble(0)
     with np.errstate(divide="ignore"):
-        return np.longdouble(np.sqrt(2 * scene.n * largest) / case.norm.unit)
+        return np.longdouble(np.sqrt(2 * scene.n * largest) / case.system.norm.unit)

@@ -47,7 +47,7 @@ def closed_or_not(case: Case) -> str | None:
             "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
             f"or more than {MOST_JOINED} particles are joined"
         )
-    if np.any((case.modes.w2 == 0) & (case.modes.pull != 0)):
+    if np.any((case.system.modes.w2 == 0) & (case.system.modes.pull != 0)):
         return "a mode under a constant force has no closed form here"
     determinant = schemes.rotation(case.matrices).determinant
     if not np.all(np.isfinite(determinant)):
@@ -113,7 +113,7 @@ def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> Limits:
     ahead = case.ahead
     if ahead is None:
         unit = case.allowance_of_stretches * bound
-        return sight.of_steps(case, told, lambda at, change: case.norm.size(*change) / unit[at])
+        return sight.of_steps(case, told, lambda at, change: case.system.norm.size(*change) / unit[at])
     most = [case.roundings * x for x in (ahead.of_q, ahead.of_p)]
 
     def part(at: Integers, change: States) -> Reals:
@@ -150,7 +150,8 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
         return _off(case.ahead, to_q, to_p)
     q, p = case.next_states
     with np.errstate(all="ignore"):
-        return np.asarray(case.norm.size(np.abs(q - to_q), np.abs(p - to_p)) / case.allowance_of_stretches)
+        size = case.system.norm.size(np.abs(q - to_q), np.abs(p - to_p))
+        return np.asarray(size / case.allowance_of_stretches)
 
 
 def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
@@ -192,13 +193,10 @@ def _amplified(case: Case, steps: int) -> Floats:
 
 
 def rates_met(case: Case, *states: Reals) -> Floats:
-    """Upper bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T].
-
-    By Gershgorin's circles.
-    """
-    rows = [case.judged.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
+    """Gershgorin's bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T]."""
+    rows = [case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
     steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
-    return np.asarray(np.sqrt(steepest) + np.max(case.judged.system.friction_rates), np.float64)
+    return np.asarray(np.sqrt(steepest) + np.max(case.system.friction_rates), np.float64)
 
 
 def fastest(case: Case) -> float:
@@ -223,7 +221,7 @@ def arithmetic(case: Case) -> Finding | str:
         last = replace(case.ahead, of_q=case.ahead.last_q, of_p=case.ahead.last_p)
         alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
-    coarser, fine = (float(np.max(x.norm.size(*x.allowance))) for x in (case, finer))
+    coarser, fine = (float(np.max(x.system.norm.size(*x.allowance))) for x in (case, finer))
     # at rest the only rounding is underflow, which is the same in both
     if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return "its coarser parts do not show in these states"

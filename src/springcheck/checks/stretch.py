@@ -62,7 +62,7 @@ def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
     with np.errstate(all="ignore"):
         parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
         told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
-        if not case.straight and steps > 1:
+        if not case.system.is_linear and steps > 1:
             span = steps * np.longdouble(abs(case.trajectory.step)) / case.judged.m
             reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
             near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
@@ -76,7 +76,7 @@ def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
 def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     """So many steps from states (f, n), with what their roundings may become."""
     if steps == 1:
-        near = None if case.straight else case.trajectory.q[1:].astype(np.longdouble)
+        near = None if case.system.is_linear else case.trajectory.q[1:].astype(np.longdouble)
         end, bound = _one(case, q, p, near=near)
         reach = np.maximum(np.abs(q), np.abs(end[0])), np.maximum(np.abs(p), np.abs(end[1]))
         q, p, of_q, of_p = *end, *bound
@@ -84,8 +84,8 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
             q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach[0], reach_p=reach[1], last_q=of_q, last_p=of_p,
             turns=np.zeros(len(q), dtype=np.longdouble),
         )  # fmt: skip
-    size = 2 if case.judged.system.is_separate else 2 * q.shape[1]
-    each = steps * q.shape[1] * (8 if case.straight else 2 * size)
+    size = 2 if case.system.is_separate else 2 * q.shape[1]
+    each = steps * q.shape[1] * (8 if case.system.is_linear else 2 * size)
     rows = max(1, NUMBERS // each)
     parts = [_many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
     return Stretch(**{name: np.concatenate([getattr(x, name) for x in parts]) for name in Stretch.__slots__})
@@ -103,7 +103,7 @@ def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> 
 
 
 def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
-    separate = case.judged.system.is_separate
+    separate = case.system.is_separate
     on_q, on_p = np.empty((2, steps + 1, *q.shape), dtype=np.longdouble)
     on_q[0], on_p[0] = q, p
     with np.errstate(all="ignore"):
@@ -114,14 +114,14 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
         _, bound = _one(case, at_q, at_p)
         each_q, each_p = (x.reshape(steps, *q.shape) for x in bound)
         bounds = _pack(each_q, each_p, separate)
-        if case.straight:
+        if case.system.is_linear:
             one = tangent(case, q[:1], p[:1])
             maps = np.broadcast_to(one, (steps, *one.shape))
         else:
             maps = tangent(case, at_q, at_p)
             maps = maps.reshape(steps, len(q), *maps.shape[1:])
         turns = np.zeros(len(q), dtype=np.longdouble)
-        if case.scheme.implicit and not case.straight:
+        if case.scheme.implicit and not case.system.is_linear:
             turns = np.max([_turn(case, at) for at in on_q[1:]], axis=0)
         carried = np.zeros_like(bounds[0])
         power: Extended = np.broadcast_to(np.eye(maps.shape[-1], dtype=np.longdouble), maps.shape[1:])
@@ -138,7 +138,7 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
 
 
 def _turn(case: Case, q: Extended) -> Extended:
-    rows = case.judged.system.gershgorin(q) / case.judged.m
+    rows = case.system.gershgorin(q) / case.judged.m
     return np.asarray(np.longdouble(case.trajectory.step) ** 2 * np.max(rows, axis=-1))
 
 
@@ -165,7 +165,7 @@ def _unpack(z: Extended, separate: bool) -> States:
 def tangent(case: Case, q: Extended, p: Extended) -> Extended:
     """Derivative of one step at states (f, n): (f, n, 2, 2) where nothing is joined, else (f, 2n, 2n)."""
     f, n = q.shape
-    separate = case.judged.system.is_separate
+    separate = case.system.is_separate
     d = 2 if separate else 2 * n
     dq, dp = np.zeros((2, 1 + d, f, n), dtype=np.longdouble)
     dq[0], dp[0] = q, p
@@ -178,9 +178,9 @@ def tangent(case: Case, q: Extended, p: Extended) -> Extended:
 
     def slope(q: Reals) -> tuple[Extended, bool]:
         # the changes solve the linear equations that belong to the motion
-        return case.judged.system.slope(q[0])[0][None], not separate
+        return case.system.slope(q[0])[0][None], not separate
 
-    q, p = case.step(dq, dp, forces=variational(case.judged.system), slope=slope)
+    q, p = case.step(dq, dp, forces=variational(case.system), slope=slope)
     if separate:
         return np.stack([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)
     return np.concatenate([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)

@@ -179,8 +179,8 @@ def deferred(module: str, *more: str) -> dict[str, Any]:
     """`start`, `version` and more functions of a module that is imported as the first of them is called."""
 
     def of(name: str) -> Callable[..., Any]:
-        def call(*arguments: object) -> Any:
-            return getattr(import_module(module), name)(*arguments)
+        def call(*arguments: object, **options: object) -> Any:
+            return getattr(import_module(module), name)(*arguments, **options)
 
         return call
 

@@ -1,7 +1,6 @@
 """SciPy's `solve_ivp` methods, at the scene's tolerance, relative and for each component alike.
 
-The solvers are stepped as `solve_ivp` steps them, and read by their dense output.  SciPy is always here,
-because others need it; its methods are run by name, so that the set that runs by default stays what it was.
+The solvers are stepped as `solve_ivp` steps them, and read by their dense output; they are run by name alone.
 """
 
 from __future__ import annotations

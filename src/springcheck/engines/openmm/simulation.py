@@ -78,7 +78,7 @@ CUSTOM = ("euler", "semi-implicit-euler", "mts")
 CUSTOM_EXCESS = 2.0**-32
 """On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
 1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
-its forces are too large by 2.3e-10.  springcheck's step defect showed it before the source was read."""
+its forces are too large by 2.3e-10."""
 
 
 ATTENTIVE = 500

@@ -2,8 +2,7 @@
 
 numba loads saved code without a look at it: a file cut short or zeroed ends in an exception of any kind,
 or kills the process.  So a digest of every file stands beside them, and what does not agree is removed and
-compiled anew.  It covers the sources too, because numba watches the file of the kernel
-alone.
+compiled anew.  It covers the sources too, because numba watches the file of the kernel alone.
 """
 
 from __future__ import annotations

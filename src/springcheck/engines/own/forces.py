@@ -3,7 +3,7 @@
 See `kernels` for the rules that every loop here keeps.  A row is what needs no index: one wall spring on
 every particle, or walls at its ends alone; springs between neighbours, or none; friction.
 
-To add a term: write its loop in `indexed`, and name its fields in `layout.FIELDS`.
+To add a term: write its loop in `indexed`, and name it in `layout.KINDS`.
 """
 
 from __future__ import annotations

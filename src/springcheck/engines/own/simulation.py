@@ -3,10 +3,7 @@
 numba is imported only for a run that is worth it (see `WORTH`).  The numbers are the same either way,
 to the last bit, so a machine without numba, or with a cache folder that cannot be written, gets them too.
 They do not depend on how the particles are cut into tiles, nor on the number of threads.  A scene with a
-term that the loops do not have is carried through the same operations by NumPy, at any length.
-
-Implicit methods damp: what has decayed below 2e-308 is a subnormal number, with which some processors
-calculate up to a hundred times as slowly.  The numbers stay right.
+term that the loops do not have is carried through the same steps by NumPy, at any length.
 """
 
 from __future__ import annotations

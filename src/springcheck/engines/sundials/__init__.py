@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from springcheck.engines.contract import EVERY_FORCE, EVERY_KIND, SPRINGS, Engine, Method, deferred, named
 
 
@@ -16,12 +14,6 @@ def _method(name: str, about: str) -> Method:
         terms=EVERY_FORCE,
         kinds=EVERY_KIND,
     )
-
-
-def _internal_steps(*arguments: Any, **options: Any) -> Any:
-    from springcheck.engines.sundials import simulation
-
-    return simulation.internal_steps(*arguments, **options)
 
 
 ENGINE = Engine(
@@ -42,6 +34,5 @@ ENGINE = Engine(
         ),
     ),
     step_seconds=6e-5,
-    internal_steps=_internal_steps,
-    **deferred(f"{__name__}.simulation"),
+    **deferred(f"{__name__}.simulation", "internal_steps"),
 )

@@ -35,10 +35,7 @@ class Solution:
     groups: tuple[_Group, ...]
 
     def __call__(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
-        """q and p (f, n) after these numbers of steps of h, in extended precision.
-
-        Motion that leaves even the extended range comes back infinite.
-        """
+        """q and p (f, n) after these numbers of steps of h: see `exact.true_motion`."""
         t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
         if len(self.groups) == 1:
             with np.errstate(all="ignore"):
