@@ -89,6 +89,8 @@ _spec.loader.exec_module(census)
         (32917, "cause named"),
         (121679, "error seen"),
         (107281, "cause named"),
+        # noise shows where a growing motion is smallest
+        (250838, "error seen"),
         # states that come back after eight frames: alternating steps and a cubic force look alike
         (120026, "cause named"),
         (38303, "cause named"),
@@ -138,3 +140,8 @@ def test_the_census_tells_a_wrong_name_from_a_right_one() -> None:
     assert census.judged(draw, found, hidden=False) in ("WRONG NAME", "LISTED WITHOUT IT", "none")
     draw.error, draw.second = "noise", ""
     assert (census.judged(draw, found, hidden=False) == "FALSE FIT") == found.fits
+
+
+@pytest.mark.parametrize("number", [3065, 3071, 3379, 3481])
+def test_positions_at_rounded_times_are_named(number: int) -> None:
+    assert census.said_of(number, alone=True)[1] == "named"

@@ -50,6 +50,11 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if not fitting and after > 8 * float(np.median(weight[:, 0] * e.unit)):
         # the rest is no single motion either, as a solver's that begins with small steps
         return []
+    size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
+    middle = float(np.median(size))
+    if float(np.max(size[bad])) < min(2 * float(np.min(size[kept])), middle / LARGER):
+        # an error of one size shows where a motion that grows or dies is smallest
+        return []
     whose = f" of {title(fitting[0].scheme)}" if fitting else ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
@@ -59,10 +64,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     elif len(runs) > 1:
         at = ", ".join(str(run[0] + 1) for run in runs[1:5])
         cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
-    size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
-    if len(bad) > 1 and float(np.min(size[bad])) > max(
-        float(np.max(size[kept])) / 2, LARGER * float(np.median(size))
-    ):
+    if len(bad) > 1 and float(np.min(size[bad])) > max(float(np.max(size[kept])) / 2, LARGER * middle):
         cause = (
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic or changes in time"

@@ -54,8 +54,7 @@ class Recurrence:
     @property
     def phase(self) -> float:
         """Phase between two frames, 0 where nothing turns."""
-        square = 4 * self.alpha - (self.alpha + self.beta) ** 2
-        return float(np.arctan2(np.sqrt(square), 2 - self.alpha - self.beta)) if square > 0 else 0.0
+        return _phase(self.alpha, self.beta)
 
     @property
     def log_det(self) -> float:
@@ -84,12 +83,17 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     residual = float(np.sqrt(np.mean(left**2))) / scale
     ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
     usual = 4 + 2 * math.sqrt(steps)
-    clock = record.clock * 2 * np.pi * amplitude if record.slips is not None else 0.0 * amplitude
+    clock = record.clock * amplitude if record.slips is not None else 0.0 * amplitude
+    # each of four frames may lie half a rounding of its time away, on the way that the motion shows
+    on_way = 2 * _phase(alpha, beta) * clock
 
     def explained(rounding: float, beside: Floats | float = 0.0) -> bool:
-        off = float(np.max(np.maximum(np.abs(left) - beside, 0) / (rounding * size)))
-        late = float(np.max(np.maximum(np.abs(left) - beside - clock, 0) / (rounding * size)))
-        return off <= usual or (late <= UNUSUAL * usual and irregular((left / noise)[:, None]))
+        def off(allowed: Floats | float) -> float:
+            return float(np.max(np.maximum(np.abs(left) - beside - allowed, 0) / (rounding * size)))
+
+        if off(on_way) <= usual:
+            return True
+        return off(2 * np.pi * clock) <= UNUSUAL * usual and irregular((left / noise)[:, None])
 
     precision = ""
     if record.fine:
@@ -110,6 +114,12 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
         alpha=alpha, beta=beta, covariance=covariance + np.diag(coherent**2), residual=residual, ulp=ulp,
         precision=precision,
     )  # fmt: skip
+
+
+def _phase(alpha: np.longdouble, beta: np.longdouble) -> float:
+    """Phase between two frames, 0 where nothing turns."""
+    square = 4 * alpha - (alpha + beta) ** 2
+    return float(np.arctan2(np.sqrt(square), 2 - alpha - beta)) if square > 0 else 0.0
 
 
 def _around(x: Floats) -> Floats:
