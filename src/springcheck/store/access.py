@@ -52,19 +52,21 @@ def members(group: Any) -> list[str]:
     names = list(group)
     if not all(map(is_name, names)):
         raise refuse(group, f"has members whose names are no text, or longer than {LONGEST_NAME} characters")
-    return [name for name in names if isinstance(group.get(name, getlink=True), h5py.HardLink)]
+    return [name for name in names if _is_hard(group, name)]
+
+
+def _is_hard(group: Any, name: str) -> bool:
+    """Whether what a group has under this name lies in the file itself."""
+    return bool(group.id.links.get_info(name.encode()).type == h5py.h5l.TYPE_HARD)
 
 
 def find(group: Any, path: str) -> Any:
     """The group or dataset at a path below a group; None where there is none.  No other file is opened."""
     node = group
     for name in path.strip("/").split("/"):
-        if not isinstance(node, h5py.Group):
+        if not isinstance(node, h5py.Group) or not node.id.links.exists(name.encode()):
             return None
-        link = node.get(name, getlink=True)
-        if link is None:
-            return None
-        if not isinstance(link, h5py.HardLink):
+        if not _is_hard(node, name):
             raise refuse(
                 node, f"has a link {name!r} that leads elsewhere: only what lies in the file is read"
             )

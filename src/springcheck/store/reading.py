@@ -159,7 +159,9 @@ def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats]:
 
 
 def source_of(path: Path, label: str) -> Path:
-    """The file that holds a trajectory of a store."""
+    """The file that holds a trajectory of a store; a part of a journal is that file."""
+    if path.parent.suffix == files.JOURNAL:
+        return path
     found = sources(path)
     if label not in found:
         known = f"{nearest(label, found)}; it has {', '.join(found) or 'none'}"

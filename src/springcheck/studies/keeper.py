@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cache, partial, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -21,8 +21,10 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies import provenance
 from springcheck.studies.study import Progress
-from springcheck.studies.tables import Form
 from springcheck.studies.team import ALONE, Team
+
+if TYPE_CHECKING:
+    from springcheck.studies.tables import Form
 
 __all__ = [
     "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restoring",
