@@ -28,7 +28,7 @@ OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 def values(path: Path) -> dict[str, Any]:
     """Every number and text of the tables of a store, NaN equal to NaN."""
     found = {}
-    for name, table in store.read_tables(path).items():
+    for name, table in store.tables_of(path).items():
         columns = {key: repr(np.asarray(column).tolist()) for key, column in table.columns.items()}
         found[name] = (columns, repr(sorted(table.attributes.items())), table.signal, table.axes)
     return found

@@ -114,7 +114,7 @@ def test_a_study_by_a_cluster_is_the_study_by_one_process(calm: Farm, tmp_path: 
     arguments = ["extremes", "--quick", *(x for name in OWN for x in ("--method", name)), "--quiet"]
     assert cli.main([*arguments, "-o", str(tmp_path / "many.h5"), "--cluster", str(farm.file)]) == 0
     extremes.record(tmp_path / "one.h5", OWN, quick=True)
-    one, many = (store.read_tables(tmp_path / f"{name}.h5") for name in ("one", "many"))
+    one, many = (dict(store.tables_of(tmp_path / f"{name}.h5")) for name in ("one", "many"))
     assert one.keys() == many.keys()
     for name in one:
         for column, values in one[name].columns.items():

@@ -124,7 +124,7 @@ def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() ->
 def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
     atlas = extremes.record(tmp_path / "extremes.h5", ["own:euler"], quick=True)
     assert store.check(tmp_path / "extremes.h5") == []
-    table = store.read_tables(tmp_path / "extremes.h5")["extremes/own:euler"]
+    table = store.tables_of(tmp_path / "extremes.h5")["extremes/own:euler"]
     columns = {name: np.asarray(column) for name, column in table.columns.items()}
     assert (table.signal, table.axes) == ("outcome_number", ("log10_force", "log10_h_w"))
     assert [keeping.OUTCOMES[i] for i in columns["outcome_number"]] == [cell.outcome for cell in atlas.cells]

@@ -287,13 +287,13 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
 
 def test_charts_hold_the_stored_doubles(studies: dict[str, Path]) -> None:
     data = _data(page.html(page.gather(studies["census"])))["banks"]["census-0"]
-    tables = store.read_tables(studies["census"])
+    tables = dict(store.tables_of(studies["census"]))
     curve = next(x for x in data["charts"][0]["curves"] if x["name"] == "own:euler")
     for name in ("q", "p"):
         kept = np.asarray(tables["census/own:euler"].columns[name], np.float64)
         x = {"q": "x", "p": "y"}[name]
         assert np.array(curve[x], np.float64).tobytes() == kept.tobytes()
-    points = store.read_tables(studies["precision"])["precision/own:euler"].columns["max_error"]
+    points = store.tables_of(studies["precision"])["precision/own:euler"].columns["max_error"]
     data = _data(page.html(page.gather(studies["precision"])))["banks"]["precision-0"]
     drawn_errors = next(x["y"] for x in data["charts"][0]["curves"] if x["name"] == "own:euler")
     assert set(drawn_errors) <= set(np.asarray(points, np.float64).tolist())

@@ -66,7 +66,7 @@ def test_more_pieces_than_a_store_may_have_tables_are_one_table(
         assert [x for one in found for x in one] == [x for i in range(40) for x in squares(i)]
         kept.commit("squares", {})
     assert store.check(path) == []
-    table = store.read_tables(path)["squares/own"]
+    table = store.tables_of(path)["squares/own"]
     # in the order of the names of the pieces, whoever came first
     assert rows(table) == WANTED
     assert table.units == {"square": "nm"}
@@ -81,7 +81,7 @@ def test_a_checkpoint_leaves_pieces_where_they_are_and_loses_none(tmp_path: Path
                 if piece.name not in journal.tables():
                     journal.add(FORM.table(piece.key, piece.measure()), by=[{"host": f"h{count}"}], rows=True)
             journal.commit(final=count == 40)
-    assert rows(store.read_tables(path)["squares/own"]) == WANTED
+    assert rows(store.tables_of(path)["squares/own"]) == WANTED
     by = dict(store.measured_by(path))
     assert [by[piece.name]["host"] for piece in pieces(40)] == ["h10"] * 10 + ["h40"] * 30
 
@@ -125,7 +125,7 @@ def test_a_damaged_piece_alone_is_measured_again(tmp_path: Path) -> None:
         kept.results(pieces(5))
         assert kept.resumed == 4
         kept.commit("squares", {})
-    assert rows(store.read_tables(path)["squares/own"]) == WANTED[: sum(i % 3 + 1 for i in range(5))]
+    assert rows(store.tables_of(path)["squares/own"]) == WANTED[: sum(i % 3 + 1 for i in range(5))]
 
 
 def test_a_result_that_is_written_again_keeps_all_who_measured_it(tmp_path: Path) -> None:

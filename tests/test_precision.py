@@ -297,7 +297,7 @@ def test_an_interrupted_study_keeps_every_finished_point(tmp_path: Path) -> None
     with pytest.raises(KeyboardInterrupt):
         precision.record(scene, labels, path, budget=5.0, progress=interrupt)
     assert not path.exists()
-    kept = [point for table in store.read_tables(path).values() for point in POINTS.found(table)]
+    kept = [point for table in store.tables_of(path).values() for point in POINTS.found(table)]
     # three methods and one round of timings a level: 12 calls are three levels less one timing
     assert len(kept) == 6
     assert all(point.complete and point.run_repeats for point in kept)
@@ -311,7 +311,7 @@ def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
     assert store.check(path) == []
     document = json.loads(store.document(path, "precision"))
     assert document == found.document()
-    table = store.read_tables(path)["precision/own:semi-implicit-euler"]
+    table = store.tables_of(path)["precision/own:semi-implicit-euler"]
     assert table.signal == "max_error"
     assert table.axes == ("run_seconds",)
     mine = found.of("own:semi-implicit-euler")

@@ -311,7 +311,7 @@ def test_verdicts_comparison_tables_and_documents_come_back(tmp_path: Path) -> N
     assert found.labels == comparison.labels
     assert np.array_equal(found.max_difference, comparison.max_difference)
     assert store.document(path, "report") == "all\nwell"
-    back = store.read_tables(path)["precision/own:euler"]
+    back = store.tables_of(path)["precision/own:euler"]
     for name, column in table.columns.items():
         assert np.array_equal(back.columns[name], np.asarray(column)), name
     assert (back.units, back.attributes, back.signal, back.axes) == (

@@ -30,7 +30,7 @@ READERS: list[Callable[[Path], object]] = [
     store.scene_text,
     store.verdicts,
     store.comparison,
-    store.read_tables,
+    lambda path: dict(store.tables_of(path)),
     store.read_foreign,
     lambda path: list(store.windows(path, LABELS[0], 7)),
     lambda path: store.strided(path, LABELS[0], 7),

@@ -158,7 +158,7 @@ def test_a_table_names_its_scales_and_what_is_drawn_beside(tmp_path: Path) -> No
     assert {name: values.tolist() for name, values in plot.auxiliary.items()} == {"bound": [7.0, 8.0, 9.0]}
     assert plot.scales["axes_scale_type"] == ["linear"]
     assert plot.scales["signal_scale_type"] == "log"
-    back = store.read_tables(tmp_path / "s.h5")["precision/x"]
+    back = store.tables_of(tmp_path / "s.h5")["precision/x"]
     assert (back.auxiliary, back.log, back.attributes) == (table.auxiliary, table.log, {})
 
 

@@ -76,7 +76,7 @@ def test_a_checkpoint_empties_the_journal_and_counts_as_finished(tmp_path: Path)
         journal.commit(s)
     assert store.summary(path).complete
     assert list(store.read(path)) == LABELS[:2]
-    assert list(store.read_tables(path)) == ["precision/x"]
+    assert list(dict(store.tables_of(path))) == ["precision/x"]
     assert store.check(path) == []
 
 

@@ -43,7 +43,7 @@ def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
-    return store.read_tables(path)
+    return dict(store.tables_of(path))
 
 
 def equal(one: store.Table, other: store.Table) -> bool:
@@ -83,7 +83,7 @@ def test_a_killed_study_is_taken_up_and_nothing_of_it_measured_again(
     kept = killed(arguments, path, 1)
     assert cli.main([*arguments, "-o", str(path)]) == 0
     assert f"  {len(kept)} " in capsys.readouterr().out
-    whole = store.read_tables(path)
+    whole = dict(store.tables_of(path))
     assert 0 < len(kept) < len(whole)
     for name, table in kept.items():
         assert equal(table, whole[name]), name
@@ -107,7 +107,7 @@ def test_a_killed_study_of_precision_keeps_its_points(
     # what the killed call took counts, on a slow machine more
     budget = 3 + max(float(table.attributes["study_seconds"]) for table in begun.values())
     assert cli.main([*arguments, "-o", str(path), "--json", "--budget", f"{budget:.0f}"]) == 0
-    whole = {name: POINTS.found(table) for name, table in store.read_tables(path).items() if ":" in name}
+    whole = {name: POINTS.found(table) for name, table in store.tables_of(path).items() if ":" in name}
     assert sum(map(len, kept.values())) >= 3
     for name, points in kept.items():
         assert whole[name][: len(points)] == points
@@ -134,7 +134,7 @@ def test_an_interrupted_study_of_precision_goes_on(tmp_path: Path) -> None:
         precision.record(scene, labels, path, budget=2.0, progress=raising(12))
     assert not path.exists()
     assert not store.summary(path).complete
-    done = [point for table in store.read_tables(path).values() for point in POINTS.found(table)]
+    done = [point for table in store.tables_of(path).values() for point in POINTS.found(table)]
     with pytest.raises(StoreError, match=r"another command, or of other versions"):
         precision.record(scene, labels[:2], path, budget=2.0)
     second = precision.record(scene, labels, path, budget=2.0)
@@ -157,7 +157,7 @@ def test_a_study_whose_budget_was_spent_when_it_was_killed_measures_nothing_more
         patch.setattr(store.Journal, "commit", full)
         with pytest.raises(StoreError, match="full"):
             precision.record(scene, labels, path, budget=0.5)
-    (table,) = [t for name, t in store.read_tables(path).items() if name == "precision/own:euler"]
+    (table,) = [t for name, t in store.tables_of(path).items() if name == "precision/own:euler"]
     before, seconds = POINTS.found(table), float(table.attributes["study_seconds"])
     found = precision.record(scene, labels, path, budget=0.5)
     assert [p for p in found.points if p.complete] == [p for p in before if p.complete]

@@ -78,7 +78,7 @@ def atlas(folder: Path) -> bool:
     for workers in (1, 2):
         path = folder / f"atlas-{workers}.h5"
         seconds[workers] = timed(partial(extremes.record, path, team=Processes(workers)))
-    one, two = (store.read_tables(folder / f"atlas-{workers}.h5") for workers in (1, 2))
+    one, two = (dict(store.tables_of(folder / f"atlas-{workers}.h5")) for workers in (1, 2))
     same = one.keys() == two.keys() and all(
         repr(np.asarray(values).tolist()) == repr(np.asarray(two[name].columns[column]).tolist())
         for name in one

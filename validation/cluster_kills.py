@@ -183,7 +183,7 @@ def lost(before: dict[str, tuple[str, int]], path: Path) -> int:
 
 def table(path: Path) -> dict[str, bytes]:
     """The cells, bit for bit."""
-    columns = store.read_tables(path)[CELLS.beginning + METHOD].columns
+    columns = store.tables_of(path)[CELLS.beginning + METHOD].columns
     return {name: np.asarray(column).tobytes() for name, column in columns.items()}
 
 

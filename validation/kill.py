@@ -117,7 +117,7 @@ def lost(path: Path, seed: int, stored: dict[str, str], listed: set[str]) -> lis
             return [str(error)]
         # the final commit was through: the store is closed, and holds everything
         digests = {label: digest(source, label) for label, source in store.sources(path).items()}
-        named = set(store.read_tables(path))
+        named = set(dict(store.tables_of(path)))
     missing += [label for label, expected in stored.items() if digests.get(label) != expected]
     missing += sorted(listed - named)
     if path.is_file() or parts.parts_folder(path).is_dir():
@@ -275,7 +275,7 @@ def finished(path: Path) -> dict[str, object]:
         return {}
     try:
         found: dict[str, object] = {label: digest(file, label) for label, file in store.sources(path).items()}
-        tables = store.read_tables(path)
+        tables = dict(store.tables_of(path))
     except StoreError as error:
         if "no such file" in str(error):
             return {}

@@ -1,7 +1,7 @@
 """The HDF5 store: trajectories, verdicts and studies of one scene in one file; alone imports h5py.
 
 Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `read`, `windows`, `strided`,
-`end`, `summary`, `read_tables`, `verdicts`, `comparison`.
+`end`, `summary`, `tables_of`, `verdicts`, `comparison`.
 """
 
 from springcheck.errors import StoreError, StoreWarning
@@ -23,7 +23,6 @@ from springcheck.store.reading import (
     measured_by,
     read,
     read_one,
-    read_tables,
     scene_text,
     sources,
     strided,
@@ -39,6 +38,6 @@ __all__ = [
     "Draft", "Finding", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
     "is_foreign", "is_h5md", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
-    "read_one", "read_tables", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
+    "read_one", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
     "windows",
 ]  # fmt: skip

@@ -288,11 +288,6 @@ def measured_by(path: str | Path) -> list[tuple[str, dict[str, str]]]:
     return list(pieces.measured(given))
 
 
-def read_tables(path: str | Path, run: str | None = None) -> dict[str, Table]:
-    """The tables of a store by name, but for comparison and verdicts."""
-    return dict(tables_of(path, run))
-
-
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:
     """The verdicts of a store; none where it has none."""
     with opened(Path(path)) as file:
