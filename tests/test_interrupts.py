@@ -396,6 +396,27 @@ def test_a_worker_that_dies_is_an_error() -> None:
         list(workers.carried_out([partial(os._exit, 7), partial(doubled, 1)], 2))
 
 
+def test_workers_of_a_program_without_a_file_are_refused_in_one_line() -> None:
+    """Each would run the program again, and end as it looks for the file "<stdin>"."""
+    code = (
+        "import operator\nfrom functools import partial\nfrom springcheck.studies import workers\n"
+        "from springcheck.errors import SpringcheckError\n"
+        "try:\n    list(workers.carried_out([partial(operator.add, 1, 2)] * 3, 2))\n"
+        "except SpringcheckError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-"], input=code, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "need the program as a file, which <stdin> is not" in done.stdout
+
+
+@posix
+def test_a_worker_that_dies_before_it_reads_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then the system resets the connection instead of closing it."""
+    monkeypatch.setattr(workers, "_work", os._exit)
+    with pytest.raises(SpringcheckError, match="a worker process has ended by itself"):
+        list(workers.carried_out([partial(len, "x" * 10**7)] * 2, 2))
+
+
 @posix
 def test_workers_end_when_they_are_left() -> None:
     found = workers.carried_out([partial(time.sleep, 600), partial(doubled, 1), partial(doubled, 2)], 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,12 +22,14 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, 
     """What the parts return, as they finish; with one worker here, else in so many processes.
 
     Parts must be functions that another process can import.  Close the iterator where it is left early.
-    An exception of a part is raised here.  SpringcheckError: a process has ended without an answer.
+    An exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended
+    without an answer.
     """
     if workers <= 1:
         for part in parts:
             yield part()
         return
+    _is_a_file(sys.modules["__main__"])
     ahead = list(reversed(parts))
     team: dict[Any, Any] = {}
     try:
@@ -38,13 +41,13 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, 
                 interrupts.takes(process.kill)
                 theirs.close()
                 team[ours] = process
-            ours.send(ahead.pop())
+            _send(ahead.pop(), ours, team)
         while team:
             ready: list[Any] = wait(list(team))
             for ours in ready:
                 yield _answer(ours, team)
                 if ahead:
-                    ours.send(ahead.pop())
+                    _send(ahead.pop(), ours, team)
                 else:
                     ours.close()
                     _ended(team.pop(ours))
@@ -57,17 +60,37 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, 
                 ours.close()
 
 
+def _is_a_file(main: Any) -> None:
+    """Raise SpringcheckError where processes that are started would look for the program and not find it."""
+    path = getattr(main, "__file__", None)
+    if getattr(main, "__spec__", None) is None and path is not None and not os.path.exists(path):
+        raise SpringcheckError(
+            f"processes beside this one need the program as a file, which {path} is not: save it, or use one"
+        )
+
+
+def _send(part: Any, ours: Any, team: dict[Any, Any]) -> None:
+    try:
+        ours.send(part)
+    except OSError:
+        raise _gone(team[ours]) from None
+
+
 def _answer(ours: Any, team: dict[Any, Any]) -> Any:
     try:
         good, found = ours.recv()
-    except EOFError:
-        team[ours].join()
-        raise SpringcheckError(
-            f"a worker process has ended by itself (exit status {team[ours].exitcode}): is memory short?"
-        ) from None
+    except (EOFError, OSError):
+        raise _gone(team[ours]) from None
     if not good:
         raise found
     return found
+
+
+def _gone(process: Any) -> SpringcheckError:
+    process.join()
+    return SpringcheckError(
+        f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
+    )
 
 
 def _ended(process: Any) -> None:
