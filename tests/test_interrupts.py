@@ -340,6 +340,39 @@ def test_a_program_that_was_called_ends_with_all_that_it_has_started(swallowed: 
     assert interrupting._left(process.pid) == 0
 
 
+SLOW_DISK = """interrupts.GRACE = 0.1
+    import ctypes, os, signal, threading
+    from springcheck import simulate, store
+    from springcheck.physics import scenefile
+    right, calls = os.fsync, []
+    def slow(file):
+        calls.append(file)
+        if len(calls) == {number}:
+            threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+            # a thread beside this one gets it, which stays in the system's call
+            signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+            ctypes.CDLL(None).sleep(30)
+        right(file)
+    os.fsync = slow
+    scene = scenefile.load_scene("spring")
+    journal = store.open_new("s.h5", "run")
+    journal.save(simulate.run(scene, "own:euler"), scene)
+    journal.commit(scene)"""
+
+
+@posix
+@pytest.mark.parametrize("number", [1, 4, 6])
+def test_a_disk_that_does_not_answer_leaves_no_half_written_file(number: int, tmp_path: Path) -> None:
+    """The claim, a trajectory and the store, each as it is synced: nobody comes back to remove it."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(body=SLOW_DISK.format(number=number))],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
+    left = {1: {"lock"}, 4: {"lock", "command"}, 6: {"lock", "command", "run-own%3Aeuler.h5"}}
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == left[number]
+
+
 SHOWN = """
 import builtins, os, signal, sys
 from springcheck import __main__

@@ -96,7 +96,10 @@ def finish() -> None:
 def leave() -> None:
     """End an interrupted process now, with one line and none from the interpreter's shutdown."""
     for end in list(_State.ends):
-        end()
+        try:
+            end()
+        except Exception:
+            continue
     _say()
     for stream in (sys.stdout, sys.stderr):
         try:

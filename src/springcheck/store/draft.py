@@ -6,7 +6,6 @@ that hash what they write.  A run that stops early is laid out again at the leng
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
@@ -25,6 +24,7 @@ from springcheck.store.layout import Column
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 
 BUFFER = 1 << 22
 """Bytes that one array collects before they are written."""
@@ -53,6 +53,7 @@ class Draft:
         """One for each column, at its next byte: columns are written side by side."""
         self._threads: ThreadPoolExecutor | None = None
         self._running: list[Future[None]] = []
+        self._stack = ExitStack()
 
     def append(self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None) -> None:
         """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies.
@@ -151,17 +152,15 @@ class Draft:
             content = content[self._files[name].write(content) :]
 
     def _shorten(self) -> None:
-        long, offsets = files.temporary(self.path), self._offsets
-        self._temporary.replace(long)
-        try:
+        offsets = self._offsets
+        with files.unfinished(files.temporary(self.path)) as long:
+            self._temporary.replace(long)
             self._create(self.rows)
             with long.open("rb") as source:
                 for name, column in self._columns.items():
                     for block in seal.blocks(source, offsets[name], column.size):
                         self._put(name, memoryview(block))
             self._close()
-        finally:
-            long.unlink(missing_ok=True)
 
     def _complete(self, attributes: Mapping[str, Scalar | None]) -> str:
         found = {name: total.hexdigest() for name, total in self._hash.items()}
@@ -204,12 +203,12 @@ class Draft:
         self._files.clear()
 
     def __enter__(self) -> Draft:
+        self._stack.enter_context(files.unfinished(self._temporary))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._close()
-        with contextlib.suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+        with self._stack:
+            self._close()
 
 
 def _lay_out(

@@ -49,19 +49,15 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
             "step": access.array(file, f"{first}/step", wide[:1], "i"),
             "mass": access.array(file, f"particles/{label}/mass", wide[1:]),
         }
-        made = files.temporary(out)
-        with files.told(out, "write"):
-            try:
-                size = sum(2 * values.size * 8 for values in arrays.values())
-                with layout.fresh(made, size + 24 * known.frames) as target:
-                    layout.begin(target)
-                    layout.write_attributes(target, {"format": layout.EXPORTED})
-                    group = target.create_group("particles/trajectory")
-                    _write(group, arrays, columns, layout.UNITS[known.kind, known.units])
-                    layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
-                files.put(made, out)
-            finally:
-                made.unlink(missing_ok=True)
+        with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
+            size = sum(2 * values.size * 8 for values in arrays.values())
+            with layout.fresh(made, size + 24 * known.frames) as target:
+                layout.begin(target)
+                layout.write_attributes(target, {"format": layout.EXPORTED})
+                group = target.create_group("particles/trajectory")
+                _write(group, arrays, columns, layout.UNITS[known.kind, known.units])
+                layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
+            files.put(made, out)
     return found
 
 

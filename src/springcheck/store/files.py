@@ -15,9 +15,11 @@ import time
 import warnings
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning
 
 JOURNAL = ".parts"
@@ -178,24 +180,43 @@ def temporary(path: Path) -> Path:
     return path.with_name(f"springcheck-{os.urandom(8).hex()}.new")
 
 
+@contextlib.contextmanager
+def unfinished(path: Path) -> Iterator[Path]:
+    """A file that is moved to its place when it is complete; nothing else is left of it, by no interrupt."""
+    remove = partial(path.unlink, missing_ok=True)
+    interrupts.takes(remove)
+    try:
+        yield path
+    finally:
+        with interrupts.held(), contextlib.suppress(OSError):
+            remove()
+        interrupts.forget(remove)
+
+
 def put(complete: Path, path: Path) -> None:
     """Move a complete file to its place: fsync, os.replace, fsync of the folder."""
-    with complete.open("rb+") as file:
+    sync(complete)
+    move(complete, path)
+
+
+def sync(path: Path) -> None:
+    """Make a file's content survive a loss of power."""
+    with path.open("rb+") as file:
         os.fsync(file.fileno())
+
+
+def move(complete: Path, path: Path) -> None:
+    """Move a file that is complete and synced to its place."""
     complete.replace(path)
     sync_folder(path.absolute().parent)
 
 
 def put_bytes(content: bytes, path: Path) -> None:
     """Write a small file whole or not at all."""
-    made = temporary(path)
-    try:
+    with unfinished(temporary(path)) as made:
         with created(made) as file:
             file.write(content)
         put(made, path)
-    except BaseException:
-        made.unlink(missing_ok=True)
-        raise
 
 
 class Lock:

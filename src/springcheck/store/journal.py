@@ -15,6 +15,7 @@ import re
 import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
@@ -257,10 +258,13 @@ class Journal:
         if not final:
             found = replace(found, rows=[])
         temporary = self.folder / COLLECTION
-        with files.told(self.path, "write"):
+        # an adopted part is all that there is of it
+        copied = adopt.choice(found.parts) is None
+        with files.told(self.path, "write"), files.unfinished(temporary) if copied else nullcontext():
             try:
                 temporary.unlink(missing_ok=True)
                 merge.collection(temporary, found, root, extra, documents or {})
+                files.sync(temporary)
             except BaseException as error:
                 # an interrupt as the file was opened leaves it to a frame, which holds it open
                 traceback.clear_frames(error.__traceback__)
@@ -268,7 +272,7 @@ class Journal:
                 raise
             # whole once begun, in milliseconds: no interrupt leaves a complete store beside its journal
             with interrupts.held():
-                files.put(temporary, self.path)
+                files.move(temporary, self.path)
                 adopt.settled(self.folder)
                 for part in (*found.parts, *found.rows):
                     part.unlink(missing_ok=True)
