@@ -274,6 +274,19 @@ def test_a_bond_that_has_broken_is_followed_however_far() -> None:
         assert off <= 1, t
 
 
+@pytest.mark.parametrize("m", [(3.7, 1e60, 1e-4), (1e-60, 2.0, 1e100), (1.3, 1e308, 1.0)])
+def test_masses_over_hundreds_of_decades_keep_the_stated_error(
+    m: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each joined mode needs as many digits more as the masses differ by decades."""
+    monkeypatch.setattr(exact_check, "BITS", 2400)
+    scene = replace(load_scene("chain"), m=np.array(m))
+    w2 = np.asarray(scene.system.hessian(scene.q), np.float64) / np.sqrt(scene.m)[:, None] / np.sqrt(scene.m)
+    off = exact_check.ratio(replace(scene, step=0.2 / float(np.sqrt(np.max(np.abs(w2)))), steps=100))
+    assert off is not None
+    assert off <= 1
+
+
 @pytest.mark.parametrize("speed", [0.0, 1.7, -1.7])
 def test_a_bond_whose_exponential_overflows_goes_straight_on_and_bounces(speed: float) -> None:
     """Nothing pulls there; a motion inwards comes back to the same stretch as fast as it went."""

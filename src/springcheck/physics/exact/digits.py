@@ -26,7 +26,7 @@ DIGITS = 420
 """Of sums of products of doubles, which may differ by 300 decades, and of pi beside the largest angle."""
 
 ENOUGH = 57
-"""Of everything that stays within 30 decades of the largest number: three words of libmpdec."""
+"""Of everything that stays within 17 decades of the largest number: three words of libmpdec."""
 
 
 @contextmanager
@@ -95,19 +95,19 @@ def _series(x: Decimal, *, even: bool) -> Decimal:
         total += term
 
 
-def eigen(symmetric: Wide) -> tuple[Wide, Wide]:
+def eigen(symmetric: Wide, count: int = ENOUGH) -> tuple[Wide, Wide]:
     """Eigenvalues (n,) and eigenvectors (n, n), columns, of a symmetric matrix, by Jacobi's rotations (1846).
 
-    Their errors are 10**-ENOUGH of the largest eigenvalue.  They start from vectors in double precision, and
-    take 1e-5 n**3 seconds.
+    Their errors are 10**-count of the largest eigenvalue.  They start from vectors in double precision, and
+    take 1e-5 n**3 seconds with ENOUGH digits.
     """
     n = len(symmetric)
     size = np.max(np.abs(symmetric)) or Decimal(1)
-    limit = size * Decimal(10) ** (5 - ENOUGH)
-    with digits(ENOUGH):
+    limit = size * Decimal(10) ** (5 - count)
+    with digits(count):
         _, start = np.linalg.eigh((symmetric / size).astype(np.float64))
         turn = exactly(start)
-        for _ in range(3):
+        for _ in range(2 + (count // ENOUGH).bit_length()):
             # Newton's iteration for the nearest orthogonal matrix: 1e-16, 1e-32, 1e-64, and beyond
             turn = turn @ (3 * exactly(np.eye(n)) - turn.T @ turn) / 2
         a = turn.T @ symmetric @ turn

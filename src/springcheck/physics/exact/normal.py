@@ -204,16 +204,20 @@ def _sums(system: System, of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]
 
 def _precise(system: System) -> Modes:
     """Modes in so many digits that stiff and soft ones of a small system keep all of theirs."""
-    with digits(ENOUGH):
+    with digits():
+        # sums of the terms as they stand: exact
         k, force, rates = _sums(system, np.asarray)
+    count = _digits_for(system, k)
+    left = Decimal(10) ** (12 - count)
+    with digits(count):
         m, q, p = (exactly(x) for x in (system.m, system.scene.q, system.scene.p))
         root = np.sqrt(m)
-        w2, vectors = eigen(k / root[:, None] / root)
+        w2, vectors = eigen(k / root[:, None] / root, count)
         pull = vectors.T @ (force / root)
         # a free translation: nothing holds it, and inner forces do not move it
-        is_zero = np.abs(w2) <= np.max(np.abs(w2)) * LEFT
+        is_zero = np.abs(w2) <= np.max(np.abs(w2)) * left
         w2 = np.where(is_zero, 0 * w2, w2)
-        pull = np.where(np.abs(pull) <= np.sum(np.abs(force / root)) * LEFT, 0 * pull, pull)
+        pull = np.where(np.abs(pull) <= np.sum(np.abs(force / root)) * left, 0 * pull, pull)
         y, v = vectors.T @ (root * q), vectors.T @ (p / root)
         u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
         slow, fast, _ = _split(u, v, w2, np.max(rates))
@@ -226,8 +230,13 @@ def _precise(system: System) -> Modes:
     return _modes(system, start=start, **found)
 
 
-LEFT = Decimal(10) ** (12 - ENOUGH)
-"""What the rounding of `_precise` leaves of a 0."""
+def _digits_for(system: System, k: Wide) -> int:
+    """Digits that keep those of the slowest mode, as many decades as masses and stiffnesses differ by."""
+    masses, springs = system.m, np.abs(k[k != 0])
+    decades = Decimal(0)
+    for of in (exactly(masses), springs):
+        decades += (max(of) / min(of)).log10() if len(of) else 0
+    return max(ENOUGH, 40 + int(decades))
 
 
 def _drag(system: System, force: Extended) -> Extended:
