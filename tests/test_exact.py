@@ -280,7 +280,7 @@ def test_masses_over_hundreds_of_decades_keep_the_stated_error(
 ) -> None:
     """Each joined mode needs as many digits more as the masses differ by decades."""
     monkeypatch.setattr(exact_check, "BITS", 2400)
-    scene = replace(load_scene("chain"), m=np.array(m))
+    scene = replace(scenes.load_scene("chain"), m=np.array(m))
     w2 = np.asarray(scene.system.hessian(scene.q), np.float64) / np.sqrt(scene.m)[:, None] / np.sqrt(scene.m)
     off = exact_check.ratio(replace(scene, step=0.2 / float(np.sqrt(np.max(np.abs(w2)))), steps=100))
     assert off is not None
