@@ -330,7 +330,7 @@ def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: 
     one, other = simulate.run(scene, "openmm:verlet"), simulate.run(scene, "ase:velocity-verlet")
     case = checks.Case(trajectory=other, scene=scene)
     hw = scene.step * fastest(case)
-    rounding = float(np.max(case.norm(*case.allowance)))
+    rounding = float(np.max(scene.system.norm(*case.allowance)))
     allowed = 2 * case.roundings * rounding * scene.steps * (1 + scene.steps * hw)
     assert np.max(scene.system.norm(one.q - other.q, one.p - other.p)) <= allowed
     assert allowed < 1e-6
