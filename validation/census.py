@@ -17,8 +17,9 @@ import numpy as np
 
 from arguments import arguments
 from springcheck import engines
+from springcheck.figures.looks import title
 from springcheck.studies.census.measure import measure
-from springcheck.studies.census.result import Census, title
+from springcheck.studies.census.result import Census
 
 MEASURED = {
     "mujoco:joint-spring": ("semi-implicit-euler", 1.020),

@@ -157,26 +157,20 @@ def read_gro(path: Path, step: float | None) -> States:
 
 def read_trr(path: Path, step: float | None) -> States:
     """A GROMACS .trr file, in single precision, by MDAnalysis."""
-    t, q, v = [], [], []
     with _opened(path, "lib.formats.libmdaxdr", "TRRFile") as file:
-        for frame in file:
-            if frame.hasx and frame.hasv:
-                t.append(frame.time)
-                q.append(np.array(frame.x))
-                v.append(np.array(frame.v))
-    if not t:
+        both = (frame for frame in file if frame.hasx and frame.hasv)
+        found = [(frame.time, np.array(frame.x), np.array(frame.v)) for frame in both]
+    if not found:
         raise StoreError(f"{path}: has no frame with both positions and velocities")
+    t, q, v = zip(*found, strict=True)
     return _made(path, t, q, v, None, 2.0**-24)
 
 
 def read_xtc(path: Path, step: float | None) -> States:
     """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
-    t, q = [], []
     with _opened(path, "lib.formats.libmdaxdr", "XTCFile") as file:
-        for frame in file:
-            t.append(frame.time)
-            q.append(np.array(frame.x))
-    return _made(path, t, q, None, None, 2.0**-24)
+        found = [(frame.time, np.array(frame.x)) for frame in file]
+    return _made(path, [t for t, _ in found], [q for _, q in found], None, None, 2.0**-24)
 
 
 def read_dcd(path: Path) -> States:

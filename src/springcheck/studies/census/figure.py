@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from springcheck.figures import looks
-from springcheck.studies.census.result import Census, title
+from springcheck.studies.census.result import Census
 
 MOST_NAMES = 3
 
@@ -28,7 +28,7 @@ def portrait(census: Census) -> Figure:
         for j, x in enumerate(members):
             names = [y.method for y in members[:MOST_NAMES]]
             more = len(members) - len(names)
-            label = f"{title(name)}\n" + ", ".join(names) + (f" and {more} more" if more else "")
+            label = f"{looks.title(name)}\n" + ", ".join(names) + (f" and {more} more" if more else "")
             axes.plot(
                 x.q,
                 x.p,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from springcheck import schemes
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
@@ -93,8 +92,3 @@ class Census:
             for x in self.entries
         ]
         return keeper.document(entries=rows, left_out=self.left_out)
-
-
-def title(name: str) -> str:
-    """A found scheme in words."""
-    return schemes.title(name).partition(":")[0]

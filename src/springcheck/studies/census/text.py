@@ -6,7 +6,8 @@ from argparse import Namespace
 
 import numpy as np
 
-from springcheck.studies.census.result import Census, Entry, title
+from springcheck.figures.looks import title
+from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, plain, table
 from springcheck.text.wording import seconds

@@ -138,11 +138,7 @@ def record(
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Atlas:
-    """Like `measure`, kept in a store: one table of cells for each method as it is finished, the document.
-
-    An unfinished atlas of the same command is resumed.  Raises StoreError, before anything is measured,
-    when the file exists or cannot be written.
-    """
+    """Like `measure`, kept in a store (see `keeper.kept`): a table for each method, and the document."""
     labels = engines.match(tuple(methods) or everything())
     if cells and quick:
         raise SpringcheckError("--quick and --cells: fewer cells or more, not both")

@@ -198,9 +198,7 @@ def record(
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
-    Points are kept as they are finished, and an unfinished study of the same command is resumed.
-
-    Raises StoreError, before anything is measured, when the file exists or cannot be written.
+    Points are kept as they are finished (see `keeper.kept`).
     """
     command = keeper.command("precision", labels, scene.digest)
     with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:

@@ -46,7 +46,10 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
 
 def _report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
-    out: Lines = [_headline(report), plain(), _runs(report.runs)]
+    scene = report.scene
+    size = "" if scene.n == 1 else f", {scene.n} particles"
+    head = f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}"
+    out: Lines = [plain(head, "bold"), plain(), _runs(report.runs)]
     out += [
         plain("error: largest distance from the exact solution, over the initial energy norm", "dim"),
         plain(f"energy: {_energy(report.scene)}", "dim"),
@@ -69,13 +72,6 @@ def _report(report: Report) -> Lines:
         out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
     out += [plain(), *_summary(report)]
     return out
-
-
-def _headline(report: Report) -> Text:
-    """Title, grid and start of a scene."""
-    scene = report.scene
-    size = "" if scene.n == 1 else f", {scene.n} particles"
-    return plain(f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}", "bold")
 
 
 def _runs(runs: Sequence[MethodRun]) -> Table:
@@ -251,21 +247,16 @@ def _repeat(one: Repeat) -> Text:
     return plain(f"{one.method}: NOT equal, differs by up to {one.difference:.1e}{why}", "bold red")
 
 
-def _next(report: Report) -> Text:
-    """What to do with it now, to be copied into a shell."""
-    name = shlex.quote(str(report.path))
-    return plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim")
-
-
 def _summary(report: Report) -> Lines:
     """How many verdicts passed, where the store is, and what to do with it."""
     failed = any(v.passed is False for v in report.verdicts)
     taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
+    name = shlex.quote(str(report.path))
     look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
     return [
         plain(f"{report.counts}{taken}", look),
         plain(f"Stored in {report.path}", look),
-        _next(report),
+        plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"),
     ]
 
 

@@ -14,7 +14,7 @@ from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
-from springcheck.studies.stability.result import Stability
+from springcheck.studies.stability.result import Stability, fastest
 
 ROOM = 30.0
 """Errors above this say nothing."""
@@ -24,7 +24,7 @@ def pictures(study: Stability) -> dict[str, Figure]:
     """Figures of what was measured, by name."""
     out = {}
     if study.limits:
-        out["stability-limits"] = limits(study.limits, abs(study.scene.step) * study.fastest)
+        out["stability-limits"] = limits(study.limits, abs(study.scene.step) * fastest(study.scene))
     if study.regions:
         out["stability-regions"] = regions(study.regions)
     if study.resonances:

@@ -96,11 +96,7 @@ def record(
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Stability:
-    """Like `measure`, kept in a store: tables under /stability as they are finished, and the document.
-
-    An unfinished study of the same command is resumed.  Raises StoreError, before anything is measured,
-    when the file exists or cannot be written.
-    """
+    """Like `measure`, kept in a store (see `keeper.kept`): tables under /stability, and the document."""
     labels = engines.match(tuple(methods) or ("*",))
     command = keeper.command("stability", labels, scene.digest)
     with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:

@@ -42,11 +42,6 @@ class Stability:
     """Where it was stored."""
 
     @property
-    def fastest(self) -> float:
-        """The scene's largest angular frequency [1/T] (see `fastest`)."""
-        return fastest(self.scene)
-
-    @property
     def passed(self) -> bool:
         """Whether limits, growth, regions and bands are where theory puts them, and any was measured."""
         return bool(self.limits) and not self.failures
@@ -100,8 +95,8 @@ class Stability:
         return document(
             scene=self.scene.name,
             passed=self.passed,
-            fastest=self.fastest,
-            h_w=abs(self.scene.step) * self.fastest,
+            fastest=fastest(self.scene),
+            h_w=abs(self.scene.step) * fastest(self.scene),
             methods=[_limit(limit) for limit in self.limits],
             regions=[
                 {

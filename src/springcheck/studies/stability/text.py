@@ -6,7 +6,7 @@ from argparse import Namespace
 
 import numpy as np
 
-from springcheck.studies.stability.result import Stability
+from springcheck.studies.stability.result import Stability, fastest
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 
@@ -33,7 +33,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
                 *places,
                 f"{off:.0e}",
                 *grown,
-                _largest_step(x.theory if x.agrees else x.limit, study.fastest),
+                _largest_step(x.theory if x.agrees else x.limit, fastest(study.scene)),
             )
             rows.append([plain(cell, style) for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
@@ -55,15 +55,17 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
 
 def _of_scene(study: Stability) -> Lines:
     """The scene's fastest motion, its step, and the methods for which that is too long."""
-    if not study.fastest:
+    if not fastest(study.scene):
         return [
             plain("  nothing in this scene oscillates at its start: no step is too long for its stability")
         ]
-    turn = abs(study.scene.step) * study.fastest
+    turn = abs(study.scene.step) * fastest(study.scene)
     beyond = [x.method for x in study.limits if x.limit < turn]
     said = f"its step h = {study.scene.step:g} makes h w = {turn:.4g}"
     out: Lines = [
-        plain(f"  fastest angular frequency of this scene, at its start: w = {study.fastest:.6g}; {said}")
+        plain(
+            f"  fastest angular frequency of this scene, at its start: w = {fastest(study.scene):.6g}; {said}"
+        )
     ]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
