@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from springcheck import engines
@@ -19,28 +19,33 @@ class LeftOut:
     reason: str
 
 
+def sorted_out(
+    labels: Iterable[Label], reason: Callable[[Label], str | None]
+) -> tuple[list[Label], list[LeftOut]]:
+    """The methods against which there is no reason, and the others with theirs."""
+    reasons = {label: reason(label) for label in labels}
+    left = [LeftOut(method=str(label), reason=why) for label, why in reasons.items() if why]
+    return [label for label, why in reasons.items() if not why], left
+
+
 def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut]]:
     """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
 
     Raises MethodError when a method that is named in full cannot run: it was asked for.
     """
     named = tuple(patterns) or scene.include
-    chosen: list[Label] = []
-    left: list[LeftOut] = []
     try:
         matched = engines.match(named)
     except MethodError as error:
         if patterns:
             raise
         raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
-    for label in matched:
-        reason = engines.refusal(scene, label) or engines.absence(label.engine)
-        if reason is None:
-            chosen.append(label)
-        elif str(label) in patterns:
-            raise MethodError(f"{label} cannot run scene {scene.name}: {reason}")
-        else:
-            left.append(LeftOut(method=str(label), reason=reason))
+    chosen, left = sorted_out(
+        matched, lambda label: engines.refusal(scene, label) or engines.absence(label.engine)
+    )
+    for one in left:
+        if one.method in patterns:
+            raise MethodError(f"{one.method} cannot run scene {scene.name}: {one.reason}")
     if not chosen:
         raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
     return chosen, left

@@ -21,7 +21,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.census.result import ENTRIES, Census, Entry
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import Keeper, each
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
@@ -42,16 +42,15 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
 
     Raises MethodError where none of them can be run.
     """
-    usable: list[Label] = []
-    left = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
-    for label in engines.match(tuple(methods) or (EVERY,)):
-        scenes = (load_scene(BLOG), load_scene(UNEVEN))
-        reasons = [engines.refusal(scene, label) for scene in scenes] + [_absence(label)]
-        reason = next((x for x in reasons if x), None)
-        if reason:
-            left.append(LeftOut(method=str(label), reason=reason))
-        else:
-            usable.append(label)
+    scenes = load_scene(BLOG), load_scene(UNEVEN)
+
+    def why(label: Label) -> str | None:
+        reasons = [engines.refusal(scene, label) for scene in scenes]
+        return next(filter(None, reasons), None) or _absence(label)
+
+    broken = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
+    usable, left = sorted_out(engines.match(tuple(methods) or (EVERY,)), why)
+    left = [*broken, *left]
     if not usable:
         raise MethodError(f"none of these methods moves a spring: {left[0].method}: {left[0].reason}")
     kept = kept or Keeper()

@@ -19,7 +19,7 @@ from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.planes import decade
@@ -61,14 +61,7 @@ def measure(
             "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
             "double on this machine: run it on Linux on x86-64"
         )
-    usable = []
-    left_out = []
-    for label in engines.match(tuple(methods) or everything()):
-        reason = _absence(label)
-        if reason is None:
-            usable.append(label)
-        else:
-            left_out.append(LeftOut(method=str(label), reason=reason))
+    usable, left_out = sorted_out(engines.match(tuple(methods) or everything()), _absence)
     if not usable:
         reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
         raise MethodError(f"none of these methods is here: {reasons}")

@@ -57,10 +57,10 @@ class Cost:
     """Step of the method, or the mean internal step of a solver [T]."""
     steps: int
     """Steps to the end; where a run was not worth it, those that it would take."""
-    rejected: int
+    rejected: int = 0
     """Internal steps that a solver tried and did not keep; 0 for methods of fixed step."""
-    force_calls: int
-    error: float
+    force_calls: int = 0
+    error: float = np.nan
     """Error of the slow motion at the end, in units of its amplitude; NaN where there is no end."""
     outcome: str
 
@@ -111,23 +111,18 @@ def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
     steps = int(np.ceil(end / step_for(found, label)))
     run = replace(found, step=end / steps, steps=steps, every=steps, quantities=("q", "p"))
     most = most_steps(label)
-    common = {"family": family, "method": str(label), "ratio": ratio, "step": run.step, "steps": steps}
+    common: dict[str, Any] = {"family": family, "method": str(label), "ratio": ratio, "steps": steps}
+    common["step"] = run.step
     if steps > most:
-        return Cost(
-            **common,  # type: ignore[arg-type]
-            rejected=0, force_calls=steps, error=float("nan"), outcome=f"not run: {steps:.1e} steps",
-        )  # fmt: skip
+        return Cost(**common, force_calls=steps, outcome=f"not run: {steps:.1e} steps")
     try:
         done = simulate.run(run, label)
     except MethodError as refused:
-        return Cost(**common, rejected=0, force_calls=0, error=float("nan"), outcome=str(refused))  # type: ignore[arg-type]
+        return Cost(**common, outcome=str(refused))
     error = float("nan")
     if done.outcome.status == "complete":
         error = slow_error(run, done.q[-1], done.p[-1], steps)
-    return Cost(
-        **common,  # type: ignore[arg-type]
-        rejected=0, force_calls=done.force_calls, error=error, outcome=done.outcome.status,
-    )  # fmt: skip
+    return Cost(**common, force_calls=done.force_calls, error=error, outcome=done.outcome.status)
 
 
 def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
@@ -137,10 +132,7 @@ def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
     try:
         done = solver(found, engines.method(label), most=most_steps(label))
     except Stopped as stop:
-        return Cost(
-            **common, step=float("nan"), steps=stop.rows, rejected=0, force_calls=0, error=float("nan"),
-            outcome=f"stopped: {stop}",
-        )  # fmt: skip
+        return Cost(**common, step=np.nan, steps=stop.rows, outcome=f"stopped: {stop}")
     whole = done.t >= end
     steps = done.accepted if whole else int(done.accepted * end / done.t)
     return Cost(

@@ -22,7 +22,7 @@ from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
-from springcheck.studies.choose import LeftOut
+from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import Keeper, each
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
 from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability, fastest
@@ -47,19 +47,16 @@ def measure(
     """
     fastest(scene)
     chosen = engines.match(tuple(methods) or ("*",))
-    left_out = []
-    usable: list[Label] = []
-    for label in chosen:
+    of_springs = propagators.one_step_labels(chosen)
+
+    def why(label: Label) -> str | None:
         absent = engines.absence(label.engine)
-        if label not in propagators.one_step_labels(chosen):
-            adaptive = not scheme(engines.method(label).scheme).one_step
-            absent = absent or ("it has no fixed step and no limit" if adaptive else "it moves no springs")
-        else:
-            absent = absent or propagators.absence(label)
-        if absent:
-            left_out.append(LeftOut(method=str(label), reason=absent))
-        else:
-            usable.append(label)
+        if absent or label in of_springs:
+            return absent or propagators.absence(label)
+        adaptive = not scheme(engines.method(label).scheme).one_step
+        return "it has no fixed step and no limit" if adaptive else "it moves no springs"
+
+    usable, left_out = sorted_out(chosen, why)
     damped = regions.labels(tuple(usable)) if scene.system.is_damped else ()
     resonant = [label for label in usable if resonance.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
