@@ -116,15 +116,10 @@ def _served(label: Label) -> list[Scene]:
         (_in_haste(scene) for scene in several[8:10]),
         (load_scene(name) for name in ("lc-circuit", "rlc-circuit", "pendulum", "torsion-pendulum")),
     ):
-        found = [scene for scene in scenes if _serves(label, scene)]
+        found = [scene for scene in scenes if engines.refusal(scene, label) is None]
         if found:
             return found
     raise AssertionError(f"{label} serves none of the scenes: {engines.refusal(several[0], label)}")
-
-
-def _serves(label: Label, scene: Scene) -> bool:
-    right_friction = scene.system.has_one_friction_rate or not engines.method(label).one_friction
-    return engines.refusal(scene, label) is None and right_friction
 
 
 def _damped(scene: Scene) -> Scene:

@@ -217,4 +217,8 @@ def refusal(scene: Scene, label: Label) -> str | None:
     needed = sorted(need.value for need in what.requires if not need.met_by(scene))
     if needed:
         return f"it is for scenes with {' and '.join(needed)}"
+    if what.one_friction and not scene.system.has_one_friction_rate:
+        rates = scene.system.friction_rates
+        ranges = f"{float(rates.min()):.6g} to {float(rates.max()):.6g}"
+        return f"it has one friction rate for all particles, and damping/mass ranges from {ranges}"
     return None

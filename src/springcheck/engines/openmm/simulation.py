@@ -61,12 +61,13 @@ _PRECISIONS = {
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
 
-EXTERNAL: dict[str, tuple[str, tuple[str, ...]]] = {
-    "quartic": ("0.25*b*(x-at)^4", ("b",)),
-    "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave")),
+CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "quartic": ("0.25*b*(x-at)^4", ("b", "at")),
+    "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave", "at")),
+    "morse": ("depth*(1-exp(-steepness*(r-rest)))^2", ("depth", "steepness", "rest")),
 }
-"""One-body terms: energy as OpenMM reads it, and the parameters in it beside `at`.  No parameter is divided
-by or multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
+"""Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or
+multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
 SHIFTED = frozenset({"verlet", "langevin-middle", "langevin"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
@@ -134,38 +135,30 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         if group.getNumBonds():
             system.addForce(group)
     for term in scene.terms:
-        if term.key in EXTERNAL:
-            system.addForce(_external(term, origins))
-        elif isinstance(term, Morse):
+        if isinstance(term, Morse):
             _stays_right_way_round(scene, term)
-            system.addForce(_morse(term, origins))
+        if term.key in CUSTOM_TERMS:
+            system.addForce(_custom(term, origins))
     positions = np.zeros((len(x), 3))
     positions[:, 0] = x
     return system, positions
 
 
-def _external(term: Any, origins: Floats) -> mm.CustomExternalForce:
-    """A one-body term as its energy in the coordinate x."""
-    energy, names = EXTERNAL[term.key]
-    force = mm.CustomExternalForce(energy)
-    for name in (*names, "at"):
-        force.addPerParticleParameter(name)
-    columns = [getattr(term, name) for name in names] + [term.at - origins[term.i]]
-    for i, values in zip(term.i.tolist(), np.transpose(columns).tolist(), strict=True):
-        force.addParticle(i, values)
-    return force
-
-
-def _morse(term: Morse, origins: Floats) -> mm.CustomBondForce:
-    force = mm.CustomBondForce("depth*(1-exp(-steepness*(r-rest)))^2")
-    for name in ("depth", "steepness", "rest"):
-        force.addPerBondParameter(name)
-    rest = term.rest - (origins[term.b] - origins[term.a])
-    for a, b, *values in zip(
-        term.a.tolist(), term.b.tolist(), term.depth.tolist(), term.steepness.tolist(), rest.tolist(),
-        strict=True,
-    ):  # fmt: skip
-        force.addBond(a, b, values)
+def _custom(term: Any, origins: Floats) -> mm.Force:
+    """A term as its energy in the coordinate x of a particle, or in the length r of a bond."""
+    energy, names = CUSTOM_TERMS[term.key]
+    if term.bodies == 1:
+        force, origin = mm.CustomExternalForce(energy), term.at - origins[term.i]
+        name_parameter, add = force.addPerParticleParameter, force.addParticle
+    else:
+        force, origin = mm.CustomBondForce(energy), term.rest - (origins[term.b] - origins[term.a])
+        name_parameter, add = force.addPerBondParameter, force.addBond
+    for name in names:
+        name_parameter(name)
+    columns = [getattr(term, name) for name in names[:-1]] + [origin]
+    ends = (index.tolist() for index in term.particles)
+    for *particles, values in zip(*ends, np.transpose(columns).tolist(), strict=True):
+        add(*particles, values)
     return force
 
 
@@ -190,7 +183,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         return mm.NoseHooverIntegrator(step)
     if name in ("langevin", "langevin-middle"):
         made = mm.LangevinIntegrator if name == "langevin" else mm.LangevinMiddleIntegrator
-        return made(0.0, _friction_rate(scene, name), step)
+        return made(0.0, float(scene.system.friction_rates[0]), step)
     integrator = mm.CustomIntegrator(step)
     if name == "euler":
         integrator.addPerDofVariable("v0", 0)
@@ -201,17 +194,6 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         integrator.addComputePerDof("v", "v + dt*(f/m)")
         integrator.addComputePerDof("x", "x + dt*v")
     return integrator
-
-
-def _friction_rate(scene: Scene, name: str) -> float:
-    """The one friction rate of all particles [1/T].  MethodError where they differ."""
-    rate = scene.system.friction_rates.astype(np.float64)
-    if not scene.system.has_one_friction_rate:
-        raise MethodError(
-            f"openmm:{name} has one friction rate for all particles, and damping/mass of scene "
-            f"{scene.name!r} ranges from {np.min(rate):.6g} to {np.max(rate):.6g}"
-        )
-    return float(rate[0])
 
 
 def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.Context:

@@ -77,6 +77,16 @@ class Job:
         """All of the kernel's arguments but `every` and the rows to fill."""
         return *head, m, *self.room(len(m)), q, p, skip
 
+    @property
+    def whole(self) -> tuple[Any, ...]:
+        """The arguments for all particles, but the state of a single one."""
+        return self.head if self.m is None else self.arguments(self.head, self.m, *self.state, 0)
+
+    @property
+    def carried(self) -> tuple[Any, ...]:
+        """The state of a single particle, which its kernel takes and returns."""
+        return self.state if self.m is None else ()
+
 
 def processors() -> int:
     """Processors that this process may use."""
@@ -88,31 +98,19 @@ def compiled(job: Job) -> Job:
     from springcheck.engines.own.compiled import compiled as compile_for
 
     none = np.empty((0, job.n))
-    if job.m is None:
-        arguments = (1, *job.head, *job.state, none, none)
-    else:
-        arguments = (1, *job.arguments(job.head, job.m, *job.state, 0), none, none)
-    return replace(job, kernel=compile_for(job.kernel, arguments))
+    return replace(job, kernel=compile_for(job.kernel, (1, *job.whole, *job.carried, none, none)))
 
 
 class Whole:
     """All particles in one call, interpreted or compiled."""
 
     def __init__(self, job: Job, *, compiled: bool) -> None:
-        keep = _identity if compiled else as_lists
-        self._kernel = job.kernel
-        self._state: Any = None
-        if job.m is None:
-            self._arguments, self._state = keep(job.head), job.state
-        else:
-            self._arguments = keep(job.arguments(job.head, job.m, *job.state, 0))
+        self._kernel, self._state = job.kernel, job.carried
+        self._arguments = job.whole if compiled else as_lists(job.whole)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
-        if self._state is None:
-            self._kernel(every, *self._arguments, q, p)
-        else:
-            self._state = self._kernel(every, *self._arguments, *self._state, q, p)
+        self._state = self._kernel(every, *self._arguments, *self._state, q, p) or ()
 
 
 class Tiled:
@@ -240,10 +238,6 @@ def as_lists(value: Any) -> Any:
     if isinstance(value, tuple):
         return tuple(as_lists(x) for x in value)
     return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _identity(value: Any) -> Any:
-    return value
 
 
 def _numbers(value: Any) -> list[Floats]:
