@@ -149,9 +149,11 @@ class _Steps:
                         self._control[:] = self._force(q_now, v_now * self._m)
                         step(model, data, self._substeps)
                     if dropped[0].number:
+                        p[:row] *= self._m
                         raise Stopped(row, "MuJoCo sets controls to 0 where one is beyond 1e10")
                 q[row] = q_now
-                p[row] = v_now * self._m
+                p[row] = v_now
+            p *= self._m
         self.force_calls += every * len(q) * self._each
 
 
