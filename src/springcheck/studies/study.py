@@ -62,9 +62,10 @@ class Study:
     def perform(self, options: Namespace, progress: Progress | None) -> Result:
         """Measure what the command line asks for; SpringcheckError for what a user can mend."""
         measure = self._part("measure")
-        # what was imported stays, and is never searched for cycles
-        gc.freeze()
-        gc.enable()
+        if not gc.isenabled():
+            # the program has switched it off for its imports: what was imported stays, and is not searched
+            gc.freeze()
+            gc.enable()
         found: Result = measure.perform(options, progress)
         return found
 
