@@ -564,6 +564,8 @@ def test_where_compiled_code_cannot_be_saved_it_is_compiled_for_the_process(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     numba = pytest.importorskip("numba")
+    # numba has modules that use njit, which it imports as it first compiles
+    numba.njit(lambda: 0)()
     compiled._jit.cache_clear()
     njit = numba.njit
     asked = []
