@@ -13,12 +13,13 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from springcheck import cli, store
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import cluster, keeper, provenance
 from springcheck.studies.cluster import Cluster
 from springcheck.studies.extremes import measure as extremes
@@ -180,6 +181,42 @@ def test_a_worker_of_many_threads_is_told_how_to_start(calm: Farm) -> None:
     finally:
         other.kill()
         other.wait()
+        for worker in calm.workers:
+            worker.send_signal(signal.SIGCONT)
+
+
+def first_is_silent(dask_scheduler: Any) -> dict[str, float]:
+    """As if the scheduler had not heard of its first worker for long; called on the scheduler."""
+    return {address: 1e3 * (not i) for i, address in enumerate(sorted(dask_scheduler.workers))}
+
+
+def test_a_worker_that_has_hung_before_is_named_and_gets_no_piece(
+    calm: Farm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Cluster(str(calm.file))._client() as client:
+        client.wait_for_workers(2, timeout=60)
+        pids = client.run(os.getpid)
+    hung, *others = sorted(pids)
+    os.kill(pids[hung], signal.SIGSTOP)
+    monkeypatch.setattr(cluster, "_silence", first_is_silent)
+    try:
+        parts = [partial(slow, i, 0.0) for i in range(20)]
+        with pytest.warns(StoreWarning, match=f"^worker {hung} has not been heard of for 1000 s"):
+            found = dict(Cluster(str(calm.file)).carried_out(parts))
+    finally:
+        os.kill(pids[hung], signal.SIGCONT)
+    assert sorted(found) == list(range(20))
+    assert {pid for pid, _ in found.values()} <= {pids[address] for address in others}
+
+
+def test_workers_of_which_none_answers_are_named(calm: Farm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "SILENT", -1.0)
+    for worker in calm.workers:
+        worker.send_signal(signal.SIGSTOP)
+    try:
+        with pytest.raises(SpringcheckError, match=r"no worker of the cluster answers: tcp://.*; stop them"):
+            list(Cluster(str(calm.file), patience=0.5).carried_out([partial(slow, 0, 0.0)]))
+    finally:
         for worker in calm.workers:
             worker.send_signal(signal.SIGCONT)
 

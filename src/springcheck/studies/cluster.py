@@ -8,6 +8,8 @@ kept, and the same command goes on with another one.
 from __future__ import annotations
 
 import logging
+import time
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import provenance, queues
 
 T = TypeVar("T")
@@ -30,6 +32,10 @@ ATTEMPTS = 20
 
 WAITING = 30.0
 """Seconds to wait for a scheduler and for its first worker."""
+
+SILENT = 30.0
+"""Seconds after which a worker that the scheduler has not heard of gets no piece: it hangs, or was stopped.
+The scheduler itself waits for 300 s and longer."""
 
 GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
 
@@ -90,16 +96,44 @@ class Cluster:
                 stack.callback(queues.cancel, cluster)
             try:
                 client.wait_for_workers(1, timeout=WAITING)
-            except TimeoutError as error:
+            except (TimeoutError, OSError) as error:
                 raise SpringcheckError(f"--cluster {self.place}: the scheduler has no worker") from error
             try:
                 # the scheduler unpacks what passes through it
-                client.run_on_scheduler(provenance.versions)
+                _on_scheduler(client, provenance.versions)
             except Exception as error:
                 raise SpringcheckError(
                     f"--cluster {self.place}: springcheck is not installed where the scheduler runs: {error}"
                 ) from error
             yield client
+
+
+def _on_scheduler(client: Any, function: Callable[..., T]) -> T:
+    """What a function returns there.  TimeoutError where the scheduler does not answer."""
+    found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING)
+    return found
+
+
+def _silence(dask_scheduler: Any) -> dict[str, float]:
+    """Seconds since each worker was heard of, by its address; called on the scheduler."""
+    now = time.time()
+    return {address: now - worker.last_seen for address, worker in dask_scheduler.workers.items()}
+
+
+def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
+    """Addresses of the workers that are heard of and of those that are not, each of which is named once."""
+    try:
+        silence = _on_scheduler(client, _silence)
+    except (TimeoutError, OSError) as error:
+        raise SpringcheckError(GONE) from error
+    hang = sorted(address for address, seconds in silence.items() if seconds > SILENT)
+    live = sorted(silence.keys() - hang)
+    for address in hang if live else ():
+        if address not in named:
+            said = f"worker {address} has not been heard of for {silence[address]:.0f} s and gets no piece"
+            warnings.warn(said, StoreWarning, stacklevel=2)
+    named.update(hang if live else ())
+    return live, hang
 
 
 def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
@@ -131,19 +165,24 @@ def _answers(
     client: Any, parts: Sequence[Callable[[], T]], patience: float
 ) -> Generator[tuple[int, T], None, None]:
     import distributed
+    from distributed.comm import CommClosedError
 
     wanted = provenance.versions()
     number: dict[Any, int] = {}
     given = [0] * len(parts)
     ended: SimpleQueue[Any] = SimpleQueue()
+    named: set[str] = set()
 
     def give(i: int) -> None:
         given[i] += 1
         if given[i] > ATTEMPTS:
             raise SpringcheckError(f"piece {i} was given out {ATTEMPTS} times, and no worker survived it")
         key = f"springcheck-{id(number)}-{i}-{given[i]}"
+        # whoever joins may take it; where a worker hangs, only the others
+        where = {"workers": live} if live and hang else {}
         # the first has the highest priority: longest pieces are in front
-        future = client.submit(_checked, parts[i], wanted, key=key, pure=False, priority=-i, retries=0)
+        how = {"key": key, "pure": False, "priority": -i, "retries": 0, **where}
+        future = client.submit(_checked, parts[i], wanted, **how)
         number[future] = i
         future.add_done_callback(ended.put)
 
@@ -153,13 +192,20 @@ def _answers(
         while len(done) < len(parts):
             if len(done) % OUT == 0:
                 # no worker waits for its next piece
-                most = max(OUT, 2 * len(client.nthreads()))
+                live, hang = _hanging(client, named)
+                most = max(OUT, 2 * len(live))
             for i in islice(following, max(0, most - len(number))):
                 give(i)
             try:
                 future = ended.get(timeout=patience)
             except Empty:
                 _alive(client)
+                live, hang = _hanging(client, named)
+                if hang and not live:
+                    raise SpringcheckError(
+                        f"no worker of the cluster answers: {', '.join(hang)}; stop them and start others; "
+                        "what was finished is kept, the same command goes on"
+                    ) from None
                 for i in {i for i in number.values() if i not in done}:
                     give(i)
                 continue
@@ -185,7 +231,7 @@ def _answers(
             else:
                 _alive(client)
                 cause = future.exception(timeout=patience)
-                if not isinstance(cause, distributed.KilledWorker):
+                if not isinstance(cause, distributed.KilledWorker | CommClosedError):
                     raise cause
                 give(i)
     except (KeyboardInterrupt, GeneratorExit, SpringcheckError):
