@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,21 +12,17 @@ from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
-from springcheck.identify.maps import power, table
+from springcheck.identify.maps import Table, power, table
 from springcheck.identify.match import Match
 from springcheck.identify.orbit import powers
 from springcheck.identify.record import Record
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Extended, Floats, Integers
 
 __all__ = ["QUANTUM", "Defect", "defects", "misses"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
-
-UNUSUAL = 2.5
-"""Roundings of a step in units of those that are usual, 4 + 2 sqrt(steps), that are taken for roundings where
-nothing makes them larger.  Measured on 700 trajectories: 1 at most."""
 
 REBUILT_NOTE = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
 
@@ -63,19 +60,22 @@ def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extende
     return np.asarray(out)
 
 
+def _numbers(matches: list[Match], kind: type[Any]) -> tuple[Table, Integers, Any]:
+    """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
+    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
+    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
+    rows = [(match.a, match.g, match.log_mass, match.stride) for match in matches]
+    return table(families), which, np.array(rows, kind).T
+
+
 def _slipped(
     matches: list[Match], found: Map, slip: np.longdouble | float, *, between: bool = True
 ) -> Extended:
     """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps longer by the
     share `slip`."""
-    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
-    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
-    held = np.array([family.held for family in families])[which]
-    a, g, log_mass, stride = (
-        np.array([getattr(match, name) for match in matches], np.longdouble)
-        for name in ("a", "g", "log_mass", "stride")
-    )
-    out = table(families).frame(
+    every, which, (a, g, log_mass, stride) = _numbers(matches, np.longdouble)
+    held = np.array([family.held for family in every.families])[which]
+    out = every.frame(
         which,
         a * (1 + slip) ** 2,
         np.where(held, g, g * (1 + slip)),
@@ -89,13 +89,7 @@ def _slipped(
 def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
     """Sums (c, 2, 2) of the sizes of all that a step adds up, and what a frame's first step adds up to at
     its end, in the frame of `found`."""
-    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
-    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
-    a, g, log_mass, stride = (
-        np.array([getattr(match, name) for match in matches], np.float64)
-        for name in ("a", "g", "log_mass", "stride")
-    )
-    every = table(families)
+    every, which, (a, g, log_mass, stride) = _numbers(matches, np.float64)
     step = every.sums(which, a, g)
     first = step
     if np.any(stride > 1):
@@ -200,13 +194,8 @@ def _defects(
     rounded = ulp
     if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
         rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
-    plain = rounded <= np.minimum(path, usual)
-    if not np.all(plain) and visible():
-        # an uneven clock makes roundings larger
-        most = np.where(follows, path, np.minimum(path, UNUSUAL * usual))
-        for i in np.flatnonzero((rounded <= most) & ~plain).tolist():
-            # an uneven clock's roundings follow its times; others are irregular, or they are no roundings
-            plain[i] = follows[i] or coarse.irregular(signed[i] / size[i])
+    # those of an uneven clock follow its times
+    plain = rounded <= np.where(follows, path, np.minimum(path, usual))
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

@@ -27,7 +27,6 @@ class Evidence:
     found: Map
     terms: Terms
     stiffness: float | None
-    notes: tuple[str, ...] = ()
 
     @property
     def pairs(self) -> int:

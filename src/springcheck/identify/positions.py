@@ -14,7 +14,7 @@ from springcheck.identify.fit import ROUNDING
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
-from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.result import Explanation, Identification, nothing
 from springcheck.identify.search import FEW, SINGLE_ROOM, Joint, distinct, numbers
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -57,7 +57,7 @@ def identify_positions(
         )
     worst = max(found, key=lambda x: x.residual)
     if any(not x.precision for x in found):
-        return _none(record, moving, found, notes, *_misfit(worst))
+        return _none(found, notes, *_misfit(worst))
     known = stated is not None and record.mass is not None
     plain = tuple(x[0] for x in classes())
     every_stride = known or not _all_preserve(found)
@@ -74,7 +74,7 @@ def identify_positions(
     if friction:
         kept = [x for x in kept if candidates_of(record, moving, x, friction)]
     if not kept:
-        return _none(record, moving, found, notes, *_unfitting(record, moving, found, joints, stated))
+        return _none(found, notes, *_unfitting(record, moving, found, joints, stated))
     return _known(record, moving, found, kept, stride, known, friction or None, notes)
 
 
@@ -271,18 +271,13 @@ def _unfitting(
     )
 
 
-def _none(
-    record: Record, moving: list[int], found: list[Recurrence], notes: list[str], cause: str, remedy: str
-) -> Identification:
+def _none(found: list[Recurrence], notes: list[str], cause: str, remedy: str) -> Identification:
     """No scheme, and why."""
-    unknown = tuple(math.nan for _ in moving)
     worst = max(found, key=lambda x: x.residual)
-    return Identification(
-        verdict="none", statement=cause, scheme=None, aliases=(), candidates=(), step=math.nan, stride=None,
-        omega=unknown, stiffness=None, friction=unknown, velocity_offset=math.nan,
+    return nothing(
+        (Explanation(cause=cause, remedy=remedy, misfit=worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
         symplectic_defect=max(abs(float(x.beta)) for x in found),
-        defect_ulp=max(x.ulp for x in found), precision="unknown", fits=False, undecided=False, nearest=None,
-        difference=(math.nan,) * 4, notes=tuple(dict.fromkeys(notes)),
-        explanations=(Explanation(cause=cause, remedy=remedy, misfit=worst.residual),),
-    )  # fmt: skip
+        defect_ulp=max(x.ulp for x in found),
+        notes=notes,
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +28,7 @@ from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, read, stated_stride
-from springcheck.identify.result import Candidate, Explanation, Identification
+from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.search import (
     FEW,
     SINGLE,
@@ -352,38 +353,19 @@ def _unknown(
 
     tried = search(maps, terms, strides, far=True)
     determinant, symplectic = _determinants(maps, 1)
-    nearest: str | None = None
-    off: tuple[float, ...] = (math.nan,) * 4
-    omega: tuple[float, ...] = tuple(math.nan for _ in moving)
-    stiffness = None
+    near: dict[str, Any] = {}
     if tried:
         least = min(distance(x) for x in tried)
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
-        nearest, off = str(close), difference(maps[0], close.parts[0])
         omega, stiffness, _ = numbers(record, moving, close)
-    residual = max(float(np.max(found.residual)) for found in maps)
-    explanations = explain(record, moving, maps, terms, stated)
-    return Identification(
-        verdict="none",
-        statement=explanations[0].cause,
-        scheme=None,
-        aliases=(),
-        candidates=(),
-        step=math.nan,
-        stride=None,
-        omega=omega,
-        stiffness=stiffness,
-        friction=tuple(math.nan for _ in moving),
-        velocity_offset=math.nan,
+        off = difference(maps[0], close.parts[0])
+        near = {"nearest": str(close), "difference": off, "omega": omega, "stiffness": stiffness}
+    return nothing(
+        explain(record, moving, maps, terms, stated),
         determinant=determinant,
         symplectic_defect=symplectic,
-        defect_ulp=residual / 2.0**-52,
-        precision="unknown",
-        fits=False,
-        undecided=False,
-        nearest=nearest,
-        difference=off,
-        notes=tuple(dict.fromkeys(notes)),
-        explanations=explanations,
+        defect_ulp=max(float(np.max(found.residual)) for found in maps) / 2.0**-52,
+        notes=notes,
+        **near,
     )

@@ -113,6 +113,29 @@ class Identification:
         return dict(_plain(asdict(self)))
 
 
+def nothing(
+    explanations: tuple[Explanation, ...],
+    *,
+    determinant: tuple[float, ...],
+    symplectic_defect: float,
+    defect_ulp: float,
+    notes: list[str],
+    omega: tuple[float, ...] = (),
+    stiffness: tuple[float, ...] | None = None,
+    nearest: str | None = None,
+    difference: tuple[float, ...] = (math.nan,) * 4,
+) -> Identification:
+    """No scheme, and why; of `determinant` there is one for each oscillator that moves."""
+    unknown = (math.nan,) * len(determinant)
+    return Identification(
+        verdict="none", statement=explanations[0].cause, scheme=None, aliases=(), candidates=(),
+        step=math.nan, stride=None, omega=omega or unknown, stiffness=stiffness, friction=unknown,
+        velocity_offset=math.nan, determinant=determinant, symplectic_defect=symplectic_defect,
+        defect_ulp=defect_ulp, precision="unknown", fits=False, undecided=False, nearest=nearest,
+        difference=difference, notes=tuple(dict.fromkeys(notes)), explanations=explanations,
+    )  # fmt: skip
+
+
 def _ranges(strides: list[int]) -> str:
     starts = [s for s in strides if s - 1 not in strides]
     ends = [s for s in strides if s + 1 not in strides]
