@@ -196,3 +196,12 @@ def test_joined_masses_that_decay_below_every_double_are_followed() -> None:
     run = springcheck.simulate(scene, "own:implicit-euler")
     assert np.max(np.abs(run.q[-1])) < 1e-320
     assert alarms(checks.judge(scene, run)) == []
+
+
+@pytest.mark.parametrize("label", ["own:trapezoidal", "own:implicit-euler", "own:implicit-midpoint"])
+@pytest.mark.parametrize("h", [1e17, 9.2e18, 1e50, 1e150])
+def test_implicit_steps_beyond_the_digits_of_a_double_are_not_judged(label: str, h: float) -> None:
+    scene = replace(springcheck.load_scene("detest-b1"), step=h)
+    verdicts = checks.judge(scene, springcheck.simulate(scene, label))
+    assert [v for v in verdicts if v.passed is False] == []
+    assert {v.check: v.passed for v in verdicts}["step-defect"] is None

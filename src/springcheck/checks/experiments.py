@@ -11,7 +11,7 @@ from springcheck.checks import sight
 from springcheck.checks.bench import LARGEST, Bench
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
-from springcheck.checks.steps import step_defect
+from springcheck.checks.steps import step_defect, too_long
 from springcheck.checks.stretch import JOINED, follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
@@ -29,7 +29,7 @@ def _no_matrix(bench: Bench) -> str | None:
         return "friction couples the modes; the step defect judges it"
     if bench.scene.n > LARGEST:
         return f"of more than {LARGEST} particles the step defect says as much"
-    return None
+    return too_long(bench.scheme, bench.scene)
 
 
 @check("matrix", family="map", needs="a linear scene of few particles", unless=_no_matrix)

@@ -15,6 +15,7 @@ from springcheck.checks.drag import drag
 from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
+from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_JOINED
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
@@ -66,8 +67,19 @@ def step_defect(case: Case) -> Finding | str:
     return case.once(_step_defect)
 
 
+def too_long(scheme: schemes.Scheme, scene: Scene) -> str | None:
+    """Why an implicit step is so long that neither engine nor reference keep a digit of it, or None."""
+    if not scheme.implicit:
+        return None
+    w = np.sqrt(np.max(scene.system.gershgorin(scene.q.astype(np.longdouble)) / scene.m))
+    turn = float(abs(scene.step) * w)
+    return None if turn < 2.0**53 else f"a step of h w = {turn:.1e} is beyond the digits of a double"
+
+
 def _step_defect(case: Case) -> Finding | str:
     run = case.trajectory
+    if why_not := too_long(case.scheme, case.judged):
+        return why_not
     if run.every > REPEATED and (no_leap := closed_or_not(case)):
         return f"{run.every} steps lie between frames, and {no_leap}"
     bound, told = _allowed(case)

@@ -74,7 +74,12 @@ def version() -> dict[str, str]:
 
 
 def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
-    """A solver standing at the start.  MethodError where it would not come to the first output in an hour."""
+    """A solver standing at the start.
+
+    MethodError where it would not come to the first output in an hour, or cannot step there.
+    """
+    if abs(step) * scene.every < np.finfo(np.float64).tiny:
+        raise MethodError(f"{label}: frames {abs(step) * scene.every:.0e} apart, whose inverse is no number")
     radians = followed(scene, step)
     if radians > MOST_RADIANS:
         raise MethodError(
