@@ -276,3 +276,13 @@ def test_the_friction_of_the_command_line_is_held_against_the_states(
     said = capsys.readouterr().out
     assert ("the stated friction does not fit" in said) == bool(status)
     assert "semi-implicit-euler" in said
+
+
+def test_a_coordinate_that_moves_in_the_last_frame_alone_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    t, q, v = motion()
+    beside = np.zeros_like(q)
+    kicked = beside.copy()
+    kicked[-1] = 0.3
+    path = written(t, np.hstack([q, beside]), np.hstack([v, kicked]))
+    assert main(["identify", path]) == 2
+    assert "rests but for the last frame" in capsys.readouterr().err

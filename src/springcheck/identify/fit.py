@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.errors import IdentificationError
 from springcheck.identify.orbit import orbit, repeats
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats
@@ -216,7 +217,10 @@ def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
     noise = np.maximum(noise, lowest / 3 * length)
     weight = 1 / np.maximum(noise, LEAST_NOISE * np.max(noise))
     about = states[:-1] - rest
-    return np.asarray(weight * np.sqrt(2 * len(about) / float(np.sum((weight[:, None] * about) ** 2))))
+    size = float(np.sum((weight[:, None] * about) ** 2))
+    if not size:
+        raise IdentificationError("a coordinate rests but for the last frame: give the part before")
+    return np.asarray(weight * np.sqrt(2 * len(about) / size))
 
 
 def _about_rest(
