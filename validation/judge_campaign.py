@@ -1,6 +1,6 @@
 """Random scenes, legal engines and faulty ones: false alarms and misses of the judge, counted.
 
-    python validation/judge_campaign.py [FIRST COUNT [FILE]]
+    python validation/judge_campaign.py [FIRST COUNT [FILE [thorough]]]
 
 Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
 ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; ten legal
@@ -15,6 +15,9 @@ allowances, or what the scheme rounds along a step if that is more: the frame is
 own steps, in extended precision, from the frame before.  It is missed where no verdict fails and the step
 defect does not say that it cannot tell.  Allowances are the judge's own; the noise of the legal engines,
 printed beside, says how far they are from what rounding really does.
+
+With `thorough` a set is all experiments of `run --thorough` with one own method on one such scene; FILE,
+which holds blocks of one kind, may be - for none.
 
 With FILE every block of 250 scenes is kept in it, a line of JSON each: blocks that are there are not run
 again, and what is printed is the sum of all blocks of the file.
@@ -32,12 +35,12 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from arguments import arguments
-from springcheck import checks, schemes
+from springcheck import checks, engines, schemes, simulate
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
-from springcheck.physics.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 
 FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow)
@@ -574,9 +577,12 @@ class Counts:
         )
 
 
-def judged(counts: Counts, scene: Scene, made: Trajectory, what: str) -> list[Any]:
+def judged(counts: Counts, scene: Scene, made: Trajectory, what: str) -> list[Verdict]:
     """The verdicts, counted."""
-    verdicts = checks.judge(scene, made)
+    return _counted(counts, checks.judge(scene, made), what)
+
+
+def _counted(counts: Counts, verdicts: list[Verdict], what: str) -> list[Verdict]:
     counts.sets += 1
     counts.verdicts += sum(v.passed is not None for v in verdicts)
     counts.numbers += [
@@ -599,13 +605,7 @@ def one(seed: int, counts: Counts) -> None:
             right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
             right = replace(right, rebuilds_velocity=order == "rebuilt")
             what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
-            verdicts = judged(counts, scene, right, what)
-            counts.legal += 1
-            failed = [v for v in verdicts if v.passed is False]
-            counts.alarms += [f"{what}: {v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}" for v in failed]
-            for v in verdicts:
-                if v.passed is not None and v.bound > 0:
-                    counts.noise[v.check] = max(counts.noise.get(v.check, 0.0), v.value / v.bound)
+            _legal(counts, checks.judge(scene, right), what)
         for name in rng.choice(list(FAULTS), 2, replace=False):
             eps = float(10 ** rng.uniform(-16, -0.3))
             wrong = FAULTS[str(name)](scene, scheme, eps, rng)
@@ -613,6 +613,16 @@ def one(seed: int, counts: Counts) -> None:
                 continue
             what = f"seed {seed}, {scheme.name}, {name} by {eps:.2g}, every {scene.every}"
             _fault(counts, scene, wrong, str(name), what)
+
+
+def _legal(counts: Counts, verdicts: list[Verdict], what: str) -> None:
+    """Verdicts on a legal engine."""
+    counts.legal += 1
+    for v in _counted(counts, verdicts, what):
+        if v.passed is False:
+            counts.alarms.append(f"{what}: {v.check} {v.value:.3g} of {v.bound:.3g}: {v.why}")
+        if v.passed is not None and v.bound > 0:
+            counts.noise[v.check] = max(counts.noise.get(v.check, 0.0), v.value / v.bound)
 
 
 def _fault(counts: Counts, scene: Scene, wrong: Trajectory, kind: str, what: str) -> None:
@@ -644,15 +654,27 @@ def _fault(counts: Counts, scene: Scene, wrong: Trajectory, kind: str, what: str
         counts.missed.append(f"{what}: effect {effect:.3g}")
 
 
+def experiments(seed: int, counts: Counts) -> None:
+    """One scene: every experiment with one own method."""
+    rng = np.random.default_rng([13, seed])
+    labels = engines.match(("own:*",))
+    label = labels[int(rng.integers(len(labels)))]
+    scene = random_scene(rng, schemes.scheme(engines.method(label).scheme))
+    if engines.refusal(scene, label):
+        return
+    what = f"seed {seed}, {label}, every {scene.every}"
+    _legal(counts, checks.judge_thoroughly(scene, str(label), simulate.run), what)
+
+
 BLOCK = 250
 """Scenes of one line of the file."""
 
 
-def campaign(first: int, count: int) -> Counts:
-    """So many scenes, two legal engines and two faults of each."""
+def campaign(first: int, count: int, of: Callable[[int, Counts], None] = one) -> Counts:
+    """So many scenes: two legal engines and two faults of each, or what `of` does with each."""
     counts = Counts()
     for seed in range(first, first + count):
-        one(seed, counts)
+        of(seed, counts)
     return counts
 
 
@@ -663,17 +685,19 @@ def kept(file: Path) -> dict[int, Counts]:
 
 
 if __name__ == "__main__":
-    asked = arguments(__doc__, first=0, count=500, file="")
+    asked = arguments(__doc__, first=0, count=500, file="-", part="")
     total = Counts()
-    blocks = kept(Path(asked.file)) if asked.file else {}
+    keeps = asked.file != "-"
+    blocks = kept(Path(asked.file)) if keeps else {}
     for block in blocks.values():
         total.add(block)
     for start in range(asked.first, asked.first + asked.count, BLOCK):
         if start in blocks:
             continue
-        found = campaign(start, min(BLOCK, asked.first + asked.count - start))
+        of = experiments if asked.part == "thorough" else one
+        found = campaign(start, min(BLOCK, asked.first + asked.count - start), of)
         total.add(found)
-        if asked.file:
+        if keeps:
             with Path(asked.file).open("a") as out:
                 out.write(json.dumps({"first": start, **asdict(found)}) + "\n")
         print(total, flush=True)
