@@ -3,6 +3,8 @@ linear in the number of particles."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -123,3 +125,25 @@ def test_exact_motion_in_blocks_is_that_in_one(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(exact, "MOST_NUMBERS", 7 * scene.n)
     for one, other in zip(whole, exact.true_motion(scene, steps, scene.step), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+MANY_SPRINGS = """
+import resource
+from dataclasses import replace
+import numpy as np
+import springcheck
+from springcheck.physics.terms import WallSpring
+n = 200_000
+springs = WallSpring(i=np.zeros(n, int), at=np.linspace(-1, 1, n), k=np.full(n, 1 / n))
+scene = replace(springcheck.load_scene("spring-uneven"), terms=(springs,), steps=5, every=5)
+run = springcheck.simulate(scene, "own:semi-implicit-euler")
+assert any(verdict.passed for verdict in springcheck.judge(scene, run))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="systems count the largest memory in units of their own")
+def test_many_springs_on_one_particle_take_a_kilobyte_each() -> None:
+    """240 MB of the whole process, NumPy and numba among it; they took 1.5 GB."""
+    done = subprocess.run([sys.executable, "-c", MANY_SPRINGS], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 5e8

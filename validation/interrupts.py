@@ -21,6 +21,10 @@ came too late.
 
 Expected for 500 interrupts: every line ends in "0 wrong".
 
+So far 894 interrupts of 31 commands: 747 met the work, 18 came before it, 129 too late.  One was wrong: a
+store that took longer than 1.5 s to sync was left half written in its journal, which is mended.  Of the 894
+the last 90 came since then, under a load of 12 on two cores: 88 met the work, 2 came too late, 0 wrong.
+
 Seen once, 7 times in an earlier campaign, in extremes: a line on standard error that was not ours.  It was
 taken for the compiler behind OpenCL, which was not shown; what a library writes there while it compiles is
 caught since, and no such line was seen again.
@@ -89,7 +93,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "check": ("check", "input.h5"),
     "export": ("export", "input.h5", "own:euler", "out.h5md"),
     "list": ("list",),
-    "ensemble": ("ensemble", "spring", "--vary", "spring.0.stiffness=1:9:60000", "--method", "own:*euler"),
+    "ensemble": ("ensemble", "spring", "--vary", "spring.0.stiffness=1:9:6000", "--method", "own:*euler"),
     "precision --workers": ("precision", "spring-uneven", "--method", "own:*", "--workers", "2"),
     "stability --workers": ("stability", "spring-uneven", "--method", "own:*", "--workers", "2"),
     "faults --workers": ("faults", "--workers", "2"),
