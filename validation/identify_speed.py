@@ -8,11 +8,12 @@ and 16 oscillators at once.  With SRC, the folder `src` of another checkout, the
 package in turn with this one, twice each, and the ratio of the two is printed; the shortest time of each
 trajectory counts, after one call that is not timed.
 
-Printed for 25 calls, with a load of 17 on two cores (median and most; before):
-    plain 7.8 and 25.8 ms; 9.9 and 43.8.  damped 12.0 and 36.5; 23.3 and 203.0
-    held 8.9 and 15.9; 16.7 and 62.9
-    single 14.0 and 132.7; 47.2 and 283.2.  text 23.9 and 122.4; 67.1 and 298.7
-    systematic error 32.4 and 147.9; 65.7 and 269.2.  16 oscillators 64.1; 78.5
+Printed for 15 calls, with a load of 13 on two cores (median and most; before curves with friction and sums of
+all that a step adds up were looked at):
+    plain 6.3 and 23.5 ms; 7.4 and 26.7.  damped 12.0 and 39.3; 12.0 and 34.4
+    held 8.4 and 12.7; 8.3 and 12.6
+    single 14.6 and 135.0; 14.6 and 128.4.  text 23.6 and 104.8; 21.7 and 114.1
+    systematic error 29.1 and 123.6; 25.6 and 128.4.  16 oscillators 44.9; 64.2
 """
 
 from __future__ import annotations

@@ -193,13 +193,13 @@ def _shape(e: Evidence) -> list[Explanation]:
         "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
     }
-    # what a few pairs miss follows any law of as many numbers
+    # what a few pairs miss follows any law of as many numbers, and a frequency that was looked for more
     square = np.sum((weight * missing) ** 2, axis=1)
     counted = float(np.sum(square) ** 2 / np.sum(square**2)) if np.any(square) else 0.0
     left = {
         name: _left(weight * np.stack(columns, axis=1), weight * missing)
         for name, columns in groups.items()
-        if counted > 3 * len(columns)
+        if counted > 3 * (len(columns) + 3 * (name == "oscillation"))
     }
     size = float(np.max(e.found.residual))
     fitting = [name for name, share in left.items() if share < 0.35]
