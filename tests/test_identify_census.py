@@ -95,6 +95,7 @@ _spec.loader.exec_module(census)
         (120026, "cause named"),
         (38303, "cause named"),
         (124159, "cause named"),
+        (355165, "cause named"),
         # a frequency that is looked for follows what few frames miss
         (300109, "error seen"),
         (300543, "error seen"),

@@ -25,8 +25,8 @@ Printed for 200000 to 208199, 250000 to 266499, 300000 to 305199 and 350000 to 3
 looked at before (34,766 trajectories, by the two versions before this one): 24611 named; 4551 not told
 apart; 3896 cause named; 1346 error seen; 148 undecided; 142 error within rounding; 58 refused; 9 none; 5
 WRONG CAUSE; no wrong name, no false fit. One of the five was a "kick first" in a scheme's title taken for a
-cause here, three are mended since (250838, 300109, 300543), and 355165 is left. Milliseconds a call: half
-within 16, 90 % 43, 99 % 146, all 744, with a load of 7 to 14 on two cores.
+cause here, the others (250838, 300109, 300543, 355165) are mended since. Milliseconds a call: half within
+16, 90 % 43, 99 % 146, all 744, with a load of 7 to 14 on two cores.
 For 0 to 299 alone: 212 among several; 46 named; 32 error seen; 7 error, and a fit.
 """
 

@@ -193,13 +193,15 @@ def _shape(e: Evidence) -> list[Explanation]:
         "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
     }
-    # what a few pairs miss follows any law of as many numbers, and a frequency that was looked for more
+    # what a few pairs miss follows any law of as many numbers: a frequency that was looked for is more,
+    # the map's own constant is none
+    numbers = {"oscillation": 7, "parity": 4}
     square = np.sum((weight * missing) ** 2, axis=1)
     counted = float(np.sum(square) ** 2 / np.sum(square**2)) if np.any(square) else 0.0
     left = {
         name: _left(weight * np.stack(columns, axis=1), weight * missing)
         for name, columns in groups.items()
-        if counted > 3 * (len(columns) + 3 * (name == "oscillation"))
+        if counted > 3 * numbers.get(name, len(columns))
     }
     size = float(np.max(e.found.residual))
     fitting = [name for name, share in left.items() if share < 0.35]
@@ -250,7 +252,7 @@ FEW_TURNS = 2.0
 def _alternating(e: Evidence) -> Floats:
     """Columns (f - 1, c) of two maps in turn, and of the constant that was fitted."""
     z = e.found.z[:-1].astype(np.float64)
-    constant = np.ones((len(z), int(e.found.drifts)))
+    constant = np.ones((len(z), int(np.any(e.found.centre != 0))))
     return np.concatenate([z, z * (-1.0) ** np.arange(len(z))[:, None], constant], axis=1)
 
 
