@@ -318,6 +318,8 @@ def trace(log: Path, place: Place, asked: dict[int, tuple[str, ...]]) -> dict[in
             real = os.path.realpath(os.path.join(folder or f"{mine}work", name))
             if reads and (path in asked[now] or f"{real}/".startswith(SYSTEM)):
                 continue
+            if {"-o", "--output"} & set(asked[now]) and os.path.dirname(path) in asked[now]:
+                continue
             found.setdefault(now, []).append(f"{call} {path}")
     return found
 
