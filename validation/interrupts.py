@@ -318,7 +318,8 @@ def campaign(name: str, count: int, given: Path, rng: random.Random, warm: Warm)
             counts["before" if trial.before else "too late" if trial.too_late else "interrupted"] += 1
             if not trial.before and not trial.too_late:
                 slowest = max(slowest, trial.seconds)
-            late = trial.too_late
+            # the store was complete: the command would write it again
+            late = trial.too_late or "is complete" in trial.err
             wrong += [f"{name}, signal at {trial.moment:.3f} s: {what}" for what in trial.wrong]
             if i < count - 1:
                 shutil.rmtree(folder)

@@ -80,10 +80,20 @@ def announce(message: str) -> None:
     _State.message = message
 
 
-def say(message: str) -> None:
+def say() -> None:
     """Say once what an interrupt has left, where standard error was before a library's was caught."""
-    _State.message = message
-    _say()
+    message, _State.message = _State.message, ""
+    if not message:
+        return
+    if _State.errors == 2:
+        sys.stderr.write(f"springcheck: {message}\n")
+        return
+    # a progress bar may have hidden the cursor
+    shown = "\x1b[?25h" if os.isatty(_State.errors) else ""
+    try:
+        os.write(_State.errors, f"{shown}springcheck: {message}\n".encode(errors="backslashreplace"))
+    except OSError:
+        return
 
 
 def finish() -> None:
@@ -100,7 +110,7 @@ def leave() -> None:
             end()
         except Exception:
             continue
-    _say()
+    say()
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -208,21 +218,6 @@ def _watch(wakeup: int) -> None:
         pass
     time.sleep(GRACE)
     leave()
-
-
-def _say() -> None:
-    message, _State.message = _State.message, ""
-    if not message:
-        return
-    if _State.errors == 2:
-        sys.stderr.write(f"springcheck: {message}\n")
-        return
-    # a progress bar may have hidden the cursor
-    shown = "\x1b[?25h" if os.isatty(_State.errors) else ""
-    try:
-        os.write(_State.errors, f"{shown}springcheck: {message}\n".encode(errors="backslashreplace"))
-    except OSError:
-        return
 
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: object) -> None:

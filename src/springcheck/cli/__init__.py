@@ -57,11 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:
-        return _interrupted(what)
+        return _interrupted()
     except Exception as error:
         if interrupts.seen():
             # a library that was interrupted may call it an error of its own
-            return _interrupted(what)
+            return _interrupted()
         if isinstance(error, SpringcheckError | OSError):
             return _mistake(error)
         raise
@@ -84,9 +84,9 @@ def _said() -> Iterator[None]:
         yield
 
 
-def _interrupted(what: str) -> int:
+def _interrupted() -> int:
     """Say what Ctrl-C has left; returns the exit status."""
-    interrupts.say(f"interrupted; {what}")
+    interrupts.say()
     return INTERRUPTED
 
 

@@ -23,7 +23,7 @@ from urllib.parse import quote
 import h5py
 
 from springcheck import interrupts
-from springcheck.errors import StoreError, StoreWarning
+from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
@@ -278,6 +278,8 @@ class Journal:
                     part.unlink(missing_ok=True)
                 if final:
                     self._end()
+                    # the same command would not go on, but refuse to write it again
+                    interrupts.announce(plain(f"interrupted; {self.path} is complete"))
 
     def _end(self) -> None:
         """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
