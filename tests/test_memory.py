@@ -13,9 +13,10 @@ import pytest
 
 import springcheck
 from springcheck.cli import main
-from springcheck.errors import SceneError
+from springcheck.errors import SceneError, StoreError
 from springcheck.figures import motion
 from springcheck.physics import builders, exact, memory, scenefile
+from springcheck.store import access
 
 CHAIN = (scenefile.folder() / "long-chain.toml").read_text()
 
@@ -147,3 +148,12 @@ def test_many_springs_on_one_particle_take_a_kilobyte_each() -> None:
     """240 MB of the whole process, NumPy and numba among it; they took 1.5 GB."""
     done = subprocess.run([sys.executable, "-c", MANY_SPRINGS], capture_output=True, text=True, check=True)
     assert int(done.stdout) < 5e8
+
+
+def test_a_scene_whose_text_no_store_keeps_is_refused_before_it_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access, "LONGEST_TEXT", 100)
+    with pytest.raises(StoreError, match="stores keep"):
+        springcheck.run("spring", "own:euler", path=tmp_path / "x.h5")
+    assert not (tmp_path / "x.h5").exists()

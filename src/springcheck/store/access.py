@@ -208,6 +208,8 @@ def _value(node: Any, known: Any, name: str) -> Any:
         raise refuse(node, f"has an attribute {name} of {items} items")
     values = np.empty(shape, kind)
     known.read(values)
+    if kind.kind == "O" and sum(len(x or "") for x in values.ravel()) > LONGEST_TEXT:
+        raise refuse(node, f"has an attribute {name} of more than {LONGEST_TEXT >> 20} MiB of text")
     return [scalar(value) for value in values.ravel()] if shape else scalar(values[()])
 
 

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import digests, files, layout, seal
+from springcheck.store import access, digests, files, layout, seal
 from springcheck.store.access import Scalar
 from springcheck.store.layout import Column
 
@@ -36,6 +37,12 @@ class Draft:
     def __init__(self, path: Path, label: str, scene: Scene, *, sequence: int = 0, run: str = "") -> None:
         """`path` is where the finished part of this run goes; `sequence` is its place in the store."""
         layout.check_label(label)
+        self._text = scene.to_toml()
+        if len(self._text) > access.LONGEST_TEXT:
+            raise StoreError(
+                f"{path}: the scene's text has {len(self._text) / 1e6:.0f} MB, and stores keep "
+                f"{access.LONGEST_TEXT / 1e6:.0f}: take fewer particles, or join alike ones to a [chain]"
+            )
         self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
         self.rows = 0
         self._temporary = files.temporary(path)
@@ -167,13 +174,13 @@ class Draft:
         digest = digests.combined(found, self._columns)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         given = {name: value for name, value in attributes.items() if value is not None}
-        text = 8 * sum(len(str(value)) for value in [*given.values(), self.scene.to_toml()])
+        text = 8 * sum(len(str(value)) for value in [*given.values(), self._text])
         with layout.reopened(self._temporary, text) as file:
             layout.begin(file)
             layout.write_attributes(file, {"part": self.label})
             parameters = file.create_group(f"parameters/{self.label}")
             known: dict[str, Scalar] = {
-                "scene": self.scene.to_toml(),
+                "scene": self._text,
                 "scene_name": self.scene.name,
                 "units": self.scene.units,
                 "kind": self.scene.kind,
