@@ -3,6 +3,7 @@ other versions, and a scheduler that dies, lose nothing and change no number."""
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import signal
 import subprocess
@@ -20,7 +21,7 @@ import pytest
 
 from springcheck import cli, store
 from springcheck.errors import SpringcheckError, StoreWarning
-from springcheck.studies import cluster, keeper, provenance
+from springcheck.studies import cluster, keeper
 from springcheck.studies.cluster import Cluster
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.tables import Rows
@@ -141,8 +142,10 @@ def test_a_scheduler_that_dies_is_said_and_what_was_finished_is_kept(farm: Farm)
 def test_a_worker_of_another_version_is_refused_and_named(
     calm: Farm, monkeypatch: pytest.MonkeyPatch, package: str
 ) -> None:
-    right = provenance.version
-    monkeypatch.setattr(provenance, "version", lambda name: "0.0.1" if name == package else right(name))
+    right = importlib.metadata.version
+    monkeypatch.setattr(
+        importlib.metadata, "version", lambda name: "0.0.1" if name == package else right(name)
+    )
     with pytest.raises(SpringcheckError, match=rf"worker tcp://.* has {package} .*here it is 0\.0\.1"):
         list(Cluster(str(calm.file)).carried_out([partial(slow, 0, 0.0)]))
 
