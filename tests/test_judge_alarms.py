@@ -205,3 +205,13 @@ def test_implicit_steps_beyond_the_digits_of_a_double_are_not_judged(label: str,
     verdicts = checks.judge(scene, springcheck.simulate(scene, label))
     assert [v for v in verdicts if v.passed is False] == []
     assert {v.check: v.passed for v in verdicts}["step-defect"] is None
+
+
+def test_an_explosion_with_friction_has_no_closed_form_beyond_the_digits_of_its_area() -> None:
+    """An RLC circuit at h w = 80: elements of 1e9, and an area that a step multiplies by 5."""
+    scene = replace(springcheck.load_scene("rlc-circuit"), step=1e-3)
+    verdicts = checks.judge(scene, springcheck.simulate(scene, "own:ruth3"))
+    assert [v for v in verdicts if v.passed is False] == []
+    passed = {v.check: v.passed for v in verdicts}
+    assert passed["step-defect"]
+    assert passed["closed-form"] is None

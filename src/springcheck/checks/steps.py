@@ -57,6 +57,9 @@ def closed_or_not(case: Case) -> str | None:
         return "the step reverses orientation (det <= 0): it has no phase"
     if np.any(determinant < CONTRACTED):
         return "friction contracts area more in one step than the reference has digits for"
+    products = np.abs(case.matrices[:, 0, 0] * case.matrices[:, 1, 1])
+    if not case.area_preserving and np.any(products * CONTRACTED > determinant):
+        return "what a step leaves of an area is a difference that the reference has no digits for"
     return None
 
 
