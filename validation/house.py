@@ -12,17 +12,17 @@ Command: python validation/house.py [repeats]        (40 s for 5)
 
 Printed on two idle cores:
 
-    lines 38756 in 254 modules, median 132.5
-    largest studies/faults/seeded.py 397, identify/report.py 390, checks/case.py 387,
-      studies/run/measure.py 384, physics/system.py 380
-    rooms 20, arrows 88, longest chain 10:
-      __main__ > cli > studies > doors > identify > formats > store > trajectory > physics > errors
-    imports of numpy and h5py       176 ms
-    the smallest run                375 ms
+    lines 38418 in 254 modules, median 129.5
+    largest physics/system.py 383, studies/run/measure.py 380, identify/report.py 371,
+      identify/search.py 368, studies/faults/seeded.py 368
+    rooms 19, arrows 78, longest chain 9:
+      __main__ > cli > studies > doors > identify > formats > store > physics > errors
+    imports of numpy and h5py       177 ms
+    the smallest run                317 ms
     imports of the libraries        780 ms
-    run spring                     1185 ms
-    its engines alone               145 ms
-    smallest run / imports 2.13; run spring / (imports + engines) 1.28
+    run spring                     1089 ms
+    its engines alone               136 ms
+    smallest run / imports 1.79; run spring / (imports + engines) 1.19
 
 The speed of the own engine beside C is measured by kernel_speed.py.
 """

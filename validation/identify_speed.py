@@ -8,12 +8,9 @@ and 16 oscillators at once.  With SRC, the folder `src` of another checkout, the
 package in turn with this one, twice each, and the ratio of the two is printed; the shortest time of each
 trajectory counts, after one call that is not timed.
 
-Printed for 15 calls, with a load of 13 on two cores (median and most; before curves with friction and sums of
-all that a step adds up were looked at):
-    plain 6.3 and 23.5 ms; 7.4 and 26.7.  damped 12.0 and 39.3; 12.0 and 34.4
-    held 8.4 and 12.7; 8.3 and 12.6
-    single 14.6 and 135.0; 14.6 and 128.4.  text 23.6 and 104.8; 21.7 and 114.1
-    systematic error 29.1 and 123.6; 25.6 and 128.4.  16 oscillators 44.9; 64.2
+Printed for 15 calls on two idle cores (median and most):
+    plain 4.7 and 18.9 ms.  damped 9.6 and 31.6.  held 6.5 and 9.8.  single 12.0 and 106.9
+    text 17.7 and 87.5.  systematic error 22.8 and 105.3.  16 oscillators 34.7
 """
 
 from __future__ import annotations
