@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -33,7 +33,24 @@ SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
 """Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
 
 
-def rows(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
+def said_of(candidates: tuple[Candidate, ...], scheme: str | None, damped: bool, n: int) -> dict[str, Any]:
+    """Fields of the `Identification` of n oscillators that come from its candidates: the scheme, if it is one
+    alone, and the numbers that all of them share."""
+    unknown = (math.nan,) * n
+    known = candidates[0].stiffness is not None
+    return {
+        "verdict": "named" if scheme else "not told apart",
+        "scheme": scheme,
+        "nearest": scheme,
+        "aliases": other_names(scheme, damped=damped) if scheme else (),
+        "candidates": candidates,
+        "omega": _shared([x.omega for x in candidates]) or unknown,
+        "stiffness": _shared([x.stiffness or () for x in candidates]) if known else None,
+        "friction": _shared([x.friction for x in candidates]) or unknown,
+    }
+
+
+def _shared(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     """The numbers that all candidates share, to 1e-9, or None."""
     if len({len(row) for row in rows}) > 1:
         return None

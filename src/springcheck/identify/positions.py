@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.candidates import candidates_of, common, other_names, rows
+from springcheck.identify.candidates import candidates_of, common, said_of
 from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES, G_ROUNDING, HELD, Family
 from springcheck.identify.fit import ROUNDING
@@ -213,20 +213,13 @@ def _known(
         ]
     elif scheme and float(found[0].beta) > 0 and not known:
         notes = [*notes, "a damped spring of another stiffness may have the same positions"]
-    first = candidates[0]
     unknown = tuple(math.nan for _ in moving)
     share = 1 / (steps or 1)
     return Identification(
-        verdict="named" if scheme else "not told apart",
+        **said_of(candidates, scheme, damped, len(moving)),
         statement=statement,
-        scheme=scheme,
-        aliases=other_names(scheme, damped=damped) if scheme else (),
-        candidates=candidates,
         step=float(record.interval) * share if steps else math.nan,
         stride=steps,
-        omega=rows([x.omega for x in candidates]) or unknown,
-        stiffness=None if first.stiffness is None else rows([x.stiffness or () for x in candidates]),
-        friction=rows([x.friction for x in candidates]) or unknown,
         velocity_offset=math.nan,
         determinant=tuple(math.exp(x.log_det * share) for x in found) if steps else unknown,
         symplectic_defect=max(abs(float(x.beta)) for x in found),
@@ -234,7 +227,6 @@ def _known(
         precision=precision,
         fits=True,
         undecided=False,
-        nearest=scheme,
         difference=(math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
     )

@@ -15,8 +15,7 @@ from springcheck.identify.candidates import (
     candidates_of,
     common,
     nearest_stiffness,
-    other_names,
-    rows,
+    said_of,
     stated_stiffness,
 )
 from springcheck.identify.coarse import over_single
@@ -274,16 +273,10 @@ def _known(
     if explanations:
         statement = f"{explanations[0].cause}"
     return Identification(
-        verdict="named" if scheme else "not told apart",
+        **said_of(candidates, scheme, damped, len(moving)),
         statement=statement,
-        scheme=scheme,
-        aliases=other_names(scheme, damped=damped) if scheme else (),
-        candidates=candidates,
         step=float(record.interval) / stride if stride else math.nan,
         stride=stride,
-        omega=rows([x.omega for x in candidates]) or unknown,
-        stiffness=None if first.stiffness is None else rows([x.stiffness or () for x in candidates]),
-        friction=rows([x.friction for x in candidates]) or unknown,
         velocity_offset=math.nan if offset is None else offset,
         determinant=determinant if stride else unknown,
         symplectic_defect=symplectic,
@@ -291,7 +284,6 @@ def _known(
         precision=precision,
         fits=stated_fits and not undecided,
         undecided=undecided,
-        nearest=scheme,
         difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),
