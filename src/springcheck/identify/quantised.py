@@ -8,7 +8,7 @@ is those forces; noise of the same size, or an error that goes with anything els
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +19,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.maps import KINDS
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
+from springcheck.identify.starts import least_squares
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 
@@ -32,27 +33,30 @@ CHANCE = 1e-9
 REFINED = 30
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
 
-Force: TypeAlias = Callable[[float, Floats], Floats]
-"""k and q (f,) -> -k q as an arithmetic has it, both k and the result in quanta, powers of 2."""
+Force: TypeAlias = Callable[[Floats, Floats], Floats]
+"""k (c, 1) and q (c, f) -> -k q as an arithmetic has it, both k and the result in quanta, powers of 2."""
+
+Pull: TypeAlias = Callable[[Floats, Floats], Floats]
+"""a (c, 1) and q (c, f) or (f,) -> h**2 F/m."""
 
 
-def _single(k: float, q: Floats) -> Floats:
+def _single(k: Floats, q: Floats) -> Floats:
     return (-k * q).astype(np.float32).astype(np.float64)
 
 
-def _all_single(k: float, q: Floats) -> Floats:
-    return (np.float32(-k) * q.astype(np.float32)).astype(np.float64)
+def _all_single(k: Floats, q: Floats) -> Floats:
+    return ((-k).astype(np.float32) * q.astype(np.float32)).astype(np.float64)
 
 
-def _cut(k: float, q: Floats) -> Floats:
+def _cut(k: Floats, q: Floats) -> Floats:
     return np.trunc(-k * q)
 
 
-def _rounded(k: float, q: Floats) -> Floats:
+def _rounded(k: Floats, q: Floats) -> Floats:
     return np.rint(-k * q)
 
 
-def _floor(k: float, q: Floats) -> Floats:
+def _floor(k: Floats, q: Floats) -> Floats:
     return np.floor(-k * q)
 
 
@@ -82,45 +86,43 @@ def reproduced(
     v = (found.z[:, 1] * found.size[1] / record.interval).astype(np.float64) * h
     kick = h * h / mass * quantum
 
-    def missed(values: Floats, cut: Force | None, factor: float = 1.0, *, leaps: bool = False) -> Floats:
-        a, g = values
-
-        def pull(x: Floats) -> Floats:
-            return -a * x if cut is None else kick * factor * cut(a / kick, x)
-
+    def missed(values: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
+        """What frames miss (c, 2 f - 2) where steps have these a and g (c, 2)."""
+        a, g = values.T[:, :, None]
         x, y = q[:-1], v[:-1]
         if leaps:
             # stored half a step early, and half a kick of the exact force added where it was read
             y = y + a * x / 2
             for _ in range(match.stride):
-                y = y + pull(x)
+                y = y + pull(a, x)
                 x = x + y
             y = y - a * x / 2
         else:
             for _ in range(match.stride):
-                x, y = _step(family, x, y, pull, g)
-        return np.concatenate([q[1:] - x, v[1:] - y])
+                x, y = _step(family, x, y, partial(pull, a), g)
+        return np.concatenate([q[1:] - x, v[1:] - y], axis=1)
+
+    def exact(a: Floats, x: Floats) -> Floats:
+        return -a * x
 
     free = [0, 1] if family.damped else [0]
-    start = np.array([match.a, match.g])
-    rows = missed(start, None).reshape(2, -1)
+    start = np.array([[match.a, match.g]])
+    rows = missed(start, exact).reshape(2, -1)
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
     slopes = []
     for i in free:
         shift = np.zeros(2)
         shift[i] = 1e-6 * match.a if i == 0 else 1e-6
-        slopes.append((missed(start + shift, None) - missed(start - shift, None)) / (2 * shift[i]))
+        slopes.append((missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift[i]))
     columns = np.stack(slopes, axis=1) * scale[:, None]
-
-    def change(left: Floats, weight: Floats | float = 1.0) -> Floats:
-        weights = weight * np.ones(len(left))
-        return np.asarray(np.linalg.lstsq(columns * weights[:, None], left * weights, rcond=None)[0])
-
+    if not np.all(np.isfinite(columns)):
+        return False
     # what another stiffness takes away is explained without any quantum
+    inverse = np.linalg.pinv(columns).T
     plain = start.copy()
-    plain[free] -= change(missed(start, None) * scale)
-    without = missed(plain, None) * scale
+    plain[:, free] -= missed(start, exact) * scale @ inverse
+    without = missed(plain, exact) * scale
     before = float(np.sqrt(np.mean(without**2)))
     counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - len(free)
     if counted <= 0:
@@ -128,27 +130,39 @@ def reproduced(
     most = min(EXPLAINED, CHANCE ** (1 / counted))
     single = float(over_single(mass))
     factors = [x * y for x in (1.0, 1.0 + excess) for y in dict.fromkeys((1.0, single))]
-    ways = (False, True) if family.name == "velocity-verlet" else (False,)
-    for leaps, cut, factor in product(ways, FORCES[precision], factors):
-        values = start.copy()
+    quanta = kick * np.array(factors)[:, None]
+    forces, n = FORCES[precision], len(factors)
+
+    def cut(a: Floats, x: Floats) -> Floats:
+        # every force with all factors, one below the other
+        x = np.broadcast_to(x, (len(a), x.shape[-1]))
+        parts = ((f, a[i : i + n], x[i : i + n]) for f, i in zip(forces, range(0, len(a), n), strict=True))
+        return np.concatenate([quanta * f(b / kick, y) for f, b, y in parts])
+
+    for leaps in (False, True) if family.name == "velocity-verlet" else (False,):
+        values = np.repeat(start, len(forces) * n, axis=0)
         for turn in range(REFINED):
-            left = missed(values, cut, factor, leaps=leaps) * scale
-            share = float(np.sqrt(np.mean(left**2))) / before
-            if share <= most:
+            left = missed(values, cut, leaps=leaps) * scale
+            share = np.sqrt(np.mean(left**2, axis=1)) / before
+            if np.any(share <= most):
                 return True
-            if not np.isfinite(share):
+            if not np.any(np.isfinite(share)):
                 break
+            if 2 * turn <= REFINED:
+                values[:, free] -= left @ inverse
+                continue
             # few are left that are cut to the wrong side, and those are outliers
-            off = 1 + (left / (np.median(np.abs(left)) + 0.1 * before)) ** 2
-            values[free] -= change(left, 1 / off if 2 * turn > REFINED else 1.0)
+            usual = np.median(np.abs(left), axis=1, keepdims=True)
+            weight = 1 / (1 + (left / (usual + 0.1 * before)) ** 2)
+            values[:, free] -= least_squares(columns * weight[:, :, None], left * weight)[0]
     return False
 
 
 def _step(
-    family: Family, q: Floats, v: Floats, pull: Callable[[Floats], Floats], g: float
+    family: Family, q: Floats, v: Floats, pull: Callable[[Floats], Floats], g: Floats
 ) -> tuple[Floats, Floats]:
     """One step on (q, v h), with h**2 F/m from `pull` and the friction gamma h."""
-    inside = 0.0 if family.stages else g
+    inside = 0 * g if family.stages else g
     if family.stability[0]:
         scheme = SCHEMES[family.scheme]
         slopes: list[tuple[Floats, Floats]] = []
