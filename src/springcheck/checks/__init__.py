@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -36,8 +36,8 @@ from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 __all__ = [
     "ALL", "CHECKS", "CONTRACTED", "TELLING", "THOROUGH", "Bench", "Case", "Check", "Experiment", "Run",
     "arithmetic", "closed_form", "energies", "first_off", "frequency", "judge",
-    "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "start", "step_defect", "tolerance",
-    "tolerance_bound", "worst",
+    "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "start", "status", "step_defect",
+    "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 Check: TypeAlias = check.Check[Case]
@@ -76,14 +76,22 @@ THOROUGH: tuple[Experiment, ...] = (
 ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
 
 
-TELLING = frozenset(one.name for one in ALL if one.family in ("motion", "map", "law") and one is not momentum)
-"""Checks that tell the scheme that a method claims from another one."""
+_TELLING = [one.name for one in ALL if one.family in ("motion", "map", "law") and one is not momentum]
+TELLING = frozenset(["identified", *_TELLING])
+"""Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""
 
 
 def not_judged(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
     """Methods of which there are verdicts, but none by a check that tells one scheme from another."""
     told = {v.method for v in verdicts if v.passed is not None and v.check in TELLING}
     return tuple(dict.fromkeys(v.method for v in verdicts if v.method not in told))
+
+
+def status(verdicts: Sequence[Verdict]) -> Literal[0, 1, 2]:
+    """Exit status: 0 all passed, 1 some verdict failed, 2 nothing measured, or a method not judged."""
+    if any(verdict.passed is False for verdict in verdicts):
+        return 1
+    return 2 if not_judged(verdicts) or not verdicts else 0
 
 
 def judge_thoroughly(

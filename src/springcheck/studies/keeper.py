@@ -19,6 +19,7 @@ from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
+from springcheck.store import Draft, Table
 from springcheck.studies import provenance
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
@@ -27,15 +28,15 @@ if TYPE_CHECKING:
     from springcheck.studies.tables import Form
 
 __all__ = [
-    "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read", "restoring",
+    "Draft", "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read",
+    "restoring",
 ]  # fmt: skip
 
 T = TypeVar("T")
-Table = store.Table
 
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
-digest = store.digest
-"""Trajectories of a store, read in pieces."""
+digest, attributes = store.digest, store.attributes
+"""Trajectories of a store, read in pieces, and what is known of one besides its frames."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,11 +175,9 @@ class Keeper:
         """StoreError where there is no space for so many trajectories of a scene."""
         store.need_space(self._writing.path, store.size(scene) * runs)
 
-    @contextmanager
-    def draft(self, label: Label, scene: Scene) -> Iterator[Draft]:
+    def draft(self, label: Label, scene: Scene) -> Draft:
         """A writer of one trajectory."""
-        with self._writing.draft(str(label), scene) as draft:
-            yield Draft(draft)
+        return self._writing.draft(str(label), scene)
 
     def commit_run(self, scene: Scene, comparison: Comparison, verdicts: Sequence[Verdict]) -> None:
         """Put the trajectories and what was found of them into the store."""
@@ -194,18 +193,6 @@ class Keeper:
         if self._journal is not None:
             text = json.dumps(document, allow_nan=False)
             self._journal.commit(scene, documents={name: text})
-
-
-class Draft:
-    """A trajectory that is being written."""
-
-    def __init__(self, draft: store.Draft) -> None:
-        self._draft = draft
-        self.append = draft.append
-
-    def finish(self, run: Trajectory) -> str:
-        """Keep it, with what is known of the run besides its frames -> digest."""
-        return self._draft.finish(store.attributes(run))
 
 
 @contextmanager

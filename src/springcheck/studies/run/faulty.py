@@ -9,7 +9,7 @@ from springcheck.errors import MethodError, nearest
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
-from springcheck.studies.keeper import Draft
+from springcheck.studies.keeper import Draft, attributes
 from springcheck.studies.run.result import FAULT
 
 MOST_NUMBERS = 10**7
@@ -48,7 +48,7 @@ class Broken:
         energy = made.energy if "energy" in scene.quantities else None
         draft.append(made.t, made.q, made.p, energy)
         origin = {"engine": "broken on purpose", "method": self.about, "velocity": "as it says"}
-        draft.finish(replace(made, origin=origin))
+        draft.finish(attributes(replace(made, origin=origin)))
 
 
 def broken(text: str) -> Broken:

@@ -132,7 +132,8 @@ def run(
             try:
                 with kept.draft(label, scene) as draft:
                     told = bar.of(label, scene.steps)
-                    draft.finish(simulate.play(scene, label, draft.append, progress=told))
+                    made = simulate.play(scene, label, draft.append, progress=told)
+                    draft.finish(keeper.attributes(made))
             except MethodError as error:
                 # what only shows as an engine starts; a method that was asked for by name must not go missing
                 if str(label) in methods or len(labels) == 1:
@@ -351,7 +352,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 mine = replace(scene, quantities=quantities)
                 with kept.draft(label, mine) as draft:
                     record = simulate.play(mine, label, draft.append, progress=bar.of(label, scene.steps))
-                    digest = draft.finish(record)
+                    digest = draft.finish(keeper.attributes(record))
                 source = kept.sources()[name]
                 found.append(
                     Repeat(

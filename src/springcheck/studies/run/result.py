@@ -74,10 +74,8 @@ class Report:
 
     @property
     def status(self) -> Literal[0, 1, 2]:
-        """Exit status: 0 all passed, 1 some verdict failed, 2 nothing measured, or a method not judged."""
-        if any(verdict.passed is False for verdict in self.verdicts):
-            return 1
-        return 2 if self.not_judged or not self.verdicts else 0
+        """Exit status of these verdicts."""
+        return checks.status(self.verdicts)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
