@@ -453,6 +453,13 @@ def test_anharmonic_motion_is_called_so_and_coupled_motion_judged_by_its_modes()
         (lambda c: (0 * c.t, c.q, c.p), "times are equal"),
         (lambda c: (c.t, np.where(c.t[:, None] > c.t[7], np.nan, c.q), c.p), "frame 8"),
         (lambda c: (c.t, c.q[:-1], c.p), "shape"),
+        (
+            lambda c: (c.t, 1e-200 * c.q, 1e-200 * c.p),
+            "positions are of the size .*e-201: give",
+        ),
+        (lambda c: (c.t, 1e200 * c.q, 1e200 * c.p), "positions are of the size .*e.199: give"),
+        (lambda c: (1e-200 * c.t, c.q, 1e200 * c.p), "times are of the size .*e-20"),
+        (lambda c: (c.t, c.q, 1e-100 * c.p), "velocities times the interval are of the size"),
         (lambda c: (c.t, c.t[:, None] * 0.3 + 1, 0 * c.p + 0.3 * c.m), "straight line"),
         (lambda c: (c.t, c.q[0] * (-1.0) ** np.arange(101)[:, None], 0 * c.p), "do not span"),
     ],
@@ -462,6 +469,23 @@ def test_states_that_cannot_show_a_map_are_refused_with_a_reason(change, words: 
     t, q, p = change(made)
     with pytest.raises(IdentificationError, match=words):
         identify(t, q, p, mass=made.m)
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ({"stiffness": np.nan}, "stiffness nan"),
+        ({"friction": np.inf}, "friction inf"),
+        ({"step": 0.0}, "step 0"),
+        ({"mass": 1e-90}, "mass 1e-90"),
+        ({"stiffness": [1.0, 2.0]}, "stiffness of shape"),
+    ],
+)
+@pytest.mark.parametrize("alone", [False, True])
+def test_what_is_stated_is_a_number_of_a_size_or_refused(stated, words: str, alone: bool) -> None:
+    made = case("velocity-verlet", np.random.default_rng(20))
+    with pytest.raises(IdentificationError, match=words):
+        identify(made.t, made.q[:, 0], v=None if alone else made.p[:, 0], **stated)
 
 
 def test_the_document_is_json_with_the_fields_of_the_command() -> None:

@@ -280,6 +280,8 @@ def _hides(states: tuple[Floats, ...], stride: int) -> bool:
     scale = np.array([np.std(q) or 1.0, np.std(v) or 1.0])
     z = np.stack([q, v], axis=1) / scale
     size = np.sqrt(np.sum(z[:-1] ** 2 + z[1:] ** 2, axis=1, keepdims=True))
+    # squares of what has died down are 0
+    size = np.where(size > 1e-100, size, np.inf)
     columns = np.concatenate([z[:-1], np.ones((len(z) - 1, 1))], axis=1) / size
     unit = np.sqrt(np.sum(columns**2, axis=0))
     fitted = np.linalg.lstsq(columns / unit, z[1:] / size, rcond=None)[0]

@@ -47,7 +47,9 @@ class Evidence:
             + z[:-1].max(axis=1)
             + 2 * float(np.max(np.abs(self.found.centre / self.found.size)))
         )
-        return np.asarray(8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1))
+        # at rest in 0 nothing is rounded
+        size = 8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1)
+        return np.asarray(np.maximum(size, np.finfo(np.float64).tiny))
 
 
 def title(scheme: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
+from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
@@ -183,12 +184,7 @@ def identify_file(
     """
     given = {name: value for name, value in stated.items() if value is not None}
     for name, value in given.items():
-        # beyond these sizes the squares of numbers are none
-        if not 1e-150 < abs(value) < 1e150 or (name == "mass" and value < 0):
-            if value == 0 and name in ("stiffness", "friction"):
-                continue
-            needed = "a number of a size from 1e-150 to 1e150, a mass above 0"
-            raise SpringcheckError(f"--{name} {value:g}: {needed} is needed")
+        of_size(f"--{name}", value, zero=name in ("stiffness", "friction"))
     found = {}
     for states in read(path, trajectory, columns, given.get("step")):
         try:

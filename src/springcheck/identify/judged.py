@@ -9,7 +9,7 @@ import numpy as np
 from springcheck.errors import IdentificationError
 from springcheck.identify import coupled
 from springcheck.identify.fit import ROUNDING, Map, fit
-from springcheck.identify.record import Record
+from springcheck.identify.record import SIZES, Record
 from springcheck.identify.search import COARSE
 
 
@@ -17,7 +17,7 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     """The oscillators that can be judged, in a record of their own where they are normal modes; their maps;
     and notes on those that cannot."""
     spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
-    moving = np.flatnonzero(spread > 0).tolist()
+    moving = np.flatnonzero(spread > SIZES[0]).tolist()
     if not moving:
         raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
     still = len(spread) - len(moving)

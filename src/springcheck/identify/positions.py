@@ -12,7 +12,7 @@ from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES, G_ROUNDING, HELD, Family
 from springcheck.identify.fit import ROUNDING
 from springcheck.identify.match import Match
-from springcheck.identify.record import Record
+from springcheck.identify.record import SIZES, Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
 from springcheck.identify.search import FEW, SINGLE_ROOM, Joint, distinct, numbers
@@ -33,7 +33,7 @@ def identify_positions(
 ) -> Identification:
     """The schemes that may have made these positions.  Raises IdentificationError where they show none."""
     notes = [*notes, ALONE]
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0).tolist()
+    moving = np.flatnonzero(np.ptp(record.q, axis=0) > SIZES[0]).tolist()
     if not moving:
         raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
     if len(record.q) < FEWEST_FRAMES:

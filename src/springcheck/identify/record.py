@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,9 @@ FEWEST = 5
 
 LEAST = 2.0**-102
 """Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
+
+SIZES = 1e-75, 1e75
+"""Sizes of numbers whose fourth powers are numbers of double precision still."""
 
 SAMPLE = 500
 """Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
@@ -178,13 +180,23 @@ def _alive(positions: Floats, moving: Floats) -> int:
     return last + 1 if last + 1 >= FEWEST else len(positions)
 
 
-def _masses(mass: ArrayLike | None, n: int) -> Floats | None:
-    if mass is None:
+def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -> Floats | None:
+    """A number that is stated of n oscillators, or of each (n,): a mass of `SIZES`, or what may be a product
+    of two, and 0 where that says something.  Raises IdentificationError."""
+    if x is None:
         return None
-    out = np.asarray(mass, dtype=np.float64)
-    if out.size not in {1, n} or not np.all(np.isfinite(out)) or np.any(out <= 0):
-        raise IdentificationError(f"mass must be one positive number, or {n}; found {mass!r}")
-    return np.broadcast_to(out.ravel(), (n,)).copy()
+    out = np.ravel(np.asarray(x, dtype=np.float64))
+    of_mass = name.endswith("mass")
+    least, most = SIZES if of_mass else (SIZES[0] ** 2, SIZES[1] ** 2)
+    good = (least < np.abs(out)) & (np.abs(out) < most) & ((out > 0) | (not of_mass)) | ((out == 0) & zero)
+    if out.size not in {1, n} or not np.all(good):
+        found = f"{out[~good][0]:g}" if not np.all(good) else f"of shape {np.shape(x)}"
+        each = f", or {n}," if n > 1 else ""
+        above = ", above 0" if of_mass else ""
+        raise IdentificationError(
+            f"{name} {found}: one number{each} of a size from {least:g} to {most:g}{above}, is needed"
+        )
+    return np.broadcast_to(out, (n,)).copy()
 
 
 def read(
@@ -209,8 +221,21 @@ def read(
             raise IdentificationError(
                 f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
             )
-    interval, jitter, clock, slips = _interval(times)
-    masses = _masses(mass, positions.shape[1])
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        interval, jitter, clock, slips = _interval(times)
+        sizes = {
+            "times": abs(float(interval)),
+            "positions": float(np.max(np.abs(positions), initial=0.0)),
+            "velocities": float(np.max(np.abs(given[-1]), initial=0.0) * abs(float(interval))),
+        }
+    for name, size in sizes.items():
+        if size and not SIZES[0] < size < SIZES[1]:
+            way = " times the interval" if name == "velocities" else ""
+            raise IdentificationError(
+                f"{name}{way} are of the size {size:.1g}: give them in units in which that is from "
+                f"{SIZES[0]:g} to {SIZES[1]:g}"
+            )
+    masses = of_size("mass", mass, positions.shape[1])
     if p is not None and v is not None and masses is None:
         weight = np.sum(given[1] ** 2, axis=0)
         masses = np.sum(given[0] * given[1], axis=0) / np.where(weight == 0, 1.0, weight)
@@ -253,8 +278,7 @@ def stated_stride(record: Record, step: float | None, notes: list[str]) -> int |
     """Steps to a frame of a stated step; -1, and a note, where it does not divide the interval."""
     if step is None:
         return None
-    if not math.isfinite(step) or step == 0:
-        raise IdentificationError(f"step must be a finite number other than 0; found {step!r}")
+    of_size("step", step)
     ratio = float(record.interval / np.longdouble(step))
     stride = round(ratio)
     if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):

@@ -72,6 +72,7 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     stored = np.maximum(record.q_quantum[:, j] / np.sqrt(12.0), 0.0)
     size = np.abs(q).astype(np.float64)
     size = size[2:] + 2 * size[1:-1] + size[:-2]
+    size = np.maximum(size, 1e-30 * np.max(size))
     noise = ROUNDING * size
     # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
     amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
@@ -119,7 +120,7 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
 def _phase(alpha: np.longdouble, beta: np.longdouble) -> float:
     """Phase between two frames, 0 where nothing turns."""
     square = 4 * alpha - (alpha + beta) ** 2
-    return float(np.arctan2(np.sqrt(square), 2 - alpha - beta)) if square > 0 else 0.0
+    return float(np.arctan2(np.sqrt(square), 2 - alpha - beta)) if square > 0 and beta < 1 else 0.0
 
 
 def _around(x: Floats) -> Floats:

@@ -26,7 +26,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.positions import identify_positions
-from springcheck.identify.record import Record, read, stated_stride
+from springcheck.identify.record import Record, of_size, read, stated_stride
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.search import (
     FEW,
@@ -86,11 +86,12 @@ def identify_arrays(
         alone = read(t, q, None, np.zeros(np.shape(q)), mass)
         return _of_positions(alone, stiffness, step, friction)
     record = read(t, q, p, v, mass)
+    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
     given = record
     record, moving, maps, notes = judged(record)
-    stated = None
-    if stiffness is not None and record is given:
-        stated = np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
+    if record is not given:
+        stated = None
     stride = stated_stride(record, step, notes)
     base = [_terms(record, j, stated) for j in moving]
     if record.momenta and stated is None:
@@ -146,11 +147,10 @@ def _of_positions(
     record: Record, stiffness: ArrayLike | None, step: float | None, friction: float | None
 ) -> Identification:
     notes: list[str] = []
-    stated = None
-    if stiffness is not None:
-        stated = np.broadcast_to(np.asarray(stiffness, float).ravel(), record.q.shape[1])
-        if record.mass is None:
-            notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
+    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
+    if stated is not None and record.mass is None:
+        notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
     stride = stated_stride(record, step, notes)
     return identify_positions(record, stated, stride, friction, notes)
 
