@@ -61,10 +61,13 @@ def pictures(found):
     return {"squares": figure}
 """
 STUDY = """
-from springcheck.studies.study import Study, store_options
-def options(parser):
-    store_options(parser, "squares.h5")
-STUDY = Study(name="squares", about="squares of whole numbers", options=options, package="squares_study")
+from springcheck.studies.study import Study, store_arguments
+STUDY = Study(
+    name="squares",
+    about="squares of whole numbers",
+    arguments=store_arguments("squares.h5"),
+    package="squares_study",
+)
 """
 
 

@@ -117,7 +117,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     for one in [one for one in every if one.name in words[:1]] or every:
         parser_of = commands.add_parser(one.name, help=one.about)
         if one.name in words:
-            one.options(parser_of)
+            for names, how in one.arguments:
+                parser_of.add_argument(*names, **how)
         if isinstance(one, Study):
             parser_of.set_defaults(command=partial(_study, one), keeps=one.keeps)
         else:

@@ -6,7 +6,7 @@ Heavy modules are imported by the command that needs them.
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from typing import Any
 from springcheck import interrupts
 from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
-from springcheck.studies.study import JSON, QUIET, Argument, engine_option
+from springcheck.studies.study import ENGINE, JSON, QUIET, Argument, argument
 from springcheck.studies.team import processes
 
 
@@ -30,15 +30,6 @@ class Command:
     perform: Callable[[Namespace], int]
     """Does what it is for; returns the exit status."""
     arguments: tuple[Argument, ...]
-    engines: bool = False
-    """Whether a call may bring engines."""
-
-    def options(self, parser: ArgumentParser) -> None:
-        """Add its arguments to its parser."""
-        for names, how in self.arguments:
-            parser.add_argument(*names, **how)
-        if self.engines:
-            engine_option(parser)
 
 
 def _inspect(options: Namespace) -> int:
@@ -266,30 +257,26 @@ def _list(options: Namespace) -> int:
     return 0
 
 
-def _argument(*names: str, **how: Any) -> Argument:
-    return names, how
-
-
-_FILE = _argument("file", metavar="FILE")
-_GROUP = _argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
-_NAMES = _argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
-_STEPS = _argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
+_FILE = argument("file", metavar="FILE")
+_GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
+_NAMES = argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
+_STEPS = argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (
     Command("inspect", "what is in a store", _inspect, (
         _FILE,
-        _argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory"),
-        _argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
-        _argument("--verdicts", action="store_true", help="print every verdict with its reason"),
+        argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory"),
+        argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
+        argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
     )),
     Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
         _FILE,
-        _argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
-        _argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
-        _argument("--quantity", metavar="NAME",
+        argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
+        argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
+        argument("--quantity", metavar="NAME",
                   help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome"),
-        _argument("--over", metavar="FIELD[,FIELD]",
+        argument("--over", metavar="FIELD[,FIELD]",
                   help="of an ensemble: over which of the fields that were varied"),
         _NAMES,
         _STEPS,
@@ -298,34 +285,35 @@ COMMANDS = (
     )),
     Command("report", "a store as one HTML page that checks itself in a browser", _report, (
         _FILE,
-        _argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
+        argument("-o", "--output", metavar="OUT.html", help="default: the store's name, .html"),
         QUIET,
     )),
     Command("show", "a shipped scene as a file to start from", _show, (
-        _argument("scene", metavar="SCENE"),
-        _argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
+        argument("scene", metavar="SCENE"),
+        argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
     )),
     Command("explain", "a check, scheme, fault or finding in words", _explain, (
-        _argument("word", metavar="NAME", help="a check, scheme, engine:method, fault or finding"),
-    ), engines=True),
+        argument("word", metavar="NAME", help="a check, scheme, engine:method, fault or finding"),
+        ENGINE,
+    )),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
-        _argument("files", metavar="FILE", nargs="*", help="stores, or any H5MD files with velocities"),
+        argument("files", metavar="FILE", nargs="*", help="stores, or any H5MD files with velocities"),
         _GROUP,
-        _argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
-        _argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
-        _argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
+        argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
+        argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
+        argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
         _NAMES,
-        _argument("--step", type=float, metavar="H", help="is this the time step?"),
-        _argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
+        argument("--step", type=float, metavar="H", help="is this the time step?"),
+        argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
-        _argument("--workers", type=processes, default=1, metavar="N",
+        argument("--workers", type=processes, default=1, metavar="N",
                   help="processes that look at many files (default 1)"),
         JSON,
     )),
     Command("judge", "is a trajectory of any program what its scheme promises", _judge, (
-        _argument("file", metavar="FILE", help="a table, NPY, NPZ, extended XYZ, LAMMPS dump, H5MD ..."),
-        _argument("--scene", required=True, metavar="SCENE", help="the scene that it is of"),
-        _argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
+        argument("file", metavar="FILE", help="a table, NPY, NPZ, extended XYZ, LAMMPS dump, H5MD ..."),
+        argument("--scene", required=True, metavar="SCENE", help="the scene that it is of"),
+        argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
         _NAMES,
         _GROUP,
         _STEPS,
@@ -333,8 +321,8 @@ COMMANDS = (
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
-        _FILE, _argument("label", metavar="LABEL"), _argument("output", metavar="OUT.h5md"),
+        _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
-    Command("list", "scenes, engines with their versions, checks", _list, (JSON,), engines=True),
+    Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
 )  # fmt: skip
 """Every command that is no study, in the order in which `--help` names them."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cache, partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
 import msgspec
 import numpy as np
@@ -21,6 +22,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import Draft, Table
 from springcheck.studies import provenance
+from springcheck.studies import team as teams
+from springcheck.studies.choose import LeftOut
 from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
 
@@ -79,6 +82,8 @@ class Keeper:
         team: Team = ALONE,
     ) -> None:
         self._journal, self.team = journal, team
+        self.path: Path | None = None
+        """Of the store, as it was given."""
         self._finished = journal.tables() if journal else {}
         self.progress = progress
         self._by: dict[str, list[dict[str, str]]] = {}
@@ -195,6 +200,19 @@ class Keeper:
             self._journal.commit(scene, documents={name: text})
 
 
+class How(TypedDict, total=False):
+    """Whether an existing store is written anew, who is told of the progress, and who measures."""
+
+    force: bool
+    progress: Progress | None
+    team: Team
+
+
+def how(options: Namespace, progress: Progress | None) -> How:
+    """What the command line asks for."""
+    return {"force": options.force, "progress": progress, "team": teams.of(options)}
+
+
 @contextmanager
 def kept(
     path: str | Path,
@@ -209,7 +227,9 @@ def kept(
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
     with store.open_new(path, command, force=force) as journal:
-        yield Keeper(journal, progress, team)
+        found = Keeper(journal, progress, team)
+        found.path = Path(path)
+        yield found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,6 +248,11 @@ class Kept:
     def scene(self) -> Scene:
         """The scene that was studied."""
         return stored_scene(self.path)
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """The methods that were not measured."""
+        return tuple(LeftOut(**one) for one in self.document["left_out"])
 
 
 def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path], T]]:

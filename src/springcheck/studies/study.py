@@ -8,7 +8,7 @@ are charts for the report page.
 from __future__ import annotations
 
 import gc
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from springcheck.store import Summary
     from springcheck.studies.charts import Bank
     from springcheck.text.lines import Lines
+
+
+Argument = tuple[tuple[str, ...], dict[str, Any]]
+"""An argument of a command: its names, and what argparse is told of it."""
 
 
 class Progress(Protocol):
@@ -48,8 +52,8 @@ class Study:
     name: str
     """Of its command, of its folder, and of its document in a store."""
     about: str
-    options: Callable[[ArgumentParser], None]
-    """Adds the options of its command."""
+    arguments: tuple[Argument, ...]
+    """Of its command."""
     trajectories: bool = False
     """Kept in a store as trajectories, not as a document."""
     chooses: tuple[str, ...] = ()
@@ -113,50 +117,43 @@ class Study:
         return self.package or f"springcheck.studies.{self.name}"
 
 
-def store_options(parser: ArgumentParser, default: str = "SCENE.h5") -> None:
-    """The options of every study that is kept in a store: where, which methods, what runs beside them."""
-    parser.add_argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})")
-    label = "engine:method[@platform[-precision]] or a glob such as 'own:*'"
-    repeatable(parser, "--method", "LABEL", label)
-    engine_option(parser)
-    function = "your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION"
-    repeatable(parser, "--stepper", "MODULE:FUNCTION", function)
-    program = "a program in any language, as 'name=./engine {scene} {out}'"
-    repeatable(parser, "--command", "NAME=COMMAND", program, dest="program")
-    scheme = "the scheme of your functions and programs, or of one of them"
-    repeatable(parser, "--scheme", "SCHEME|NAME=SCHEME", scheme)
-    parser.add_argument(
-        "--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"
-    )
-    parser.add_argument("--force", action="store_true", help="write an existing store anew")
-    report_options(parser)
+def argument(*names: str, **how: Any) -> Argument:
+    """An argument of a command."""
+    return names, how
 
 
-def repeatable(parser: ArgumentParser, name: str, metavar: str, about: str, **more: Any) -> None:
+def repeatable(name: str, metavar: str, about: str, **more: Any) -> Argument:
     """An option that may be given more than once."""
-    about = f"{about}; repeatable"
-    parser.add_argument(name, action="append", default=[], metavar=metavar, help=about, **more)
+    return argument(name, action="append", default=[], metavar=metavar, help=f"{about}; repeatable", **more)
 
 
-def engine_option(parser: ArgumentParser) -> None:
-    """Engines that a call brings."""
-    repeatable(parser, "--engine", "FILE.py", "an engine of your own, for this call")
+JSON = argument("--json", action="store_true", help="one JSON document on standard output")
+QUIET = argument("--quiet", action="store_true", help="print nothing but mistakes")
+FORCE = argument("--force", action="store_true", help="write an existing store anew")
+ENGINE = repeatable("--engine", "FILE.py", "an engine of your own, for this call")
+SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file")
+"""Arguments of many commands."""
 
 
-Argument = tuple[tuple[str, ...], dict[str, Any]]
-JSON: Argument = (("--json",), {"action": "store_true", "help": "one JSON document on standard output"})
-QUIET: Argument = (("--quiet",), {"action": "store_true", "help": "print nothing but mistakes"})
-"""Options of many commands: names, and what argparse is told of them."""
-
-
-def report_options(parser: ArgumentParser) -> None:
-    """The options of every study."""
-    for names, how in (JSON, QUIET):
-        parser.add_argument(*names, **how)
-
-
-def scene_option(parser: ArgumentParser, **more: Any) -> None:
-    """The scene of a study."""
-    parser.add_argument(
-        "scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file", **more
-    )
+def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
+    """Those of every study that is kept in a store: where, which methods, what runs beside them."""
+    return (
+        argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})"),
+        repeatable("--method", "LABEL", "engine:method[@platform[-precision]] or a glob such as 'own:*'"),
+        ENGINE,
+        repeatable(
+            "--stepper", "MODULE:FUNCTION",
+            "your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION",
+        ),
+        repeatable(
+            "--command", "NAME=COMMAND", "a program in any language, as 'name=./engine {scene} {out}'",
+            dest="program",
+        ),
+        repeatable(
+            "--scheme", "SCHEME|NAME=SCHEME", "the scheme of your functions and programs, or of one of them"
+        ),
+        argument("--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"),
+        FORCE,
+        JSON,
+        QUIET,
+    )  # fmt: skip

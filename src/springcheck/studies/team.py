@@ -6,11 +6,13 @@ back; so the numbers are the same whoever measures them.
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from springcheck.studies.study import Argument, argument
 
 if TYPE_CHECKING:
     from springcheck.doors import Brought
@@ -64,28 +66,26 @@ def _after(brought: Brought, part: Callable[[], T]) -> T:
 ALONE = Processes()
 
 
-def options(parser: ArgumentParser, default: int = 1) -> None:
-    """The options of a study that can be measured by many."""
-    parser.add_argument(
-        "--workers",
-        type=processes,
-        default=default,
-        metavar="N",
-        help=f"processes that measure at the same time (default {default})",
-    )
-    parser.add_argument(
-        "--cluster",
-        metavar="tcp://HOST:PORT|FILE",
-        help="the workers of a dask scheduler, by its address or its file; or N workers of a queue such as "
-        "SLURM's, by a file of dask-jobqueue",
-    )
-
-
 def processes(text: str) -> int:
     """A number of them on the command line."""
     if not (text.isdecimal() and 0 < int(text) <= 4096):
         raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to 4096 is needed")
     return int(text)
+
+
+def arguments(default: int = 1) -> tuple[Argument, ...]:
+    """Those of a study that can be measured by many."""
+    return (
+        argument(
+            "--workers", type=processes, default=default, metavar="N",
+            help=f"processes that measure at the same time (default {default})",
+        ),
+        argument(
+            "--cluster", metavar="tcp://HOST:PORT|FILE",
+            help="the workers of a dask scheduler, by its address or its file; or N workers of a queue such "
+            "as SLURM's, by a file of dask-jobqueue",
+        ),
+    )  # fmt: skip
 
 
 def of(options: Namespace) -> Team:

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-
 from springcheck.studies import team
-from springcheck.studies.study import Study, store_options
-
-
-def _options(parser: ArgumentParser) -> None:
-    team.options(parser)
-    store_options(parser, "census.h5")
-
+from springcheck.studies.study import Study, store_arguments
 
 STUDY = Study(
     name="census",
     about="which integrator every installed engine really runs, by its states",
-    options=_options,
+    arguments=(*team.arguments(), *store_arguments("census.h5")),
 )

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -19,12 +20,10 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
-from springcheck.studies.keeper import Keeper, each
+from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.study import Progress
-from springcheck.studies.team import ALONE, Team
 
 EVERY = "*:*"
 """Every method of every engine; of an engine that has default ones, those."""
@@ -57,7 +56,7 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
     # workers have ended: nothing of ours runs beside what is timed
     entries = [_timed(label, one, kept) for label, one in zip(usable, found, strict=True)]
-    return Census(entries=tuple(entries), left_out=tuple(left), resumed=kept.resumed)
+    return Census(entries=tuple(entries), left_out=tuple(left), resumed=kept.resumed, path=kept.path)
 
 
 def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
@@ -79,19 +78,10 @@ def _absence(label: Label) -> str | None:
     return None
 
 
-def record(
-    path: str | Path,
-    methods: Sequence[str] = (),
-    *,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
-) -> Census:
+def record(path: str | Path, methods: Sequence[str] = (), **how: Unpack[How]) -> Census:
     """Like `measure`, kept in a store; an unfinished census of the same command is resumed."""
     labels = engines.match(tuple(methods) or (EVERY,))
-    with keeper.kept(
-        path, keeper.command("census", labels), force=force, progress=progress, team=team
-    ) as kept:
+    with keeper.kept(path, keeper.command("census", labels), **how) as kept:
         census = measure(methods, kept=kept)
         kept.commit("census", census.document())
     return census
@@ -99,9 +89,7 @@ def record(
 
 def perform(options: Namespace, progress: Progress | None) -> Census:
     """What `springcheck census` does."""
-    path = Path(options.output or "census.h5")
-    found = record(path, options.method, force=options.force, progress=progress, team=teams.of(options))
-    return replace(found, path=path)
+    return record(options.output or "census.h5", options.method, **keeper.how(options, progress))
 
 
 @keeper.restoring("census")
@@ -109,7 +97,7 @@ def stored(kept: keeper.Kept) -> Census:
     """The census that `record` has kept.  StoreError where the file holds none."""
     return Census(
         entries=tuple(kept.found(ENTRIES, one["method"]) for one in kept.document["entries"]),
-        left_out=tuple(LeftOut(**one) for one in kept.document["left_out"]),
+        left_out=kept.left_out,
         path=kept.path,
     )
 

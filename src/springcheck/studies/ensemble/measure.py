@@ -11,7 +11,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -22,14 +22,12 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
-from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.choose import choose
 from springcheck.studies.ensemble.result import CELLS, Columns, Ensemble, Tally
 from springcheck.studies.ensemble.vary import Plan, Varied, plan, together
 from springcheck.studies.extremes.running import raw
-from springcheck.studies.keeper import Piece
+from springcheck.studies.keeper import How, Piece
 from springcheck.studies.study import Progress
-from springcheck.studies.team import ALONE, Team
 
 NUMBERS = 1 << 17
 """Numbers per array of a run: memory does not grow with the number of cells."""
@@ -42,15 +40,8 @@ def perform(options: Namespace, progress: Progress | None) -> Ensemble:
     scene = scenefile.load_scene(options.scene)
     text = scenefile.text_of(options.scene)
     cells = plan(options.vary, options.samples, options.seed, text=text)
-    return record(
-        scene,
-        cells,
-        Path(options.output or f"{scene.name}-ensemble.h5"),
-        options.method,
-        force=options.force,
-        progress=progress,
-        team=teams.of(options),
-    )
+    path = options.output or f"{scene.name}-ensemble.h5"
+    return record(scene, cells, path, options.method, **keeper.how(options, progress))
 
 
 def record(
@@ -58,21 +49,17 @@ def record(
     cells: Plan,
     path: str | Path,
     methods: Sequence[str] = (),
-    *,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
+    **how: Unpack[How],
 ) -> Ensemble:
     """Run every cell by every method and keep its numbers; chunks that are finished are reused.
 
     Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
     """
-    path = Path(path)
     labels, left = choose(scene, methods)
     fields = tuple(axis.field for axis in cells.axes)
     Varied(scene, cells).substitutions(cells.values(0))
     command = keeper.command("ensemble", labels, scene.digest, repr(cells))
-    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
+    with keeper.kept(path, command, **how) as kept:
         tallies = {str(label): Tally(method=str(label), smallest={}, largest={}) for label in labels}
         pieces = [
             Piece(
@@ -94,7 +81,7 @@ def record(
             tallies=tuple(tallies.values()),
             left_out=tuple(left),
             resumed=kept.resumed,
-            path=path,
+            path=kept.path,
         )
         kept.commit("ensemble", ensemble.document(), scene)
     return ensemble
@@ -109,7 +96,7 @@ def stored(kept: keeper.Kept) -> Ensemble:
         fields=tuple(known["fields"]),
         grid=known["grid"],
         tallies=tuple(Tally(**one) for one in known["methods"]),
-        left_out=tuple(LeftOut(**one) for one in known["left_out"]),
+        left_out=kept.left_out,
         path=kept.path,
     )
 

@@ -12,22 +12,21 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from typing import Unpack
 
 from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
-from springcheck.studies.choose import LeftOut, sorted_out
+from springcheck.studies.choose import sorted_out
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.planes import decade
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
-from springcheck.studies.keeper import Keeper, Piece, each
+from springcheck.studies.keeper import How, Keeper, Piece, each
 from springcheck.studies.stability import propagators
 from springcheck.studies.study import Progress
-from springcheck.studies.team import ALONE, Team
 
 
 def everything() -> tuple[str, ...]:
@@ -81,6 +80,7 @@ def measure(
         windows=tuple(windows(found)),
         left_out=tuple(left_out),
         resumed=kept.resumed,
+        path=kept.path,
     )
 
 
@@ -127,9 +127,7 @@ def record(
     *,
     quick: bool = False,
     cells: int = 0,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
+    **how: Unpack[How],
 ) -> Atlas:
     """Like `measure`, kept in a store (see `keeper.kept`): a table for each method, and the document."""
     labels = engines.match(tuple(methods) or everything())
@@ -137,26 +135,21 @@ def record(
         raise SpringcheckError("--quick and --cells: fewer cells or more, not both")
     size = "quick" if quick else f"{cells} cells" if cells else "whole"
     command = keeper.command("extremes", labels, size)
-    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
+    with keeper.kept(path, command, **how) as kept:
         atlas = measure(methods, quick=quick, cells=cells, kept=kept)
-        known = {"tables": kept.names, **atlas.document(cells=False)}
-        kept.commit("extremes", known)
+        kept.commit("extremes", {"tables": kept.names, **atlas.document(cells=False)})
     return atlas
 
 
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
     """What `springcheck extremes` does."""
-    path = Path(options.output or "extremes.h5")
-    atlas = record(
-        path,
+    return record(
+        options.output or "extremes.h5",
         options.method,
         quick=options.quick,
         cells=options.cells,
-        force=options.force,
-        progress=progress,
-        team=teams.of(options),
+        **keeper.how(options, progress),
     )
-    return replace(atlas, path=path)
 
 
 @keeper.restoring("extremes")
@@ -166,7 +159,7 @@ def stored(kept: keeper.Kept) -> Atlas:
     return Atlas(
         cells=tuple(cell for name in known["tables"] for cell in CELLS.found(kept.tables[name])),
         windows=tuple(Window(**window) for window in known["windows"]),
-        left_out=tuple(LeftOut(**one) for one in known["left_out"]),
+        left_out=kept.left_out,
     )
 
 

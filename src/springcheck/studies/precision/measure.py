@@ -19,7 +19,7 @@ from functools import partial
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -30,9 +30,8 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
 from springcheck.studies.choose import choose
-from springcheck.studies.keeper import Keeper
+from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
 from springcheck.studies.precision.points import POINTS, Point, points_of
@@ -48,7 +47,6 @@ from springcheck.studies.precision.sweeps import (
 )
 from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.studies.study import Progress
-from springcheck.studies.team import ALONE, Team
 from springcheck.text.wording import count
 
 BUDGET = 75.0
@@ -115,6 +113,7 @@ def study(
         machine=keeper.origin([sweep.label for sweep in sweeps]),
         tick=tick(),
         resumed=resumed,
+        path=kept.path,
     )
 
 
@@ -192,16 +191,14 @@ def record(
     path: str | Path,
     *,
     budget: float = BUDGET,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
+    **how: Unpack[How],
 ) -> PrecisionStudy:
     """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
 
     Points are kept as they are finished (see `keeper.kept`).
     """
     command = keeper.command("precision", labels, scene.digest)
-    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
+    with keeper.kept(path, command, **how) as kept:
         found = study(scene, labels, budget=budget, kept=kept)
         for summary in found.methods:
             form = points_of(scene)
@@ -218,17 +215,9 @@ def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
         raise SpringcheckError(f"--budget {budget}: a number of seconds above 0 is needed")
     scene = scenefile.load_scene(options.scene)
     labels, left = choose(scene, options.method)
-    path = Path(options.output or f"{scene.name}-precision.h5")
-    found = record(
-        scene,
-        labels,
-        path,
-        budget=budget,
-        force=options.force,
-        progress=progress,
-        team=teams.of(options),
-    )
-    return replace(found, left_out=tuple(left), path=path)
+    path = options.output or f"{scene.name}-precision.h5"
+    found = record(scene, labels, path, budget=budget, **keeper.how(options, progress))
+    return replace(found, left_out=tuple(left))
 
 
 def _open(sweeps: list[Sweep]) -> list[Sweep]:

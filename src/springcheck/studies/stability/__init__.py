@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-
 from springcheck.studies import team
-from springcheck.studies.study import Study, scene_option, store_options
+from springcheck.studies.study import SCENE, Study, store_arguments
 
-
-def _options(parser: ArgumentParser) -> None:
-    scene_option(parser)
-    team.options(parser)
-    store_options(parser, "SCENE-stability.h5")
-
-
-STUDY = Study(name="stability", about="limits of stability, measured against theory", options=_options)
+STUDY = Study(
+    name="stability",
+    about="limits of stability, measured against theory",
+    arguments=(SCENE, *team.arguments(), *store_arguments("SCENE-stability.h5")),
+)

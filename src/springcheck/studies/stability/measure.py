@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from springcheck import engines
 from springcheck.engines.contract import Label
@@ -21,22 +20,15 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
-from springcheck.studies.choose import LeftOut, sorted_out
-from springcheck.studies.keeper import Keeper, each
+from springcheck.studies.choose import sorted_out
+from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
 from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability, fastest
 from springcheck.studies.study import Progress
 from springcheck.studies.tables import Form
-from springcheck.studies.team import ALONE, Team
 
 
-def measure(
-    scene: Scene,
-    methods: Sequence[str] = (),
-    *,
-    kept: Keeper | None = None,
-) -> Stability:
+def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
 
     What an earlier call has finished (`kept`) is reused.
@@ -81,6 +73,7 @@ def measure(
         costs=tuple(row for rows in of_costs for row in rows),
         left_out=tuple(left_out),
         resumed=kept.resumed,
+        path=kept.path,
     )
 
 
@@ -88,15 +81,12 @@ def record(
     scene: Scene,
     path: str | Path,
     methods: Sequence[str] = (),
-    *,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
+    **how: Unpack[How],
 ) -> Stability:
     """Like `measure`, kept in a store (see `keeper.kept`): tables under /stability, and the document."""
     labels = engines.match(tuple(methods) or ("*",))
     command = keeper.command("stability", labels, scene.digest)
-    with keeper.kept(path, command, force=force, progress=progress, team=team) as kept:
+    with keeper.kept(path, command, **how) as kept:
         study = measure(scene, methods, kept=kept)
         kept.commit("stability", study.document(), scene)
     return study
@@ -105,11 +95,8 @@ def record(
 def perform(options: Namespace, progress: Progress | None) -> Stability:
     """What `springcheck stability` does."""
     scene = scenefile.load_scene(options.scene)
-    path = Path(options.output or f"{scene.name}-stability.h5")
-    study = record(
-        scene, path, options.method, force=options.force, progress=progress, team=teams.of(options)
-    )
-    return replace(study, path=path)
+    path = options.output or f"{scene.name}-stability.h5"
+    return record(scene, path, options.method, **keeper.how(options, progress))
 
 
 @keeper.restoring("stability")
@@ -127,5 +114,5 @@ def stored(kept: keeper.Kept) -> Stability:
         regions=under(REGIONS, "regions"),
         resonances=under(RESONANCES, "resonances"),
         costs=tuple(row for rows in under(COSTS, "costs") for row in rows),
-        left_out=tuple(LeftOut(**one) for one in kept.document["left_out"]),
+        left_out=kept.left_out,
     )
