@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 import springcheck
-from springcheck import checks, simulate
+from springcheck import checks, simulate, store
 from springcheck.physics import scenefile as scenes
+from springcheck.studies import keeper
 from springcheck.studies.faults import measure as trial
 from springcheck.studies.faults.measure import examine
 from springcheck.studies.faults.result import Clean, FaultReport, Result
@@ -129,14 +130,13 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     monkeypatch.setattr(trial, "_BATCH", 4)
     monkeypatch.setattr(trial, "BY_ENGINES", 0)
     monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))
-    monkeypatch.setattr("os.cpu_count", lambda: 1)
-    assert cli.main(["faults", "--json"]) == 0
+    assert cli.main(["faults", "--json", "--workers", "1"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
     assert document["limits"]["stiffness"]["step-defect"] < 1e-14
     assert document["clean_runs"] == 5
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["faults", "-o", "f.h5"]) == 0
+    assert cli.main(["faults", "-o", "f.h5", "--workers", "1"]) == 0
     said = capsys.readouterr().out
     assert "2 of 2 faults rejected" in said
     assert cli.main(["inspect", "f.h5"]) == 0
@@ -146,6 +146,18 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     assert [path.name for path in sorted(tmp_path.rglob("*.png"))] == ["faults.png"]
     assert cli.main(["faults", "-o", "f.h5"]) == 2
     assert "--force" in capsys.readouterr().err
+    assert store.check("f.h5") == []
+
+    def interrupt(done: float, whole: float, what: str = "") -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), keeper.kept("g.h5", "faults", progress=interrupt) as kept:
+        trial.study(kept=kept)
+    with keeper.kept("g.h5", "faults") as kept:
+        again = trial.study(kept=kept)
+    assert again.resumed == 3
+    assert again.document() == document
 
 
 def test_a_thorough_run_reports_its_experiments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

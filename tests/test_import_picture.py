@@ -39,7 +39,7 @@ HOMES = {
     "jinja2": ("cli/page/writing.py",),
     "markupsafe": ("cli/page/writing.py",),
     "rich": ("text/lines.py", "studies/run/text.py", "cli/output.py"),
-    "msgspec": ("physics/scenefile", "studies/keeper.py", "store"),
+    "msgspec": ("physics/scenefile", "studies/keeper.py", "studies/tables.py", "store"),
 }
 
 

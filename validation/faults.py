@@ -21,6 +21,7 @@ from arguments import arguments
 from springcheck import simulate
 from springcheck.studies.faults.measure import judged_labels, study
 from springcheck.studies.faults.result import FaultReport
+from springcheck.studies.keeper import Keeper
 from springcheck.studies.team import Processes
 
 SHARPEST = 5
@@ -41,7 +42,7 @@ def table(found: FaultReport) -> list[str]:
 def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
     arguments(__doc__)
-    found = study(simulate.run, judged_labels(), team=Processes(2))
+    found = study(simulate.run, judged_labels(), kept=Keeper(team=Processes(2)))
     for line in table(found):
         print(line)
     clean = found.clean

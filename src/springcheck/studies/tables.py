@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,6 +110,16 @@ class Rows(Form[Sequence[T]]):
         parts = [(one, _values(one, table)) for one in _fields(self.kind) if one.name != self.named]
         count = len(parts[0][1]) if parts else 0
         return [self.kind(**key, **{one.name: values[row] for one, values in parts}) for row in range(count)]
+
+
+class Documents(Form[T]):
+    """A result as a row of one text, its document in JSON: of results that are lists of names."""
+
+    def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
+        return {"document": [msgspec.json.encode(found).decode()]}, {}
+
+    def found(self, table: Table) -> T:
+        return msgspec.json.decode(str(table.columns["document"][0]), type=self.kind)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,5 +17,5 @@ STUDY = Study(
         JSON,
         QUIET,
     ),
-    keeps=lambda options: False,
+    keeps=lambda options: options.output is not None,
 )

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +19,12 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.faults import clean, steppers
-from springcheck.studies.faults.result import SEEN, Clean, FaultReport, Result, seen
+from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
+from springcheck.studies.keeper import Keeper, Piece
 from springcheck.studies.study import Progress
-from springcheck.studies.team import ALONE, Team
+from springcheck.studies.tables import Documents
 
 
 @cache
@@ -201,17 +200,17 @@ def judged_labels() -> list[str]:
 
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
-    labels, team = judged_labels(), teams.of(options)
+    labels = judged_labels()
     if options.output is None:
-        return study(simulate.run, labels, team=team, progress=progress)
-    named = keeper.command("faults", list(map(engines.parse, labels)))
-    with keeper.kept(options.output, named, force=options.force) as kept:
-        found = study(simulate.run, labels, team=team, progress=progress)
+        return study(simulate.run, labels, kept=Keeper(progress=progress, team=teams.of(options)))
+    command = keeper.command("faults", list(map(engines.parse, labels)))
+    with keeper.kept(options.output, command, **keeper.how(options, progress)) as kept:
+        found = study(simulate.run, labels, kept=kept)
         record(kept, found)
-    return replace(found, path=Path(options.output))
+    return found
 
 
-def record(kept: keeper.Keeper, found: FaultReport) -> None:
+def record(kept: Keeper, found: FaultReport) -> None:
     """Keep a study in a store."""
     kept.keep(SEEN, "limits", seen(found))
     kept.commit("faults", found.document())
@@ -221,57 +220,40 @@ def record(kept: keeper.Keeper, found: FaultReport) -> None:
 def stored(kept: keeper.Kept) -> FaultReport:
     """The study that a store holds: its document has everything."""
     known = kept.document
-    results = tuple(
-        Result(
-            name=one["name"],
-            about=one["about"],
-            size=one["size"],
-            rejected_by=tuple(one["rejected_by"]),
-            missed_by=tuple(one["missed_by"]),
-            limits=dict(known["limits"].get(one["name"], {})),
-        )
-        for one in known["faults"]
-    )
+    limits = known["limits"]
+    results = tuple(Result(**one, limits=limits.get(one["name"], {})) for one in known["faults"])
     clean = Clean(
         runs=known["clean_runs"], verdicts=known["clean_verdicts"], alarms=tuple(known["false_alarms"])
     )
     return FaultReport(results=results, clean=clean, path=kept.path)
 
 
-def study(
-    run: Run | None = None,
-    labels: Sequence[str] = (),
-    *,
-    team: Team = ALONE,
-    progress: Progress | None = None,
-) -> FaultReport:
+def study(run: Run | None = None, labels: Sequence[str] = (), *, kept: Keeper | None = None) -> FaultReport:
     """All faults, their limits, and the clean runs; `run` and `labels` add those of the engines.
 
     `run` must be a function that another process can import.
     """
-    parts: list[Callable[[], Result | Clean]] = [partial(_examine, fault.name) for fault in FAULTS]
-    parts += [partial(clean_laws, name) for name in _FIXED]
-    batches = [(clean_scene, first) for first in range(0, CLEAN, _BATCH)]
+    faults = [_piece(RESULTS, fault.name, partial(_examine, fault.name)) for fault in FAULTS]
+    cleans = [_piece(CLEANS, f"laws of {name}", partial(clean_laws, name)) for name in _FIXED]
+    scenes: list[tuple[str, Callable[[int], Clean], int]] = [("random scenes", clean_scene, CLEAN)]
     if run is not None:
-        batches += [
-            (partial(clean_engine, run, label), first)
-            for label in labels
-            for first in range(0, BY_ENGINES, _BATCH)
-        ]
-    parts += [partial(_batch, judged, first) for judged, first in batches]
-    done: list[Result | Clean] = []
-    with closing(team.carried_out(parts)) as found:
-        for _, part in found:
-            done.append(part)
-            if progress:
-                progress(len(done), len(parts))
-    cleans = [part for part in done if isinstance(part, Clean)]
-    order = [fault.name for fault in FAULTS]
-    results = sorted((part for part in done if isinstance(part, Result)), key=lambda r: order.index(r.name))
-    return FaultReport(results=tuple(results), clean=_together(cleans))
+        scenes += [(label, partial(clean_engine, run, label), BY_ENGINES) for label in labels]
+    cleans += [
+        _piece(CLEANS, f"{what} {first}", partial(_batch, judged, first))
+        for what, judged, count in scenes
+        for first in range(0, count, _BATCH)
+    ]
+    kept = kept or Keeper()
+    found = kept.results([*faults, *cleans])
+    clean = _together(found[len(faults) :])
+    return FaultReport(results=tuple(found[: len(faults)]), clean=clean, resumed=kept.resumed, path=kept.path)
 
 
 _BATCH = 20
+
+
+def _piece(form: Documents[Any], key: str, measure: Callable[[], Result | Clean]) -> Piece:
+    return Piece(key=key, what=key, measure=measure, form=form)
 
 
 def _examine(name: str) -> Result:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from springcheck.studies.keeper import document
-from springcheck.studies.tables import Rows
+from springcheck.studies.tables import Documents, Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +39,8 @@ class FaultReport:
 
     results: tuple[Result, ...]
     clean: Clean
+    resumed: int = 0
+    """Faults and clean runs that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""
 
@@ -73,6 +75,8 @@ class Seen:
     size: float
 
 
+RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="", joined=True)
+CLEANS: Documents[Clean] = Documents(kind=Clean, beginning="faults/clean/", named="", joined=True)
 SEEN: Rows[Seen] = Rows(kind=Seen, beginning="faults/", named="")
 
 

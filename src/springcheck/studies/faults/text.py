@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.faults.result import FaultReport
+from springcheck.studies.text import resumed
 from springcheck.text.lines import Lines, Row, plain, table
 from springcheck.text.wording import count
 
@@ -26,6 +27,7 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
     clean = found.clean
     rejected = sum(bool(result.rejected_by) for result in found.results)
     out: Lines = [
+        *resumed(found.resumed, "piece"),
         table(("fault", "size", "seen from", "rejected by"), rows, left=("fault",), prose="rejected by"),
         plain(),
         *(
