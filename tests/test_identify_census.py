@@ -43,7 +43,7 @@ _spec.loader.exec_module(census)
         (134, "named"),
         # a step in single precision in a file of single precision leaves other schemes no room
         (2059, "not told apart"),
-        (2130, "not told apart"),
+        (2130, "named"),
         # drifts and noise that are there in the first frames of a growing motion
         (308, "error seen"),
         (660, "error seen"),
@@ -113,6 +113,16 @@ _spec.loader.exec_module(census)
         # a velocity that is added up in substeps
         (31924, "named"),
         (119040, "named"),
+        # near whole and half turns between frames the roots of a map are known far worse than itself
+        (714102, "not told apart"),
+        (250179, "named"),
+        # an equilibrium has no velocity, which numbers that grow ever finer beside it show
+        (101122, "named"),
+        # the share of a held force tells 1/n by twice itself
+        (408640, "named"),
+        (411946, "named"),
+        (504064, "named"),
+        (505079, "named"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

@@ -460,3 +460,18 @@ def test_noise_of_a_force_far_below_a_quantum_is_no_arithmetic(m: float) -> None
     found = identify(H * np.arange(401), positions, v=velocities, mass=m)
     assert not found.fits
     assert "arithmetic explains" not in found.statement
+
+
+@pytest.mark.parametrize(("digits", "words"), [(4, "over 12 substeps"), (3, "over 11 to 13 substeps")])
+def test_a_number_of_substeps_that_digits_do_not_tell_is_a_range(digits: int, words: str) -> None:
+    q, v, rows = 1.0, 0.0, []
+    for _ in range(101):
+        rows.append((q, v))
+        force = -q
+        for _ in range(12):
+            v += 0.05 / 12 * force
+            q += 0.05 / 12 * v
+    q_, v_ = (np.array([float(f"{x:.{digits}g}") for x in row]) for row in np.array(rows).T)
+    found = identify(0.05 * np.arange(101), q_, v=v_, mass=1.0)
+    assert found.fits
+    assert_said(found, words)

@@ -104,7 +104,7 @@ def _substeps(match: Match) -> int:
     """Substeps of a step whose force is held, 1 of any other."""
     if not FAMILIES[match.family].held:
         return 1
-    return substeps(match.g, match.g_error + G_ROUNDING)[0] or 1
+    return max(substeps(match.g, match.g_error + G_ROUNDING)[0], default=1)
 
 
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:

@@ -141,6 +141,13 @@ def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
     return (*aliases(scheme), *leapfrog, *still, *same)
 
 
+def held_over(joint: Joint) -> str:
+    """A held force in a sentence, with its numbers of substeps."""
+    numbers_ = list(map(str, joint.substeps[0])) or ["many"]
+    how_many = " to ".join(dict.fromkeys([numbers_[0], numbers_[-1]]))
+    return f"Semi-implicit Euler whose force is held over {how_many} substeps"
+
+
 def common(values: Sequence[T]) -> T | None:
     """The value that all are, or None."""
     return values[0] if len(set(values)) == 1 else None

@@ -8,6 +8,7 @@ stiffness k/(1 + a).  `search.coincident` finds such identities by matching fami
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeAlias
@@ -268,17 +269,14 @@ HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, pa
 FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS)}
 
 
-def substeps(share: float, error: float) -> tuple[int | None, bool]:
-    """Number of substeps n that a force is held over, None where no whole number fits and 0 for no end of
-    them; and whether each substep kicks before it drifts.
+def substeps(share: float, error: float) -> tuple[range, bool]:
+    """Numbers of substeps that a force may be held over, none where no whole number fits or no end of them
+    does; and whether each substep kicks before it drifts.  `error` is the standard error of the share.
 
     The position gets (n + 1)/2n of h**2 F/m where substeps kick first, (n - 1)/2n where they drift first.
     """
-    off = 2 * share - 1
-    if abs(off) <= 6 * error:
-        return 0, True
-    n = round(1 / abs(off))
-    fits = n >= 2 and n <= HELD_SHARES and abs(abs(off) - 1 / n) <= 6 * error
-    # a whole number is no evidence where the next one fits as well
-    alone = fits and 1 / (n * (n + 1)) > 20 * error
-    return (n if alone else None), off > 0
+    off, room = abs(2 * share - 1), 12 * error
+    if off <= room:
+        return range(0), True
+    least, most = math.ceil(1 / (off + room)), math.floor(min(1 / (off - room), HELD_SHARES))
+    return range(max(least, 2), most + 1), share > 0.5

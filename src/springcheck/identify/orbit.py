@@ -76,7 +76,8 @@ def _slopes(entries: Floats, frames: int) -> Floats:
 def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Orbit | None:
     """Fit states z (f, 2) of size 1, written to within `quanta` (f, 2), from the map of their pairs.
 
-    `constant` says that the equilibrium is unknown.  None where the fit does not converge.
+    `constant` says that the position of the equilibrium is unknown; its velocity is 0.  None where the fit
+    does not converge.
     """
     frames = len(z)
     unit = np.maximum(quanta, FLOOR * np.max(quanta, axis=1, keepdims=True)) / np.sqrt(12.0)
@@ -90,7 +91,7 @@ def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Or
             columns = [maps[:, :, 0], maps[:, :, 1]]
             columns += list(_slopes(entries.astype(np.float64), frames) @ start)
             if constant:
-                columns += [np.broadcast_to(np.eye(2, dtype=np.longdouble)[i], (frames, 2)) for i in (0, 1)]
+                columns.append(np.broadcast_to(np.array([1, 0], np.longdouble), (frames, 2)))
             missing = z - centre - maps @ start
             right = (missing * weights).astype(np.float64).ravel()
             slopes = np.stack([(x * weights).astype(np.float64).ravel() for x in columns], axis=1)
@@ -106,7 +107,7 @@ def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Or
             start = start + change[:2]
             entries = entries + change[2:6].reshape(2, 2)
             if constant:
-                centre = centre + change[6:]
+                centre = centre + np.array([change[6], 0])
             if np.sum((across.T @ right) ** 2) <= SETTLED * max(float(np.sum(right**2)), 1.0):
                 break
     u = (right - slopes @ change).reshape(frames, 2)

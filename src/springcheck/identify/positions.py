@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.candidates import candidates_of, common, said_of
+from springcheck.identify.candidates import candidates_of, common, held_over, said_of
 from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES, G_ROUNDING, HELD, Family
 from springcheck.identify.fit import ROUNDING
@@ -120,12 +120,9 @@ def _first(found: list[Recurrence], families: tuple[Family, ...], strides: range
 
 
 def _may_hold(joint: Joint) -> bool:
-    """Whether the force may be held over some whole number of substeps."""
-    for part in joint.parts:
-        off, error = abs(2 * part.g - 1), 6 * (part.g_error + G_ROUNDING)
-        if off > error and not (off < 0.5 + error and abs(off - 1 / max(round(1 / off), 2)) <= error):
-            return False
-    return True
+    """Whether the force may be held over some whole number of substeps, or no end of them."""
+    endless = all(abs(2 * part.g - 1) <= 12 * (part.g_error + G_ROUNDING) for part in joint.parts)
+    return endless or bool(joint.substeps[0])
 
 
 def _stated(
@@ -196,7 +193,7 @@ def _known(
         law = f" with {candidates[0].law}" if candidates[0].law else " with friction" if damped else ""
         whose = title(scheme)
         if scheme == HELD.scheme:
-            whose = f"Semi-implicit Euler whose force is held over {joints[0].substeps[0]} substeps"
+            whose = held_over(joints[0])
         statement = f"{whose}{law}{frames}, by positions alone: {precision} arithmetic explains them"
     else:
         listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])

@@ -14,6 +14,7 @@ from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
     candidates_of,
     common,
+    held_over,
     nearest_stiffness,
     said_of,
     stated_stiffness,
@@ -253,9 +254,9 @@ def _known(
     )
     law = f" with {first.law}" if first.law and len(candidates) == 1 else " with friction" if damped else ""
     if scheme == "held-force":
-        n, kicks = plainest.substeps
+        kicks = plainest.substeps[1]
         order = "kick, then drift" if kicks else "drift, then kick"
-        statement = f"Semi-implicit Euler whose force is held over {n} substeps ({order}){steps}"
+        statement = f"{held_over(plainest)} ({order}){steps}"
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
         statement = f"{title(scheme)}{also}{law}{steps}: {precision} arithmetic explains every step"

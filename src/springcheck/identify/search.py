@@ -71,11 +71,12 @@ class Joint:
         )
 
     @property
-    def substeps(self) -> tuple[int, bool]:
-        """Number of substeps that a force is held over, 0 where none is certain; whether they kick first."""
-        found = {substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts}
-        n, first = found.pop() if len(found) == 1 else (None, True)
-        return n or 0, first
+    def substeps(self) -> tuple[range, bool]:
+        """Numbers of substeps that a force may be held over, and whether they kick first."""
+        found = [substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts]
+        if len({first for _, first in found}) > 1:
+            return range(0), True
+        return range(max(n.start for n, _ in found), min(n.stop for n, _ in found)), found[0][1]
 
     def __str__(self) -> str:
         steps = "" if self.stride == 1 else f", {self.stride} steps a frame"

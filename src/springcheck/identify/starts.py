@@ -93,8 +93,10 @@ def starts(
     root = roots(found, strides)
     spread = 100 * float(np.sqrt(found.covariance.max()))
     # roots blow an error up where the motion is near a whole or a half period
-    error /= float(np.sin(rotation(found.entries[None]).angle[0]))
-    most = NEAR + spread if far else min(NEAR + spread, SURE[0] + SURE[1] * error)
+    sine = float(np.sin(rotation(found.entries[None]).angle[0]))
+    error /= sine
+    sure = np.inf if far else SURE[0] + SURE[1] * error
+    most = min(NEAR + spread, sure)
     flows = [
         _flow_starts(every, found, k, of, terms, GUESSED + spread if far else most)
         for k, family in enumerate(every.families)
@@ -133,18 +135,13 @@ def starts(
         return joined(flows)
     parts = parts or [(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))]
     which, index, a, g, away = (np.concatenate(x) for x in zip(*parts, strict=True))
+    wide = spread * np.maximum(1.0, np.sin(root.phase[index]) / sine)
+    room = np.minimum(NEAR + wide, sure)
     a, g, off = solved(
-        every,
-        which,
-        a,
-        g,
-        root.entries[index],
-        away=away,
-        free_scale=terms.mass_unknown,
-        spread=spread + most,
+        every, which, a, g, root.entries[index], away=away, free_scale=terms.mass_unknown, spread=wide + room
     )
     s = root.s[index]
-    near = off <= most
+    near = off <= room
     kept = np.flatnonzero(near)
     if far:
         # of each family and stride without a near root the nearest is kept
@@ -176,16 +173,18 @@ def solved(
     free_scale: bool,
     away: Floats | None = None,
     turns: int = 0,
-    spread: float = 0.0,
+    spread: Floats | float = 0.0,
 ) -> tuple[Floats, Floats, Floats]:
     """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off; the
     friction of guesses is `away` from that of their curve."""
     away = np.abs(g) if away is None else away
+    spread = np.broadcast_to(spread, len(a))
     if len(a) > CHUNK:
         parts = [
             solved(
                 every, which[i : i + CHUNK], a[i : i + CHUNK], g[i : i + CHUNK], wanted[i : i + CHUNK],
-                away=away[i : i + CHUNK], free_scale=free_scale, turns=turns, spread=spread,
+                away=away[i : i + CHUNK], free_scale=free_scale, turns=turns,
+                spread=spread[i : i + CHUNK],
             )
             for i in range(0, len(a), CHUNK)
         ]  # fmt: skip
@@ -222,7 +221,7 @@ def solved(
             good = np.ones(n, dtype=bool)
             if not turns and turn < (len(LOST) if damped else 1):
                 room = np.minimum(LOST[turn], DAMPED_LOST * share[alive] ** 2**turn) if damped else GUESSED
-                good = off[alive] <= room + spread
+                good = off[alive] <= room + spread[alive]
             # what has been found to rounding stays where it is
             good &= off[alive] > FOUND
             if not np.all(good):
