@@ -170,19 +170,53 @@ class Curves:
         """The most that entries bend."""
         return float(np.max(self.bend))
 
+    @cached_property
+    def hull(self) -> tuple[Floats, Floats]:
+        """Least and most (3, CELLS) of M11, M12 and log det in each cell, of all curves, and as far as they bend."""
+        upper = self.normal[1]
+        wide = self.bend * np.array([np.ones_like(upper), np.abs(upper) + SMALL, np.zeros_like(upper)])
+        rows = np.array([*self.normal, self.log_det])
+        low, high = np.fmin.reduce(rows - wide, axis=1), np.fmax.reduce(rows + wide, axis=1)
+        return np.fmin(low[:, :-1], low[:, 1:]), np.fmax(high[:, :-1], high[:, 1:])
+
+    def _any_near(
+        self, entries: Floats, cell: Integers, room: float, *, free_scale: bool, damped: bool
+    ) -> Integers:
+        """Roots, of these M11, M12 and log det (3, c), whose entries may agree with those of any curve."""
+        low, high = (x[:, cell] for x in self.hull)
+        below, above = low - entries, entries - high
+        rooms = room
+        if damped:
+            rooms = room + DAMPING * np.maximum(np.abs(below[2]), np.abs(above[2]))
+        size = np.maximum(np.abs(low[1]), np.abs(high[1])) + SMALL
+        units = [1.0, size, np.inf if damped else 2 * (1 + self.most / room)]
+        good = np.ones(cell.shape, dtype=bool)
+        for i in (0, 1, 2):
+            if i != 1 or not free_scale:
+                good &= np.maximum(below[i], above[i]) <= units[i] * rooms
+        return np.flatnonzero(good)
+
     def near(
         self, root: Roots, error: float, *, damped: bool, growing: bool, free_scale: bool, far: bool
     ) -> tuple[Integers, Integers]:
         """Curves and roots whose entries may agree, known to within `error`; with `far` the nearest root of
         each stride as well."""
+        room = SIDE[0] * error + SIDE[1]
         at = root.phase * (CELLS / np.pi)
         cell = np.minimum(at.astype(np.int64), CELLS - 1)
-        part = at - cell
+        size = np.exp(-root.log_det / 2)
+        rows = np.array([root.entries[:, 0, 0] * size, root.entries[:, 0, 1] * size, root.log_det])
+        # what no curve comes near is not held against each of them
+        chosen = (
+            np.arange(len(cell)) if far
+            else self._any_near(rows, cell, room, free_scale=free_scale, damped=damped)
+        )  # fmt: skip
+        phase, cell, part = root.phase[chosen], cell[chosen], (at - cell)[chosen]
+        one, other, log_det = rows[:, chosen]
         low = self.log_det[:, cell]
-        loss = low + (self.log_det[:, cell + 1] - low) * part - root.log_det
-        room = SIDE[0] * error + SIDE[1]
+        loss = low + (self.log_det[:, cell + 1] - low) * part - log_det
         plain = self.g == 0
-        worth = (root.phase > self.low) & (root.phase < self.high) & (plain | self.next_to(loss))
+        worth = (phase > self.low) & (phase < self.high) & (plain | self.next_to(loss))
         if damped and not growing:
             # friction shrinks areas
             worth &= (loss > 0) | ~plain
@@ -195,8 +229,7 @@ class Curves:
             low = y[which, cell]
             return np.asarray(low + (y[which, cell + 1] - low) * part)
 
-        size = np.exp(-root.log_det / 2)
-        one, other = ((root.entries[:, 0, i] * size)[index] for i in (0, 1))
+        one, other = one[index], other[index]
         rooms = room + self.bend[which, cell] + (DAMPING * np.abs(loss) if damped else 0)
         off = np.abs(between(self.normal[0]) - one)
         if not free_scale:
@@ -211,7 +244,7 @@ class Curves:
             order = np.lexsort((off, root.s[index], which))
             starts = np.diff(which[order], prepend=-1) + np.diff(root.s[index][order], prepend=-1.0) != 0
             good[order[starts]] = True
-        return which[good], index[good]
+        return which[good], chosen[index[good]]
 
     def at(self, which: Integers, phase: Floats) -> tuple[Floats, Floats]:
         """h w, and log of the determinant of a step, where these curves have these phases."""
