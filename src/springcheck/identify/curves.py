@@ -64,24 +64,42 @@ class Roots:
     phase: Floats
     entries: Floats
     log_det: Floats
+    cell: Integers
+    """Cell of the phase, and how far along it the phase stands."""
+    part: Floats
+    normal: Floats
+    """M11, M12 (2, c) over the root of the determinant."""
 
 
 def roots(found: Map, strides: range) -> Roots:
     """The s-th roots of a map that turns, every whole number of unseen turns included."""
+    if ("roots", strides) not in found.found:
+        found.found["roots", strides] = _roots(found, strides)
+    out: Roots = found.found["roots", strides]
+    return out
+
+
+def _roots(found: Map, strides: range) -> Roots:
     b = found.unscaled
-    turn = rotation(b[None])
-    angle, d = float(turn.angle[0]), float(turn.determinant[0])
+    angle, d = float(found.turn.angle[0]), float(found.turn.determinant[0])
     side = -1.0 if b[0, 1] < 0 else 1.0
     s, turns = _steps(strides)
     phase = (side * angle + 2 * np.pi * turns) / s
     keep = (phase > 0) & (phase <= np.pi)
     s, turns, phase = s[keep], turns[keep], phase[keep]
     generator = side * (b.astype(np.float64) / np.sqrt(d) - np.cos(angle) * np.eye(2)) / np.sin(angle)
-    entries = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * generator
-    entries = entries * (d ** (0.5 / s))[:, None, None]
-    entries[:, 0, 1] *= s
-    entries[:, 1, 0] /= s
-    return Roots(s, turns, phase, entries, np.log(d) / s)
+    even, odd = np.cos(phase), np.sin(phase)
+    size = d ** (0.5 / s)
+    first = even + odd * generator[0, 0], odd * generator[0, 1] * s
+    entries = np.empty((len(s), 2, 2))
+    entries[:, 0, 0], entries[:, 0, 1] = (size * x for x in first)
+    entries[:, 1, 0], entries[:, 1, 1] = (
+        size * odd * generator[1, 0] / s,
+        size * (even + odd * generator[1, 1]),
+    )
+    at = phase * (CELLS / np.pi)
+    cell = np.minimum(at.astype(np.int64), CELLS - 1)
+    return Roots(s, turns, phase, entries, np.log(d) / s, cell, at - cell, np.array(first))
 
 
 @lru_cache(maxsize=64)
@@ -172,28 +190,24 @@ class Curves:
 
     @cached_property
     def hull(self) -> tuple[Floats, Floats]:
-        """Least and most (3, CELLS) of M11, M12 and log det in each cell, of all curves, and as far as they bend."""
+        """Least and most (3, CELLS) in each cell of M11, M12, log det of all curves, with what they bend."""
         upper = self.normal[1]
         wide = self.bend * np.array([np.ones_like(upper), np.abs(upper) + SMALL, np.zeros_like(upper)])
         rows = np.array([*self.normal, self.log_det])
         low, high = np.fmin.reduce(rows - wide, axis=1), np.fmax.reduce(rows + wide, axis=1)
         return np.fmin(low[:, :-1], low[:, 1:]), np.fmax(high[:, :-1], high[:, 1:])
 
-    def _any_near(
-        self, entries: Floats, cell: Integers, room: float, *, free_scale: bool, damped: bool
-    ) -> Integers:
-        """Roots, of these M11, M12 and log det (3, c), whose entries may agree with those of any curve."""
-        low, high = (x[:, cell] for x in self.hull)
-        below, above = low - entries, entries - high
-        rooms = room
-        if damped:
-            rooms = room + DAMPING * np.maximum(np.abs(below[2]), np.abs(above[2]))
-        size = np.maximum(np.abs(low[1]), np.abs(high[1])) + SMALL
-        units = [1.0, size, np.inf if damped else 2 * (1 + self.most / room)]
-        good = np.ones(cell.shape, dtype=bool)
-        for i in (0, 1, 2):
-            if i != 1 or not free_scale:
-                good &= np.maximum(below[i], above[i]) <= units[i] * rooms
+    def _any_near(self, root: Roots, room: float, *, damped: bool, free_scale: bool) -> Integers:
+        """Roots whose entries may agree with those of any curve."""
+        low, high = (x[:, root.cell] for x in self.hull)
+        above, below = high[2] - root.log_det, low[2] - root.log_det
+        rooms = room + DAMPING * np.maximum(np.abs(above), np.abs(below)) if damped else room
+        off = [np.maximum(low[i] - x, x - high[i]) for i, x in enumerate(root.normal)]
+        good = off[0] <= rooms
+        if not free_scale:
+            good &= off[1] <= rooms * (np.maximum(np.abs(low[1]), np.abs(high[1])) + SMALL)
+        if not damped:
+            good &= np.maximum(below, -above) <= 2 * (room + self.most)
         return np.flatnonzero(good)
 
     def near(
@@ -202,17 +216,13 @@ class Curves:
         """Curves and roots whose entries may agree, known to within `error`; with `far` the nearest root of
         each stride as well."""
         room = SIDE[0] * error + SIDE[1]
-        at = root.phase * (CELLS / np.pi)
-        cell = np.minimum(at.astype(np.int64), CELLS - 1)
-        size = np.exp(-root.log_det / 2)
-        rows = np.array([root.entries[:, 0, 0] * size, root.entries[:, 0, 1] * size, root.log_det])
         # what no curve comes near is not held against each of them
         chosen = (
-            np.arange(len(cell)) if far
-            else self._any_near(rows, cell, room, free_scale=free_scale, damped=damped)
+            np.arange(len(root.s)) if far
+            else self._any_near(root, room, damped=damped, free_scale=free_scale)
         )  # fmt: skip
-        phase, cell, part = root.phase[chosen], cell[chosen], (at - cell)[chosen]
-        one, other, log_det = rows[:, chosen]
+        phase, log_det, cell, part = (x[chosen] for x in (root.phase, root.log_det, root.cell, root.part))
+        one, other = root.normal[:, chosen]
         low = self.log_det[:, cell]
         loss = low + (self.log_det[:, cell + 1] - low) * part - log_det
         plain = self.g == 0

@@ -12,6 +12,8 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.orbit import orbit, repeats
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.schemes import rotation
+from springcheck.schemes.linear import Rotation
 
 ROUNDING = 2.0**-53
 
@@ -60,6 +62,14 @@ class Map:
     def unscaled(self) -> Extended:
         """The map on (q, v T), both lengths."""
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
+
+    @property
+    def turn(self) -> Rotation:
+        """How the map turns."""
+        if "turn" not in self.found:
+            self.found["turn"] = rotation(self.entries[None])
+        out: Rotation = self.found["turn"]
+        return out
 
     def misses(self, other: Map | None = None) -> Floats:
         """What the map leaves over in each pair of its states, or of those of another fit, (f - 1, 2)."""

@@ -15,7 +15,6 @@ from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
 from springcheck.identify.starts import Guesses, Terms, joined, least_squares, real_starts, starts
 from springcheck.physics.arrays import Extended, Floats, Reals
-from springcheck.schemes import rotation
 
 CHANCE = 1e-7
 """Probability with which a right scheme may be refused: five standard errors."""
@@ -153,8 +152,8 @@ def match(
         )
         parts = []
         for of, (found, what) in enumerate(zip(maps, terms, strict=True)):
-            turning = bool(rotation(found.entries[None]).angle[0] > 0)
-            if not turning and not rotation(found.entries[None]).determinant[0] > 0 and every.damped:
+            turning = bool(found.turn.angle[0] > 0)
+            if not turning and not found.turn.determinant[0] > 0 and every.damped:
                 continue
             error = float(errors[of])
             asked = "starts", of, families, strides, error, what.mass_unknown, what.growing, far

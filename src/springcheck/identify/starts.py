@@ -11,7 +11,6 @@ from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.schemes import rotation
 
 NEAR = 3e-4
 """Distance of the entries of one step, of size 1, within which a family is worth an exact comparison."""
@@ -93,7 +92,7 @@ def starts(
     root = roots(found, strides)
     spread = 100 * float(np.sqrt(found.covariance.max()))
     # roots blow an error up where the motion is near a whole or a half period
-    sine = float(np.sin(rotation(found.entries[None]).angle[0]))
+    sine = float(np.sin(found.turn.angle[0]))
     error /= sine
     sure = np.inf if far else SURE[0] + SURE[1] * error
     most = min(NEAR + spread, sure)
@@ -131,10 +130,10 @@ def starts(
                 mine = slice(ends[base], ends[base + 1])
                 which = np.full(ends[base + 1] - ends[base], k)
                 parts.append((which, index[mine], a[mine], g[mine], away[mine]))
-    if not parts and flows:
-        return joined(flows)
     parts = parts or [(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))]
     which, index, a, g, away = (np.concatenate(x) for x in zip(*parts, strict=True))
+    if flows and not len(which):
+        return joined(flows)
     wide = spread * np.maximum(1.0, np.sin(root.phase[index]) / sine)
     room = np.minimum(NEAR + wide, sure)
     a, g, off = solved(
@@ -305,7 +304,7 @@ def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range)
             )
             least[b] = [*strided, *(row + 1.0).tolist()], [*values, *GRID[low + 1].tolist()]
         parts = []
-        total = float(rotation(found.entries[None]).determinant[0])
+        total = float(found.turn.determinant[0])
         for k in kinds:
             family = every.families[k]
             b = names.index(family.scheme) if names else k
@@ -339,17 +338,21 @@ def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
 
 def _flow_starts(every: Table, found: Map, which: int, of: int, terms: Terms, most: float) -> Guesses:
     """The exact flow's guesses: it has no step, and turns several times between frames."""
-    b = found.unscaled
-    turn = rotation(b[None])
-    phase = float(turn.angle[0]) * (-1.0 if b[0, 1] < 0 else 1.0)
-    turns = np.arange(0 if phase > 0 else 1, FLOW_TURNS, dtype=np.float64)
     damped = every.families[which].damped
-    g = -float(np.log(turn.determinant[0])) if damped else 0.0
-    if damped and g <= 0 and not terms.growing:
-        turns = turns[:0]
+    asked = "flow", damped, terms.mass_unknown, terms.growing
+    if asked not in found.found:
+        b, turn = found.unscaled, found.turn
+        phase = float(turn.angle[0]) * (-1.0 if b[0, 1] < 0 else 1.0)
+        turns = np.arange(0 if phase > 0 else 1, FLOW_TURNS, dtype=np.float64)
+        g = -float(np.log(turn.determinant[0])) if damped else 0.0
+        if damped and g <= 0 and not terms.growing:
+            turns = turns[:0]
+        a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2)
+        gs = np.full(len(turns), g)
+        units = every.unit(np.full(len(turns), which), a, gs)
+        out, target = (_compared(x, free_scale=terms.mass_unknown) for x in (units, b))
+        off = np.max(np.abs(out - target) / np.maximum(np.abs(target), 1e-2), axis=1, initial=0.0)
+        found.found[asked] = turns, a, gs, off
+    turns, a, gs, off = found.found[asked]
     n = len(turns)
-    a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2)
-    index, gs = np.full(n, which), np.full(n, g)
-    out, target = (_compared(x, free_scale=terms.mass_unknown) for x in (every.unit(index, a, gs), b))
-    near = np.max(np.abs(out - target) / np.maximum(np.abs(target), 1e-2), axis=1, initial=0.0) <= most
-    return Guesses(index, np.full(n, of), np.ones(n), turns, a, gs, near)
+    return Guesses(np.full(n, which), np.full(n, of), np.ones(n), turns, a, gs, off <= most)
