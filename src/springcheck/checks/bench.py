@@ -69,8 +69,7 @@ class Bench:
         state = np.zeros((2 * n + 1, 2 * n))
         state[:, :n] = rest.astype(np.float64)
         state[1:] += np.diag(pushes)
-        many = scene.system.tiled(2 * n + 1)
-        start = replace(many, q=state[:, :n].ravel(), p=state[:, n:].ravel(), steps=1, every=1)
+        start = scene.system.from_states(state[:, :n], state[:, n:])
         return Case(trajectory=self.run(start, self.label), scene=start), state[
             np.arange(1, 2 * n + 1), np.arange(2 * n)
         ] - state[0]

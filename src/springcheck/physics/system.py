@@ -374,6 +374,10 @@ class System:
         terms = tuple(term.tiled(copies, self.n) for term in self.terms)
         return self.scene.derived(m=m, q=q, p=p, terms=terms)
 
+    def from_states(self, q: Floats, p: Floats) -> Scene:
+        """Copies of the scene side by side, one from each of these states (c, n), and one step of them."""
+        return self.tiled(len(q)).derived(q=q.ravel(), p=p.ravel(), steps=1, every=1)
+
     def part(self, chosen: Integers) -> Scene:
         """These particles (s,) alone, renumbered, with the rows of terms that act on nothing else."""
         number = np.full(self.n, -1)

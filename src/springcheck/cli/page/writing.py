@@ -40,7 +40,12 @@ def html(content: Content) -> str:
         # what a file says is text without control characters
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
-    around.filters |= {"short": short, "fraction": fraction, "ordinal": ordinal}
+    around.filters |= {
+        "short": short,
+        "fraction": fraction,
+        "ordinal": ordinal,
+        "words": lambda text: str(text).strip(),
+    }
     script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
     style = (HERE / "page.css").read_text(encoding="utf-8")
     return around.get_template("page.html").render(
@@ -105,6 +110,11 @@ def _digest(text: str) -> str:
 def short(x: float) -> str:
     """Three digits."""
     return f"{x:.3g}"
+
+
+def words(text: object) -> str:
+    """A line or a cell, whose look is the page's own."""
+    return str(text).strip()
 
 
 def fraction(verdict: Verdict) -> str:

@@ -8,6 +8,7 @@ forces have digits to both sides.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from springcheck import engines, schemes, simulate
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Extended, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 
@@ -66,23 +67,20 @@ def noise(label: Label) -> float:
     return schemes.roundings(scheme) * (max(how.state, how.force) + how.quantum / FORCE)
 
 
-def scene(
-    springs: Springs, q: Floats, p: Floats, *, copies: int = 1, steps: int = 1, every: int = 1
-) -> Scene:
-    """A scene of `copies` of these springs, one set behind the other, from q, p (copies * n,)."""
+def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
+    """A scene of these springs side by side, from q, p (n,)."""
     requires = engines.method(springs.label).requires
     has_friction = np.any(springs.brake) or Need.DAMPING in requires
-    c = np.tile(np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP), copies)
+    c = np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP)
     return spring(
         m=MASS,
-        k=np.tile(springs.k, copies),
+        k=springs.k,
         q=q,
         p=p,
         c=c if has_friction else None,
         fast=Need.FAST_SPRINGS in requires,
         step=STEP,
         steps=steps,
-        every=every,
         quantities=("q", "p"),
         name="scan",
         title="springs side by side",
@@ -100,19 +98,37 @@ def measured(springs: Springs) -> Floats:
     """The engine's own one-step matrices (n, 2, 2); not a number where a step does not end finite."""
     n = len(springs.turn)
     of_q, of_p = units(springs)
-    none = np.zeros(n)
-    start = scene(springs, np.concatenate([of_q, none]), np.concatenate([none, of_p]), copies=2)
-    run = simulate.run(start, springs.label)
-    out = np.full((n, 2, 2), np.nan)
-    if len(run.t) == 2:
-        out[:, 0, :] = run.q[1].reshape(2, n).T / of_q[:, None]
-        out[:, 1, :] = run.p[1].reshape(2, n).T / of_p[:, None]
-    elif n > 1:
+    out = matrices(scene(springs, of_q, of_p), springs.label, of_q[:, None], of_p[:, None])
+    if n > 1 and np.isnan(out).all():
         # an engine that gives up over one spring takes the others with it: halves find which
         for half in (slice(None, n // 2), slice(n // 2, None)):
             brake = springs.brake if np.ndim(springs.brake) == 0 else np.asarray(springs.brake)[half]
             out[half] = measured(Springs(label=springs.label, turn=springs.turn[half], brake=brake))
     return out
+
+
+Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
+"""The states (n,) after one step of a scene."""
+
+
+def by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
+    """The engine's own step; not a number where it does not end finite."""
+    run = simulate.run(scene, label)
+    if len(run.t) < 2:
+        return np.full(scene.n, np.nan), np.full(scene.n, np.nan)
+    return run.q[1], run.p[1]
+
+
+def matrices(scene: Scene, label: Label, of_q: Floats, of_p: Floats, step: Stepper = by_engine) -> Floats:
+    """One-step matrices (g, 2n, 2n) of g groups of n particles side by side, in these units (g, n)."""
+    g, n = of_q.shape
+    # one set of groups for each unit vector
+    q, p = np.zeros((2 * n, g, n)), np.zeros((2 * n, g, n))
+    for i in range(n):
+        q[i, :, i], p[n + i, :, i] = of_q[:, i], of_p[:, i]
+    ends = step(scene.system.from_states(q.reshape(2 * n, -1), p.reshape(2 * n, -1)), label)
+    x, y = (np.asarray(end).reshape(2 * n, g, n) / unit for end, unit in zip(ends, (of_q, of_p), strict=True))
+    return np.concatenate([x, y], axis=-1).transpose(1, 2, 0).astype(np.float64)
 
 
 def theory(springs: Springs) -> Extended:

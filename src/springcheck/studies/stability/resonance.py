@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import engines, schemes
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
 from springcheck.physics import exact
-from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
+from springcheck.studies.stability import propagators
+from springcheck.studies.stability.propagators import Stepper, by_engine
 from springcheck.studies.tables import column
 
 TURN = (1.0, 7.0)
@@ -63,7 +65,7 @@ def measure(scene: Scene, label: Label) -> Resonance:
     if reason:
         raise SceneError(f"{label}: {reason}")
     turn = np.linspace(*TURN, COPIES)
-    radius = radii(scene, label, turn, _by_engine)
+    radius = radii(scene, label, turn, by_engine)
     predicted = radii(scene, label, turn, _by_scheme)
     return Resonance(
         method=str(label),
@@ -71,48 +73,26 @@ def measure(scene: Scene, label: Label) -> Resonance:
         turn=turn,
         radius=radius,
         radius_predicted=predicted,
-        bands=_bands(turn, radius, lambda x: radii(scene, label, x, _by_engine)),
+        bands=_bands(turn, radius, lambda x: radii(scene, label, x, by_engine)),
         bands_predicted=_bands(turn, predicted, lambda x: radii(scene, label, x, _by_scheme)),
     )
 
 
-Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
-
-
-def radii(scene: Scene, label: Label, turn: Floats, stepper: Stepper) -> Floats:
+def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
     if not scene.system.is_linear or scene.system.is_damped:
         raise SceneError(f"scene {scene.name}: a scan of resonances knows springs only")
-    n, copies = scene.n, len(turn)
+    copies = len(turn)
     scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
-    # one set of copies for each unit vector, in coordinates in which q and p/(m w) are alike
+    # coordinates in which q and p/(m w) are alike
     w = fast_frequency(scene) * np.sqrt(scale)
-    q, p = np.zeros((2 * n, copies, n)), np.zeros((2 * n, copies, n))
-    for i in range(n):
-        q[i, :, i] = 1
-        p[n + i, :, i] = scene.m[i] * w
-    size = 2 * n * copies
     # a displacement from equilibrium moves as if every spring were at rest in 0
     linear = replace(scene, terms=tuple(term.centred() for term in scene.terms))
-    many = linear.system.tiled(size)
-    many = replace(
-        many,
-        q=q.ravel(),
-        p=p.ravel(),
-        terms=tuple(term.scaled(np.repeat(np.tile(scale, 2 * n), len(term) // size)) for term in many.terms),
-        steps=1,
-        every=1,
-    )
-    after_q, after_p = stepper(many, label)
-    x = np.asarray(after_q).reshape(2 * n, copies, n)
-    y = np.asarray(after_p).reshape(2 * n, copies, n) / (scene.m * w[:, None])
-    matrices = np.concatenate([x, y], axis=-1).transpose(1, 2, 0)
-    return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices.astype(np.float64))), axis=-1))
-
-
-def _by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
-    run = simulate.run(scene, label)
-    return run.q[1], run.p[1]
+    many = linear.system.tiled(copies)
+    terms = tuple(term.scaled(np.repeat(scale, len(term) // copies)) for term in many.terms)
+    units = np.ones((copies, scene.n)), scene.m * w[:, None]
+    matrices = propagators.matrices(replace(many, terms=terms), label, *units, step)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices)), axis=-1))
 
 
 def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
