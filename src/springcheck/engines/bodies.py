@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from operator import attrgetter
+from typing import Any, ClassVar
 
 import numpy as np
 
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Method
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
@@ -21,25 +22,37 @@ def single(label: Label) -> Arithmetic:
 class Bodies(ABC):
     """A world in motion along x; `bodies` are its particles.
 
-    Where the force is ours it is set before each step; else the world's own springs pull.
+    The method "force" sets our force before each step; of any other the world's own springs pull.
     """
 
-    bodies: list[Any]
+    x: ClassVar[str]
+    y: ClassVar[str]
+    v: ClassVar[str]
+    """The attributes of a body that are its place along x and y, and its velocity along x."""
 
-    def __init__(self, scene: Scene, *, springs: bool) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+        ours = method.name == "force"
         self.force_calls = 0
         self.off_axis = 0.0
-        self.bodies = []
         self.m = scene.m
-        self._force = None if springs else scene.system.force
+        self._force = scene.system.force if ours else None
+        self.begin(label, step)
+        rows = zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True)
+        self.bodies = [self.add(m, q, p / m) for m, q, p in rows]
+        if not ours:
+            self.tie(scene, label)
 
     @abstractmethod
-    def position(self, body: Any) -> Any:
-        """Where a body is, with x and y."""
+    def begin(self, label: Label, step: float) -> None:
+        """Make the world, without gravity.  MethodError where it cannot take such steps."""
 
     @abstractmethod
-    def velocity(self, body: Any) -> Any:
-        """How fast it moves, with x."""
+    def add(self, m: float, q: float, v: float) -> Any:
+        """Add a body that moves along x and does not turn."""
+
+    @abstractmethod
+    def tie(self, scene: Scene, label: Label) -> None:
+        """Add the world's own springs.  MethodError where it has none that are the scene's."""
 
     @abstractmethod
     def push(self, body: Any, force: float) -> None:
@@ -51,18 +64,17 @@ class Bodies(ABC):
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows of q and p (f, n), `every` steps each."""
-        bodies, force, position, velocity = self.bodies, self._force, self.position, self.velocity
-        here, there = np.empty(len(bodies)), np.empty(len(bodies))
+        bodies, force = self.bodies, self._force
+        x, y, v = (attrgetter(name) for name in (self.x, self.y, self.v))
         with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
                 for _ in range(every):
                     if force is not None:
-                        for i, body in enumerate(bodies):
-                            here[i], there[i] = position(body).x, velocity(body).x
+                        here, there = (np.array([of(body) for body in bodies], np.float64) for of in (x, v))
                         for body, f in zip(bodies, force(here, there * self.m).tolist(), strict=True):
                             self.push(body, f)
                     self.step(row)
-                for i, body in enumerate(bodies):
-                    q[row, i], p[row, i] = position(body).x, velocity(body).x * self.m[i]
-            self.off_axis = max(self.off_axis, *(abs(position(body).y) for body in bodies))
+                q[row] = [x(body) for body in bodies]
+                p[row] = [v(body) for body in bodies] * self.m
+            self.off_axis = max(self.off_axis, *(abs(y(body)) for body in bodies))
         self.force_calls += every * len(q)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
@@ -76,7 +77,7 @@ def far(scene: Scene) -> float:
     return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
 
 
-def walls(scene: Scene, label: str) -> Iterator[tuple[int, float, float]]:
+def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
     """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
 
     Raises MethodError where a particle has two, or a stiffness is negative.

@@ -15,7 +15,6 @@ from springcheck.engines.contract import (
     EVERY_FORCE,
     Engine,
     Label,
-    Method,
     Stopped,
     by_name,
     named,
@@ -37,43 +36,34 @@ def version() -> dict[str, str]:
 class _World(Bodies):
     """Box2D's world in motion."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    x, y, v = "position.x", "position.y", "linearVelocity.x"
+
+    def begin(self, label: Label, step: float) -> None:
         import Box2D
 
         if step < 0:
             raise MethodError(f"{label}: Box2D takes no negative step")
-        joints = method.name == "distance-joint"
-        super().__init__(scene, springs=joints)
-        self._h = step
-        self._world = world = Box2D.b2World(gravity=(0, 0), doSleep=False)
-        for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
-            body = world.CreateDynamicBody(position=(q, 0), linearVelocity=(p / m, 0), fixedRotation=True)
-            body.massData = Box2D.b2MassData(mass=m, center=(0, 0), I=1.0)
-            self.bodies.append(body)
-        if joints:
-            self._add_joints(Box2D, scene)
+        self._library, self._h = Box2D, step
+        self._world = Box2D.b2World(gravity=(0, 0), doSleep=False)
 
-    def _add_joints(self, library: Any, scene: Scene) -> None:
+    def add(self, m: float, q: float, v: float) -> Any:
+        body = self._world.CreateDynamicBody(position=(q, 0), linearVelocity=(v, 0), fixedRotation=True)
+        body.massData = self._library.b2MassData(mass=m, center=(0, 0), I=1.0)
+        return body
+
+    def tie(self, scene: Scene, label: Label) -> None:
         length, ground = far(scene), self._world.CreateStaticBody(position=(0, 0))
-        for i, k, at in walls(scene, "box2d:distance-joint"):
-            frequency = math.sqrt(k / self.m[i]) / (2 * math.pi)
-            self._world.CreateJoint(
-                library.b2DistanceJointDef(
-                    bodyA=ground,
-                    bodyB=self.bodies[i],
-                    localAnchorA=(at - length, 0),
-                    localAnchorB=(0, 0),
-                    length=length,
-                    frequencyHz=frequency,
-                    dampingRatio=0.0,
-                )
+        for i, k, at in walls(scene, label):
+            joint = self._library.b2DistanceJointDef(
+                bodyA=ground,
+                bodyB=self.bodies[i],
+                localAnchorA=(at - length, 0),
+                localAnchorB=(0, 0),
+                length=length,
+                frequencyHz=math.sqrt(k / self.m[i]) / (2 * math.pi),
+                dampingRatio=0.0,
             )
-
-    def position(self, body: Any) -> Any:
-        return body.position
-
-    def velocity(self, body: Any) -> Any:
-        return body.linearVelocity
+            self._world.CreateJoint(joint)
 
     def push(self, body: Any, force: float) -> None:
         body.ApplyForceToCenter((force, 0), True)

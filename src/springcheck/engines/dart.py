@@ -5,6 +5,8 @@ DART takes joint springs and joint damping implicitly, whatever is asked of them
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from springcheck.engines.bonds import walls
@@ -38,11 +40,11 @@ class _World:
         skeleton.setVelocities(scene.p / scene.m)
         self._force = None if springs else scene.system.force
         if springs:
-            self._add_springs(joints, scene)
+            self._add_springs(joints, scene, label)
 
     @staticmethod
-    def _add_springs(joints: list, scene: Scene) -> None:  # type: ignore[type-arg]
-        for i, k, at in walls(scene, "dart:joint-spring"):
+    def _add_springs(joints: list[Any], scene: Scene, label: Label) -> None:
+        for i, k, at in walls(scene, label):
             joints[i].setSpringStiffness(0, k)
             joints[i].setRestPosition(0, at)
         for term in scene.terms:

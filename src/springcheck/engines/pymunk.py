@@ -15,7 +15,6 @@ from springcheck.engines.contract import (
     SPRINGS,
     Engine,
     Label,
-    Method,
     by_name,
     named,
 )
@@ -39,25 +38,23 @@ def arithmetic(label: Label) -> Arithmetic:
 class _Space(Bodies):
     """Chipmunk's space in motion."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    x, y, v = "position.x", "position.y", "velocity.x"
+
+    def begin(self, label: Label, step: float) -> None:
         import pymunk
 
-        springs = method.name == "damped-spring"
-        super().__init__(scene, springs=springs)
-        self._h = step
-        self._space = space = pymunk.Space()
-        for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
-            # without a moment of inertia that is finite nothing turns
-            body = pymunk.Body(m, float("inf"))
-            body.position, body.velocity = (q, 0.0), (p / m, 0.0)
-            space.add(body)
-            self.bodies.append(body)
-        if springs:
-            self._add_springs(pymunk, scene)
+        self._library, self._h, self._space = pymunk, step, pymunk.Space()
 
-    def _add_springs(self, pymunk: object, scene: Scene) -> None:
+    def add(self, m: float, q: float, v: float) -> Any:
+        # without a moment of inertia that is finite nothing turns
+        body = self._library.Body(m, float("inf"))
+        body.position, body.velocity = (q, 0.0), (v, 0.0)
+        self._space.add(body)
+        return body
+
+    def tie(self, scene: Scene, label: Label) -> None:
         length, bodies, wall = far(scene), self.bodies, self._space.static_body
-        spring = pymunk.DampedSpring  # type: ignore[attr-defined]
+        spring = self._library.DampedSpring
         for term in scene.terms:
             if isinstance(term, WallSpring):
                 for i, k, at in term.rows():
@@ -66,12 +63,6 @@ class _Space(Bodies):
                 for a, b, k, rest in term.rows():
                     # from a, moved back by the length, to b
                     self._space.add(spring(bodies[a], bodies[b], (rest - length, 0), (0, 0), length, k, 0.0))
-
-    def position(self, body: Any) -> Any:
-        return body.position
-
-    def velocity(self, body: Any) -> Any:
-        return body.velocity
 
     def push(self, body: Any, force: float) -> None:
         body.force = (force, 0.0)

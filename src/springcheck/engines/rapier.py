@@ -15,7 +15,6 @@ from springcheck.engines.contract import (
     EVERY_FORCE,
     Engine,
     Label,
-    Method,
     Stopped,
     by_name,
     named,
@@ -28,37 +27,32 @@ from springcheck.physics.scene import Scene
 class _World(Bodies):
     """Rapier's world in motion."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    x, y, v = "translation.x", "translation.y", "linvel.x"
+
+    def begin(self, label: Label, step: float) -> None:
         import rapier3d
 
         if step < 0:
             raise MethodError(f"{label}: Rapier takes no negative step")
-        joints = method.name == "spring-joint"
-        super().__init__(scene, springs=joints)
-        self._world = world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
-        world.integration_parameters.dt = step
-        self._fastest = world.integration_parameters.normalized_max_linear_velocity
-        handles = []
-        for m, q, p in zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True):
-            body = rapier3d.RigidBody.dynamic(
-                translation=(q, 0, 0), linvel=(p / m, 0, 0), additional_mass=m, can_sleep=False
-            )
-            handles.append(world.add_body(body))
-        self.bodies = [world.rigid_bodies[handle] for handle in handles]
-        if joints:
-            self._add_joints(rapier3d, scene, handles)
+        self._library = rapier3d
+        self._handles: list[Any] = []
+        self._world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
+        self._world.integration_parameters.dt = step
+        self._fastest = self._world.integration_parameters.normalized_max_linear_velocity
 
-    def _add_joints(self, library: Any, scene: Scene, handles: list[Any]) -> None:
-        length, ground = far(scene), self._world.add_body(library.RigidBody.fixed())
-        for i, k, at in walls(scene, "rapier:spring-joint"):
-            joint = library.SpringJointBuilder(length, k, 0.0).local_anchor1((at - length, 0, 0)).build()
-            self._world.impulse_joints.insert(ground, handles[i], joint, True)
+    def add(self, m: float, q: float, v: float) -> Any:
+        body = self._library.RigidBody.dynamic(
+            translation=(q, 0, 0), linvel=(v, 0, 0), additional_mass=m, can_sleep=False
+        )
+        self._handles.append(self._world.add_body(body))
+        return self._world.rigid_bodies[self._handles[-1]]
 
-    def position(self, body: Any) -> Any:
-        return body.translation
-
-    def velocity(self, body: Any) -> Any:
-        return body.linvel
+    def tie(self, scene: Scene, label: Label) -> None:
+        length, ground = far(scene), self._world.add_body(self._library.RigidBody.fixed())
+        for i, k, at in walls(scene, label):
+            spring = self._library.SpringJointBuilder(length, k, 0.0)
+            joint = spring.local_anchor1((at - length, 0, 0)).build()
+            self._world.impulse_joints.insert(ground, self._handles[i], joint, True)
 
     def push(self, body: Any, force: float) -> None:
         body.reset_forces(True)
