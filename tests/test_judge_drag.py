@@ -59,7 +59,7 @@ def test_a_friction_below_the_noise_of_a_velocity_is_seen_in_many_steps(well: bo
     # by a single step it could not be: it is a tenth of a rounding of that velocity
     case = checks.Case(trajectory=rebuilt(scene), scene=scene)
     assert case.ahead is not None
-    assert np.all(1e-7 * scene.step * np.abs(scene.p) < 0.5 * np.median(case.ahead.of_p, axis=0))
+    assert np.all(1e-7 * scene.step * np.abs(scene.p) < 0.5 * np.median(case.ahead.allowance[1], axis=0))
 
 
 def test_frames_several_steps_apart_show_it_too() -> None:

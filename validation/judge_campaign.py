@@ -635,8 +635,7 @@ def _fault(counts: Counts, scene: Scene, wrong: Trajectory, kind: str, what: str
         for _ in range(scene.every):
             q, p = right(q, p)
         off = np.abs(q - wrong.q[1:]), np.abs(p - wrong.p[1:])
-        allowed = case.ahead.of_q, case.ahead.of_p
-        ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, allowed, strict=True)]
+        ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, case.ahead.allowance, strict=True)]
         effect = float(np.nanmax([0.0, *np.ravel(ratios)]))
     verdicts = judged(counts, scene, wrong, what)
     seen = any(v.passed is False for v in verdicts)

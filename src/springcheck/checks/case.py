@@ -163,14 +163,16 @@ class Case:
     def next_states(self) -> tuple[Extended, Extended]:
         """The scheme's own next state after each frame but the last, in extended precision."""
         if self.ahead is not None:
-            return self.ahead.q, self.ahead.p
+            q, p = self.ahead.end
+            return q, p
         return advance(self, *self._starts, self.trajectory.every)
 
     @cached_property
     def allowance(self) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
         if self.trajectory.every == 1 and self.ahead is not None:
-            return self.ahead.of_q, self.ahead.of_p
+            of_q, of_p = self.ahead.allowance
+            return of_q, of_p
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 
     def allowance_at(
@@ -203,11 +205,15 @@ class Case:
             return np.maximum.accumulate(np.max([self.system.norm.size(*end) for end in ends], axis=0))
 
     @cached_property
+    def mode_start(self) -> tuple[Extended, Extended]:
+        """The start of the scene in its modes, about their centres (n,)."""
+        return self.system.modes.about_centres(self.scene.q, self.scene.p)
+
+    @cached_property
     def closed_states(self) -> tuple[Extended, Extended]:
         """The scheme's closed-form motion at the frames: modes about their centres, (f, n) each."""
-        y, v = self.system.modes.into(self.scene.q, self.scene.p)
         return schemes.propagate(
-            self.matrices, y - self.system.modes.centre(), v, self.steps, area_preserving=self.area_preserving
+            self.matrices, *self.mode_start, self.steps, area_preserving=self.area_preserving
         )
 
     @cached_property
@@ -278,13 +284,11 @@ class Case:
         Each mode stays within its invariant ellipse, whose axes have the ratio `schemes.condition`;
         a mode that does not turn is left at its start.
         """
-        y, v = self.system.modes.into(self.scene.q, self.scene.p)
-        centre = self.system.modes.centre()
+        modes, (u, v) = self.system.modes, self.mode_start
         axes = schemes.condition(self.matrices, self.w)
-        reach = np.hypot(self.w * (y - centre), v) * np.where(np.isfinite(axes), axes, 1)
-        rest, _ = self.system.modes.out_of(centre, np.zeros_like(centre))
-        q = np.abs(rest) + self.system.modes.spread(reach / self.w) / self.system.modes.root_m
-        return np.asarray(q), np.asarray(self.system.modes.spread(reach) * self.system.modes.root_m)
+        reach = np.hypot(self.w * u, v) * np.where(np.isfinite(axes), axes, 1)
+        q = np.abs(modes.rest) + modes.spread(reach / self.w) / modes.root_m
+        return np.asarray(q), np.asarray(modes.spread(reach) * modes.root_m)
 
     @cached_property
     def origins(self) -> Floats:
@@ -350,6 +354,5 @@ def _leap(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, E
         for y, v in ((one, none), (none, one))
     ]
     (a, c), (b, d) = powers
-    y, v = case.system.modes.into(q, p)
-    u = y - case.system.modes.centre()
-    return case.system.modes.out_of(a * u + b * v + case.system.modes.centre(), c * u + d * v)
+    u, v = case.system.modes.about_centres(q, p)
+    return case.system.modes.from_centres(a * u + b * v, c * u + d * v)

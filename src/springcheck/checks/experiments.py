@@ -262,7 +262,7 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     ]
     if not all(np.all(known(case, way, steps)) for way in ways):
         return None
-    ends = 2 * case.system.norm.size(ways[1].of_q, ways[1].of_p)[0]
+    ends = 2 * case.system.norm.size(*ways[1].allowance)[0]
     return float(ends / size) if size > 0 else 0.0
 
 

@@ -10,7 +10,7 @@ from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import STILL, closed_or_not
-from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
+from springcheck.physics.arrays import WIDE, Extended, Integers, Reals
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
@@ -18,8 +18,7 @@ from springcheck.text.wording import count
 @check("closed", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
 def closed_form(case: Case) -> Finding | str:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
-    y, v = case.closed_states
-    q, p = case.system.modes.out_of(y + case.system.modes.centre(), v)
+    q, p = case.system.modes.from_centres(*case.closed_states)
     distance = case.system.norm.size(case.trajectory.q - q, case.trajectory.p - p)
     moved = case.system.norm.size(q - case.scene.q, p - case.scene.p)
     bound, unit = case.growth
@@ -79,21 +78,19 @@ def shadow_energy(case: Case) -> Finding | str:
     form = schemes.invariant(case.matrices, h=run.step)
     turn = schemes.rotation(case.matrices)
     factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
-    y0, v0 = case.system.modes.into(case.scene.q, case.scene.p)
-    u0 = y0 - case.system.modes.centre()
+    (u0, v0), rest = case.mode_start, np.asarray(case.system.modes.rest, np.float64)
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
     with np.errstate(over="ignore", invalid="ignore"):
-        y, v = case.system.modes.into(run.q, run.p)
-        u = y - case.system.modes.centre()
+        u, v = case.system.modes.about_centres(run.q, run.p)
         stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
         expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = case.growth
-    size = np.maximum.accumulate(case.system.norm.size(run.q - _rest(case), run.p))
+    size = np.maximum.accumulate(case.system.norm.size(run.q - rest, run.p))
     if case.steps[0] != 0:
         most_q, most_p = case.envelope
-        size = np.maximum(size, case.system.norm.size(most_q - np.abs(_rest(case)), most_p))
+        size = np.maximum(size, case.system.norm.size(most_q - np.abs(rest), most_p))
     with np.errstate(over="ignore", invalid="ignore"):
         scale = 2 * shape * size * unit
         off = np.max(np.abs(stored - expected), axis=1)
@@ -127,30 +124,24 @@ def shadow_energy(case: Case) -> Finding | str:
     )
 
 
-def _rest(case: Case) -> Floats:
-    q, _ = case.system.modes.out_of(case.system.modes.centre(), np.zeros_like(case.system.modes.w2))
-    return np.asarray(q, np.float64)
-
-
 @check("freq", family="motion", needs="a mode that oscillates without friction", unless=closed_or_not)
 def frequency(case: Case) -> Finding | str:
     """The phase turns by the scheme's own frequency, to rounding."""
     if case.scene.system.is_damped:
         return "a phase that decays is seen in the closed form"
     turn = schemes.rotation(case.matrices)
-    y0, v0 = case.system.modes.into(case.scene.q, case.scene.p)
-    u0 = y0 - case.system.modes.centre()
+    u0, v0 = case.mode_start
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
     j = int(np.argmax(strength))
     if strength[j] <= 0:
         return "no mode oscillates"
     form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
-    y, v = case.system.modes.into(case.trajectory.q[-1], case.trajectory.p[-1])
+    u, v = case.system.modes.about_centres(case.trajectory.q[-1], case.trajectory.p[-1])
     steps = int(case.steps[-1])
     if steps == 0:
         return "nothing has moved yet"
     # in the coordinates of the invariant form a step is a plain rotation by -angle
-    phase = _phase(form, (y - case.system.modes.centre())[j], v[j]) - _phase(form, u0[j], v0[j])
+    phase = _phase(form, u[j], v[j]) - _phase(form, u0[j], v0[j])
     # on an inverted spring a scheme that goes back on part of its way can turn the other way
     backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)

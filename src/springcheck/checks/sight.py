@@ -156,11 +156,9 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States
     at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
-    y, v = case.system.modes.into(case.scene.q, case.scene.p)
-    start = y - case.system.modes.centre(), v
 
     def states(matrices: Extended) -> States:
-        return schemes.propagate(matrices, *start, steps, area_preserving=case.area_preserving)
+        return schemes.propagate(matrices, *case.mode_start, steps, area_preserving=case.area_preserving)
 
     with np.errstate(all="ignore"):
         found = ((name, changed_matrices(case, name, change)) for name in NAMES)

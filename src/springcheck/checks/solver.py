@@ -123,38 +123,27 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
     separate = scene.system.is_separate
     if scene.system.solution is None or (not separate and n > JOINED):
         return None
-    unit = _units(case)
+    unit = np.stack(_units(case))
+    # separate particles are all pushed at once
+    pushes = np.eye(2)[..., None] * unit if separate else np.eye(2 * n).reshape(2 * n, 2, n) * unit
     h = duration / TIMES
     steps = np.arange(TIMES + 1)
     columns: list[Extended] = []
-    size = 2 if separate else 2 * n
-    for j in range(size):
-        # separate particles are all moved at once
-        here = np.ones(n, dtype=bool) if separate else np.arange(n) == j % n
-        moves = (j == 0) if separate else j < n
-        amount = np.where(here, unit[0 if moves else 1], 0)
-        ends = []
-        changes = []
-        for sign in (1, -1):
-            q, p = scene.q + sign * amount * moves, scene.p + sign * amount * (not moves)
-            moved = replace(scene, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
-            changes.append((moved.q, moved.p))
-            if not exact.has_true_motion(moved):
-                return None
-            ends.append(exact.true_motion(moved, steps, h))
+    for push in pushes:
+        moved = [np.asarray([scene.q, scene.p] + sign * push, np.float64) for sign in (1, -1)]
+        scenes = [replace(scene, q=q, p=p) for q, p in moved]
+        if not all(map(exact.has_true_motion, scenes)):
+            return None
+        one, other = (np.stack(exact.true_motion(start, steps, h), axis=1) for start in scenes)
         # by what the doubles really differ
-        change = (changes[0][0] - changes[1][0]) if moves else (changes[0][1] - changes[1][1])
-        scale = np.where(change == 0, 1, change) / np.where(here, unit[0 if moves else 1], 1)
-        by = np.asarray(scale if separate else scale[j % n])
-        columns.append(
-            np.stack([(a - b) / (u * by) for a, b, u in zip(ends[0], ends[1], unit, strict=True)], axis=-1)
-        )
-    # (d, f, n, 2): which column, time, particle, q or p
-    table = np.stack(columns)
+        change = (moved[0] - moved[1]) / unit
+        with np.errstate(divide="ignore", invalid="ignore"):
+            columns.append((one - other) / (unit * np.sum(change, axis=0 if separate else None)))
+    # (d, f, 2, n): which column, time, q or p, particle
+    table = np.stack(columns).astype(np.float64)
     if separate:
-        return np.asarray(np.moveaxis(table, 0, -1), np.float64)
-    flat = np.concatenate([table[..., 0], table[..., 1]], axis=-1)
-    return np.asarray(np.moveaxis(flat, 0, -1), np.float64)
+        return np.moveaxis(table, (0, 3), (3, 1))
+    return np.moveaxis(table.reshape(2 * n, TIMES + 1, 2 * n), 0, -1)
 
 
 JOINED = 4

@@ -12,9 +12,8 @@ from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
-from springcheck.checks.sight import States
 from springcheck.checks.stretch import Stretch, known
-from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
+from springcheck.physics.arrays import Arithmetic, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_JOINED
 from springcheck.physics.trajectory import Limits
@@ -129,12 +128,8 @@ def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> Limits:
     if ahead is None:
         unit = case.allowance_of_stretches * bound
         return sight.of_steps(case, told, lambda at, change: case.system.norm.size(*change) / unit[at])
-    most = [case.roundings * x for x in (ahead.of_q, ahead.of_p)]
-
-    def part(at: Integers, change: States) -> Reals:
-        return np.asarray([off / of[at] for off, of in zip(change, most, strict=True)])
-
-    return sight.of_steps(case, told, part)
+    most = case.roundings * ahead.allowance
+    return sight.of_steps(case, told, lambda at, change: np.asarray(change) / most[:, at])
 
 
 def first_off(case: Case) -> int | None:
@@ -172,9 +167,9 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
 def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
     """The same in allowances of each degree of freedom, the largest (f-1,)."""
     with np.errstate(all="ignore"):
-        off = (np.abs(ahead.q - to_q), ahead.of_q), (np.abs(ahead.p - to_p), ahead.of_p)
+        off = np.abs(ahead.end - np.stack([to_q, to_p]))
         # where nothing rounds nothing may be off: 0 of 0 is 0
-        return np.asarray(np.max(np.maximum(*(np.where(d == 0, 0, d / of) for d, of in off)), axis=1))
+        return np.asarray(np.max(np.where(off == 0, 0, off / ahead.allowance), axis=(0, 2)))
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
@@ -233,7 +228,7 @@ def arithmetic(case: Case) -> Finding | str:
     alone = seen.value
     if case.ahead is not None and case.trajectory.every > 1:
         told = known(case, case.ahead, case.trajectory.every)
-        last = replace(case.ahead, of_q=case.ahead.last_q, of_p=case.ahead.last_p)
+        last = replace(case.ahead, allowance=case.ahead.last)
         alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
     coarser, fine = (float(np.max(x.system.norm.size(*x.allowance))) for x in (case, finer))

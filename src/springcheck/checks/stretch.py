@@ -36,20 +36,17 @@ NUMBERS = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
-    """Where s steps of the scheme lead from each state (f, n), and the allowance there, all extended."""
+    """Where s steps of the scheme lead from each of f states, q and p as (2, f, n), all extended."""
 
-    q: Extended
-    p: Extended
-    of_q: Extended
-    of_p: Extended
-    reach_q: Extended
-    reach_p: Extended
-    """The largest |q| and |p| on the way (f, n)."""
+    end: Extended
+    allowance: Extended
+    """What the roundings of all steps may have become there (2, f, n)."""
+    last: Extended
+    """The allowance of the last step alone (2, f, n)."""
+    reach: Extended
+    """The largest |q| and |p| on the way (2, f, n)."""
     turns: Extended
     """The largest h**2 |K|/m at a force on the way (f,): below 1 an implicit step has one solution."""
-    last_q: Extended
-    last_p: Extended
-    """The allowance of the last step alone (f, n)."""
 
 
 BENT = 0.125
@@ -60,16 +57,13 @@ counts."""
 def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
     """Of which of these ways of so many steps the end, and what rounding does to it, are known (f,)."""
     with np.errstate(all="ignore"):
-        parts = [ahead.q, ahead.p, ahead.of_q, ahead.of_p]
-        told = np.all([np.all(np.isfinite(part), axis=1) for part in parts], axis=0)
+        told = np.isfinite([ahead.end, ahead.allowance]).all(axis=(0, 1, 3))
         if not case.system.is_linear and steps > 1:
             span = steps * np.longdouble(abs(case.trajectory.step)) / case.judged.m
-            reach_q, reach_p = ahead.reach_q + span * ahead.reach_p, ahead.reach_p + ahead.reach_q / span
-            near = (case.roundings * ahead.of_q <= BENT * reach_q) & (
-                case.roundings * ahead.of_p <= BENT * reach_p
-            )
+            reach = ahead.reach + np.stack([span * ahead.reach[1], ahead.reach[0] / span])
+            near = case.roundings * ahead.allowance <= BENT * reach
             # with several solutions to a step, an engine may have found another one
-            told &= np.all(near, axis=1) & (ahead.turns < 1)
+            told &= np.all(near, axis=(0, 2)) & (ahead.turns < 1)
     return np.asarray(told)
 
 
@@ -78,42 +72,40 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     if steps == 1:
         near = None if case.system.is_linear else case.trajectory.q[1:].astype(np.longdouble)
         end, bound = _one(case, q, p, near=near)
-        reach = np.maximum(np.abs(q), np.abs(end[0])), np.maximum(np.abs(p), np.abs(end[1]))
-        q, p, of_q, of_p = *end, *bound
-        return Stretch(
-            q=q, p=p, of_q=of_q, of_p=of_p, reach_q=reach[0], reach_p=reach[1], last_q=of_q, last_p=of_p,
-            turns=np.zeros(len(q), dtype=np.longdouble),
-        )  # fmt: skip
+        reach = np.maximum(np.abs([q, p]), np.abs(end))
+        turns = np.zeros(len(q), dtype=np.longdouble)
+        return Stretch(end=end, allowance=bound, last=bound, reach=reach, turns=turns)
     size = 2 if case.system.is_separate else 2 * q.shape[1]
     each = steps * q.shape[1] * (8 if case.system.is_linear else 2 * size)
     rows = max(1, NUMBERS // each)
     parts = [_many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
-    return Stretch(**{name: np.concatenate([getattr(x, name) for x in parts]) for name in Stretch.__slots__})
+    whole = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=0 if name == "turns" else 1)
+        for name in Stretch.__slots__
+    }
+    return Stretch(**whole)
 
 
-States = tuple[Extended, Extended]
-
-
-def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> tuple[States, States]:
-    """One step, and the allowance of that step."""
+def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> tuple[Extended, Extended]:
+    """One step, and the allowance of that step, (2, ..., n) each."""
     places: list[Reals] | None = [] if case.placed else None
     end = case.step(q, p, met=places, near=near)
     with np.errstate(all="ignore"):
-        return end, rounding.of_step(case, q, p, places, recorded=near is not None)
+        return np.stack(end), np.stack(rounding.of_step(case, q, p, places, recorded=near is not None))
 
 
 def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     separate = case.system.is_separate
-    on_q, on_p = np.empty((2, steps + 1, *q.shape), dtype=np.longdouble)
-    on_q[0], on_p[0] = q, p
+    on = np.empty((2, steps + 1, *q.shape), dtype=np.longdouble)
+    on[:, 0] = q, p
     with np.errstate(all="ignore"):
         for i in range(steps):
-            on_q[i + 1], on_p[i + 1] = case.step(on_q[i], on_p[i])
+            on[:, i + 1] = case.step(*on[:, i])
         # what belongs to each step alone is worked out for all steps at once
-        at_q, at_p = (x[:-1].reshape(-1, q.shape[1]) for x in (on_q, on_p))
+        at_q, at_p = on[:, :-1].reshape(2, -1, q.shape[1])
         _, bound = _one(case, at_q, at_p)
-        each_q, each_p = (x.reshape(steps, *q.shape) for x in bound)
-        bounds = _pack(each_q, each_p, separate)
+        each = bound.reshape(2, steps, *q.shape)
+        bounds = _joined(separate)(list(each), axis=-1)
         if case.system.is_linear:
             one = tangent(case, q[:1], p[:1])
             maps = np.broadcast_to(one, (steps, *one.shape))
@@ -122,19 +114,21 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
             maps = maps.reshape(steps, len(q), *maps.shape[1:])
         turns = np.zeros(len(q), dtype=np.longdouble)
         if case.scheme.implicit and not case.system.is_linear:
-            turns = np.max([_turn(case, at) for at in on_q[1:]], axis=0)
+            turns = np.max([_turn(case, at) for at in on[0, 1:]], axis=0)
         carried = np.zeros_like(bounds[0])
         power: Extended = np.broadcast_to(np.eye(maps.shape[-1], dtype=np.longdouble), maps.shape[1:])
         for i in reversed(range(steps)):
             carried = carried + _apply(np.abs(power), bounds[i])
             if i:
                 power = power @ maps[i]
-    of_q, of_p = _unpack(carried, separate)
-    last_q, last_p = _unpack(bounds[-1], separate)
-    return Stretch(
-        q=on_q[-1], p=on_p[-1], of_q=of_q, of_p=of_p, last_q=last_q, last_p=last_p, turns=turns,
-        reach_q=np.max(np.abs(on_q), axis=0), reach_p=np.max(np.abs(on_p), axis=0),
-    )  # fmt: skip
+    allowance = np.moveaxis(carried, -1, 0) if separate else np.stack(np.split(carried, 2, axis=-1))
+    reach = np.max(np.abs(on), axis=1)
+    return Stretch(end=on[:, -1], allowance=allowance, last=each[:, -1], reach=reach, turns=turns)
+
+
+def _joined(separate: bool) -> Callable[..., Extended]:
+    """How what belongs to q and to p becomes one: as pairs of single particles, or as a row of all."""
+    return np.stack if separate else np.concatenate
 
 
 def _turn(case: Case, q: Extended) -> Extended:
@@ -149,17 +143,6 @@ def _apply(matrix: Extended, x: Extended) -> Extended:
         return np.asarray(x @ matrix[0].T)
     found = (matrix @ x[..., None])[..., 0]
     return np.asarray(found)
-
-
-def _pack(q: Extended, p: Extended, separate: bool) -> Extended:
-    return np.stack([q, p], axis=-1) if separate else np.concatenate([q, p], axis=-1)
-
-
-def _unpack(z: Extended, separate: bool) -> States:
-    if separate:
-        return z[..., 0], z[..., 1]
-    n = z.shape[-1] // 2
-    return z[..., :n], z[..., n:]
 
 
 def tangent(case: Case, q: Extended, p: Extended) -> Extended:
@@ -181,9 +164,7 @@ def tangent(case: Case, q: Extended, p: Extended) -> Extended:
         return case.system.slope(q[0])[0][None], not separate
 
     q, p = case.step(dq, dp, forces=variational(case.system), slope=slope)
-    if separate:
-        return np.stack([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)
-    return np.concatenate([np.moveaxis(q[1:], 0, -1), np.moveaxis(p[1:], 0, -1)], axis=-2)
+    return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in (q, p)], axis=-2)
 
 
 def variational(system: System) -> Callable[[Iterable[Term]], Force]:

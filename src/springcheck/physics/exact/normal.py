@@ -66,12 +66,26 @@ class Modes:
         """Positions and momenta of states in mode coordinates (..., n)."""
         return self._turned(y, True) / self.root_m, self._turned(v, True) * self.root_m
 
+    def about_centres(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
+        """The same as `into`, positions counted from the rest of each mode."""
+        y, v = self.into(q, p)
+        return y - self.centre(), v
+
+    def from_centres(self, u: Extended, v: Extended) -> tuple[Extended, Extended]:
+        """Positions and momenta of states whose mode positions are counted from the rest of each mode."""
+        return self.out_of(u + self.centre(), v)
+
     def _turned(self, y: Extended, back: bool) -> Extended:
         if self.waves:
             return _sines(y)
         if self.vectors is None:
             return y
         return y @ (self.vectors.T if back else self.vectors)
+
+    @property
+    def rest(self) -> Extended:
+        """Where every mode is at its centre: positions (n,) [L]."""
+        return self.out_of(self.centre(), np.zeros_like(self.w2))[0]
 
     def spread(self, reach: Extended) -> Extended:
         """|V| reach (n,): bound of what modes of these amplitudes add up to on each particle."""
