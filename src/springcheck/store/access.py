@@ -6,12 +6,16 @@ are refused, and so are filters that would load a library.  Sizes, counts, depth
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
+from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool
 
@@ -32,6 +36,13 @@ EXPANSION = 1100
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, 32000}
 """Built into h5py; 32000 is its LZF."""
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """A file open for reading, whatever it does to libhdf5 (see `trust`).  StoreError where it cannot be."""
+    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        yield file
 
 
 def refuse(node: Any, why: str) -> StoreError:

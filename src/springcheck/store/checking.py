@@ -22,7 +22,7 @@ LONGEST_CHECK = 1 << 31
 """Bytes of a file that a command checks before it shows numbers of it; `check` reads them all."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """Something wrong with a store: an HDF5 path or a file, and what is wrong there."""
 
@@ -47,7 +47,7 @@ def check(path: str | Path, *, most: int | None = None) -> list[Finding]:
     found: list[Finding] = []
     for part in everything:
         where = "" if part == path else f"{part.name}: "
-        found += [Finding(place=where + f.place, what=f.what) for f in check_file(part, most)]
+        found += [Finding(where + f.place, f.what) for f in check_file(part, most)]
     return found
 
 
@@ -63,37 +63,31 @@ def check_file(path: Path, most: int | None = None) -> list[Finding]:
     with files.told(path, "read"):
         known = seal.find(path)
         if not h5py.is_hdf5(path):
-            return [Finding(place="/", what="is no HDF5 file")]
+            return [Finding("/", "is no HDF5 file")]
         if known is None:
-            found.append(
-                Finding(place="/", what="no seal at the end: cut off, or changed by another program")
-            )
+            found.append(Finding("/", "no seal at the end: cut off, or changed by another program"))
         else:
             if most is None or known.end <= most:
                 found += [
-                    Finding(place=name, what="its bytes have changed since it was written")
+                    Finding(name, "its bytes have changed since it was written")
                     for name in seal.broken(path, known)
                 ]
             else:
                 size = files.readable(known.end)
-                found.append(Finding(place="/observables", what=f"not checked, {size} long: check does it"))
+                found.append(Finding("/observables", f"not checked, {size} long: check does it"))
             if seal.is_whole(path, known):
                 return found + list(structure(path, arrays=False))
             found.append(
-                Finding(
-                    place="/", what="bytes of groups, attributes or tables have changed since it was written"
-                )
+                Finding("/", "bytes of groups, attributes or tables have changed since it was written")
             )
     try:
-        said = [
-            Finding(place=place, what=what) for place, what in json.loads(trust.guarded(path, trust.OURS))
-        ]
+        said = [Finding(place, what) for place, what in json.loads(trust.guarded(path, trust.OURS))]
         # of what is no store nothing else needs to be said
         found = said if said and NO_STORE in said[0].what else found + said
     except StoreError as error:
-        found.append(Finding(place="/", what=str(error)))
+        found.append(Finding("/", str(error)))
     except ValueError:
-        found.append(Finding(place="/", what="it is damaged, reading it crashes the HDF5 library"))
+        found.append(Finding("/", "it is damaged, reading it crashes the HDF5 library"))
     return found
 
 
@@ -104,13 +98,13 @@ def structure(path: Path, *, arrays: bool = True) -> list[Finding]:
     """
     found: list[Finding] = []
     try:
-        with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+        with access.opened(path) as file:
             for finding in _structure(file, arrays=arrays):
                 found.append(finding)
                 if len(found) == MOST_FINDINGS:
                     break
     except StoreError as error:
-        found.append(Finding(place="/", what=str(error)))
+        found.append(Finding("/", str(error)))
     return found
 
 
@@ -121,23 +115,23 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Finding]:
             layout.EXPORTED: "is an exported trajectory",
             layout.OLDER: "was written by an older springcheck",
         }.get(str(root.get("format")), f"is not marked as {layout.FORMAT!r}")
-        yield Finding(place="/", what=f"{what}, {NO_STORE}")
+        yield Finding("/", f"{what}, {NO_STORE}")
         return
     head = access.group_at(file, "h5md")
     if head is None or access.attributes(head).get("version") != [1, 1]:
-        yield Finding(place="/h5md", what="missing, or not version 1.1")
+        yield Finding("/h5md", "missing, or not version 1.1")
     for name in ("author", "creator"):
         group = access.group_at(file, f"h5md/{name}")
         if group is None or "name" not in access.attributes(group):
-            yield Finding(place=f"/h5md/{name}", what="missing")
+            yield Finding(f"/h5md/{name}", "missing")
     trees = ("parameters", "observables", "particles")
     for label in sorted({label for tree in trees for label in access.children(file, tree)}):
         try:
             yield from _trajectory(file, label, arrays=arrays)
         except files.BROKEN as error:
-            yield Finding(place=f"/observables/{label}", what=f"cannot be read: {files.cause(error)}")
+            yield Finding(f"/observables/{label}", f"cannot be read: {files.cause(error)}")
         except StoreError as error:
-            yield Finding(place=f"/observables/{label}", what=str(error))
+            yield Finding(f"/observables/{label}", str(error))
     if "part" in root:
         return
     yield from _contents(file, root)
@@ -148,29 +142,29 @@ def _contents(file: Any, root: dict[str, Any]) -> Iterator[Finding]:
     try:
         kept = msgspec.json.decode(str(root.get(digests.KEY)), type=dict[str, str])
     except (msgspec.MsgspecError, RecursionError):
-        yield Finding(place="/", what="the list of its digests is missing")
+        yield Finding("/", "the list of its digests is missing")
         return
     now = digests.contents(file, tables.all_names(file))
     for place in sorted(kept.keys() | now.keys()):
         if place not in now:
-            yield Finding(place=place, what="missing")
+            yield Finding(place, "missing")
         elif place not in kept:
-            yield Finding(place=place, what="was added after it was written")
+            yield Finding(place, "was added after it was written")
         elif kept[place] != now[place]:
             whole = "attributes" if place == "/" or place.startswith("/parameters/") else "content"
-            yield Finding(place=place, what=f"its {whole} changed since it was written (sha256)")
+            yield Finding(place, f"its {whole} changed since it was written (sha256)")
 
 
 def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Finding]:
     place = f"/parameters/{label}"
     group = access.group_at(file, place)
     if group is None:
-        yield Finding(place=place, what="missing")
+        yield Finding(place, "missing")
         return
     try:
         known = records.record(place, access.attributes(group))
     except StoreError as error:
-        yield Finding(place=place, what=str(error))
+        yield Finding(place, str(error))
         return
     found: dict[str, str] = {}
     whole = True
@@ -183,7 +177,7 @@ def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Finding]:
                 dataset = access.array(file, at, expected, "i" if kind == "step" else "f")
             except StoreError as error:
                 whole = False
-                yield Finding(place=at, what=str(error))
+                yield Finding(at, str(error))
                 continue
             key = name if kind == "value" else kind
             if not arrays or key in found or kind == "step":
@@ -192,16 +186,16 @@ def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Finding]:
             columns[key] = Column(path=at, shape=expected)
             if access.attributes(dataset).get("sha256") != found[key]:
                 whole = False
-                yield Finding(place=at, what="does not match its sha256")
+                yield Finding(at, "does not match its sha256")
     units = layout.UNITS[known.kind, known.units]
     for name in (*known.kept, "time"):
         at = f"/observables/{label}/" + (f"{name}/value" if name in known.kept else f"{known.kept[0]}/time")
         node = access.find(file, at)
         said = {} if node is None else access.attributes(node)
         if said.get("unit") != units[name] or said.get("units") != units[name]:
-            yield Finding(place=at, what=f"its unit is not {units[name]}")
+            yield Finding(at, f"its unit is not {units[name]}")
     if arrays and whole and digests.combined(found, columns) != known.sha256:
-        yield Finding(place=place, what="its sha256 is not that of the numbers")
+        yield Finding(place, "its sha256 is not that of the numbers")
     if known.kind == "particles":
         yield from _particles(file, label, known)
 
@@ -217,17 +211,17 @@ def _particles(file: Any, label: str, known: records.Record) -> Iterator[Finding
         whose = name if name in access.children(file, f"observables/{label}") else source
         inside = [(".", f"/observables/{label}/{whose}/value")]
         if not isinstance(view, h5py.Dataset):
-            yield Finding(place=at, what="missing")
+            yield Finding(at, "missing")
         elif not view.is_virtual or [(x.file_name, x.dset_name) for x in view.virtual_sources()] != inside:
-            yield Finding(place=at, what=f"is no view of the recorded {whose}")
+            yield Finding(at, f"is no view of the recorded {whose}")
         elif view.shape != shape:
-            yield Finding(place=at, what=f"has shape {view.shape}, not {shape}")
+            yield Finding(at, f"has shape {view.shape}, not {shape}")
         elif "unit" not in access.attributes(view):
-            yield Finding(place=at, what="attribute unit is missing")
+            yield Finding(at, "attribute unit is missing")
         for kind in ("time", "step"):
             if access.find(file, f"{base}/{name}/{kind}") is None:
-                yield Finding(place=f"{base}/{name}/{kind}", what="missing")
+                yield Finding(f"{base}/{name}/{kind}", "missing")
     if {"q", "p"} & set(known.kept):
         box = access.group_at(file, f"{base}/box")
         if box is None or not {"dimension", "boundary"} <= access.attributes(box).keys():
-            yield Finding(place=f"{base}/box", what="missing, or without dimension and boundary")
+            yield Finding(f"{base}/box", "missing, or without dimension and boundary")

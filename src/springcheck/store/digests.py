@@ -39,9 +39,8 @@ def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
 def of_array(dataset: Any) -> str:
     """sha256 of a recorded array, in bounded memory."""
     total = hashlib.sha256()
-    rows = max(1, PIECE // max(1, int(np.prod(dataset.shape[1:]))))
-    for start in range(0, len(dataset), rows):
-        total.update(np.ascontiguousarray(dataset[start : start + rows]).data)
+    for values in blocks(dataset):
+        total.update(np.ascontiguousarray(values).data)
     return total.hexdigest()
 
 

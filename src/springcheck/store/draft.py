@@ -21,7 +21,6 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.store import access, digests, files, layout, seal
 from springcheck.store.access import Scalar
-from springcheck.store.layout import Column
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -116,7 +115,8 @@ class Draft:
 
     def _create(self, frames: int) -> None:
         self._columns = layout.columns(self.label, self.scene, frames)
-        self._offsets = _lay_out(self._temporary, self.label, self.scene, frames, self._columns)
+        with layout.fresh(self._temporary, sum(column.size for column in self._columns.values())) as file:
+            self._offsets = layout.skeleton(file, self.label, self.scene, frames)
         for name, offset in self._offsets.items():
             self._files[name] = self._temporary.open("rb+", buffering=0)
             self._files[name].seek(offset)
@@ -216,11 +216,3 @@ class Draft:
     def __exit__(self, *_: object) -> None:
         with self._stack:
             self._close()
-
-
-def _lay_out(
-    path: Path, label: str, scene: Scene, frames: int, columns: Mapping[str, Column]
-) -> dict[str, int]:
-    total = sum(column.size for column in columns.values())
-    with layout.fresh(path, total) as file:
-        return layout.skeleton(file, label, scene, frames)

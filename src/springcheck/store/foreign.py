@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
-from springcheck.store import access, files, layout, trust
+from springcheck.store import access, layout, trust
 
 MOST_NUMBERS = 1 << 24
 """Positions of one particle group that are read [numbers]: frames beyond are left out."""
@@ -57,7 +57,7 @@ def read_foreign(path: str | Path, most: int | None = None, *, alone: bool = Fal
 
 def load(path: Path, most: int | None = None, *, alone: bool = False) -> dict[str, Foreign]:
     """The same in this process, whatever the file does to libhdf5."""
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with access.opened(path) as file:
         names = access.children(file, "particles")
         if not names:
             raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
@@ -74,18 +74,21 @@ def load(path: Path, most: int | None = None, *, alone: bool = False) -> dict[st
 
 def is_foreign(path: str | Path) -> bool:
     """Whether an HDF5 file is no store of ours.  StoreError where it cannot be read."""
-    path = Path(path)
-    trust.trust(path, trust.FOREIGN)
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with _trusted(Path(path)) as file:
         return access.attribute(file, "format") not in (layout.FORMAT, layout.OLDER)
 
 
 def is_h5md(path: str | Path) -> bool:
     """Whether a file has particle groups where H5MD has them.  StoreError where it cannot be read."""
-    path = Path(path)
-    trust.trust(path, trust.FOREIGN)
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with _trusted(Path(path)) as file:
         return isinstance(access.find(file, "particles"), h5py.Group)
+
+
+@contextlib.contextmanager
+def _trusted(path: Path) -> Iterator[Any]:
+    trust.trust(path, trust.FOREIGN)
+    with access.opened(path) as file:
+        yield file
 
 
 def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, dict[str, Any]]:
@@ -105,7 +108,7 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
     """The same one by one, in this process."""
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with access.opened(path) as file:
         for place in _places(file, ""):
             if wanted(place):
                 with contextlib.suppress(StoreError):

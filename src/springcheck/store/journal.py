@@ -298,7 +298,7 @@ class Journal:
             with interrupts.held(), contextlib.suppress(OSError):
                 empty = {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}
                 # after a checkpoint the collection holds what is finished, and the journal is how it is known
-                if empty and Parts.of(self.path, self.run).collection is None:
+                if empty and not Parts.of(self.path, self.run).collections:
                     self._end()
         self._lock.release()
 

@@ -69,7 +69,7 @@ def collection(
         for extent in extents:
             if (extent.offset, extent.sha256) in there:
                 continue
-            if seal.digest(raw, extent.offset, extent.size) != extent.sha256:
+            if seal.digest(raw, (extent.offset, extent.size)) != extent.sha256:
                 raise StoreError(f"{extent.name} was damaged on its way into {path}: check disk and memory")
     seal.attach(path, extents, str(root["run"]))
 

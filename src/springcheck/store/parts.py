@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-import h5py
-
 from springcheck.errors import StoreError
 from springcheck.store import access, files, layout, seal, trust
 
@@ -61,7 +59,8 @@ class Parts:
     `rows` are the parts that hold rows of a table.
     """
 
-    collection: Path | None
+    collections: list[Path]
+    """The collection, or none."""
     parts: list[Path]
     rows: list[Path]
 
@@ -69,11 +68,6 @@ class Parts:
     def everything(self) -> list[Path]:
         """All files that there are."""
         return [path for path in (*self.collections, *self.parts, *self.rows) if path.is_file()]
-
-    @property
-    def collections(self) -> list[Path]:
-        """The collection as a list of one or none."""
-        return [] if self.collection is None else [self.collection]
 
     @classmethod
     def of(cls, path: Path, run: str | None) -> Parts:
@@ -85,11 +79,11 @@ class Parts:
                 known = (claim(folder) or {}).get("run")
         own = path.is_file() and (known is None or _run_of(path) == known)
         if run is None and path.is_file() and not own:
-            return cls(collection=path, parts=[], rows=[])
+            return cls(collections=[path], parts=[], rows=[])
         parts = sorted(folder.glob("*-*.h5")) if known is not None else []
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
         return cls(
-            collection=path if own else None,
+            collections=[path] if own else [],
             parts=[part for part in parts if not part.name.startswith(ROWS)],
             rows=[part for part in parts if part.name.startswith(ROWS)],
         )
@@ -108,7 +102,7 @@ def _run_of(path: Path) -> str:
 def opened(path: Path) -> Iterator[Any]:
     """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
     trust.trust(path, trust.OURS)
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with access.opened(path) as file:
         marked = access.attribute(file, "format")
         if marked == layout.EXPORTED:
             raise StoreError(

@@ -34,12 +34,10 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         with files.told(path, "read"), path.open("rb"):
             pass
     listed: list[tuple[int, str, Path]] = []
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            listed += [
-                (_sequence(file, label), label, found.collection)
-                for label in access.children(file, "parameters")
-            ]
+    for whole in found.collections:
+        with opened(whole) as file:
+            labels = access.children(file, "parameters")
+            listed += [(_sequence(file, label), label, whole) for label in labels]
     known = {label for _, label, _ in listed}
     for part in found.parts:
         label = parts.name_of(part)
@@ -241,9 +239,9 @@ def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
     """The tables of a collection, and the parts that hold one."""
     found = Parts.of(path, run)
     listed: dict[str, Path] = {}
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            listed = dict.fromkeys(tables.names(file), found.collection)
+    for whole in found.collections:
+        with opened(whole) as file:
+            listed = dict.fromkeys(tables.names(file), whole)
     named = {parts.name_of(part): part for part in found.parts if part.name.startswith("table-")}
     return listed | named
 

@@ -47,11 +47,12 @@ class Seal:
     run: str = ""
 
 
-def digest(file: BinaryIO, start: int, size: int) -> str:
-    """sha256 of a range of bytes, in bounded memory."""
+def digest(file: BinaryIO, *pieces: tuple[int, int]) -> str:
+    """sha256 of ranges of bytes, each given by its offset and size, in bounded memory."""
     total = hashlib.sha256()
-    for block in blocks(file, start, size):
-        total.update(block)
+    for start, size in pieces:
+        for block in blocks(file, start, size):
+            total.update(block)
     return total.hexdigest()
 
 
@@ -77,21 +78,12 @@ def gaps(extents: Iterable[Extent], end: int) -> Iterator[tuple[int, int]]:
         yield position, end - position
 
 
-def rest(file: BinaryIO, extents: Iterable[Extent], end: int) -> str:
-    """sha256 of all bytes outside the arrays."""
-    total = hashlib.sha256()
-    for start, size in gaps(extents, end):
-        for block in blocks(file, start, size):
-            total.update(block)
-    return total.hexdigest()
-
-
 def attach(path: Path, extents: Iterable[Extent], run: str = "") -> None:
     """Seal a complete HDF5 file of a run."""
     kept = tuple(extents)
     with path.open("rb+") as file:
         end = file.seek(0, 2)
-        seal = Seal(end=end, extents=kept, rest=rest(file, kept, end), run=run)
+        seal = Seal(end=end, extents=kept, rest=digest(file, *gaps(kept, end)), run=run)
         file.seek(end)
         file.write(encoded(seal))
 
@@ -144,10 +136,10 @@ def is_whole(path: Path, seal: Seal) -> bool:
     if seal.end - sum(extent.size for extent in seal.extents) > LARGEST_REST:
         return False
     with path.open("rb") as file:
-        return rest(file, seal.extents, seal.end) == seal.rest
+        return digest(file, *gaps(seal.extents, seal.end)) == seal.rest
 
 
 def broken(path: Path, seal: Seal) -> list[str]:
     """Names of the arrays whose bytes have changed since the file was sealed."""
     with path.open("rb") as file:
-        return [e.name for e in seal.extents if digest(file, e.offset, e.size) != e.sha256]
+        return [e.name for e in seal.extents if digest(file, (e.offset, e.size)) != e.sha256]
