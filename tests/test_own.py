@@ -193,7 +193,7 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
         exact = schemes.step(
             law, *before, h=what.step, m=what.m, force=system.force, parts=system.parts, **laws
         )
-        parts = {"slow": system.magnitude_of(system.slow), "fast": system.magnitude_of(system.fast)}
+        parts = {name: system.magnitude(terms=getattr(system, name)) for name in ("slow", "fast")}
         stiff, rate = laws["stiffness"], laws["rate"]
         kicks = [kind for kind, _ in law.stages if kind in ("kick", "pull", "slow", "fast")] or law.b
         met = [

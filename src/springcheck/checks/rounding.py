@@ -3,7 +3,6 @@ itself."""
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from springcheck import schemes
 from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Reals
 from springcheck.physics.term import Term
-from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.rounding import Met
 
 if TYPE_CHECKING:
@@ -63,29 +61,13 @@ def of_step(
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
-def _recorded(scheme: Scheme) -> list[bool]:
-    """Of each evaluation of the force within a step, whether it is at the position where the step starts or
-    ends."""
-    if not scheme.stages:
-        return [not any(row) for row in scheme.a]
-    drifts = [kind == "drift" for kind, _ in scheme.stages]
-    return [
-        not any(drifts[:i]) or not any(drifts[i:])
-        for i, (kind, _) in enumerate(scheme.stages)
-        if kind not in ("drift", "held", *schemes.FRICTION)
-    ]
-
-
 def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     acting = {"slow": scene.system.slow, "fast": scene.system.fast}
-    kicks = [stage for stage in scheme.stages if stage[0] not in ("drift", "held", *schemes.FRICTION)]
-    kicks = kicks or [("kick", Fraction(1)) for _ in scheme.b]
-    exact = _recorded(scheme) if recorded else [False] * len(kicks)
     found: list[Met] = []
     made: dict[tuple[str, float], Met] = {}
-    for number, (kind, part) in enumerate(kicks):
+    for number, (kind, part, at_end) in enumerate(scheme.evaluations):
         # an engine may take a step's kick at once, and what its force lacks with it
         whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
         known = kind, whole
@@ -96,7 +78,7 @@ def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list
             if scheme.implicit:
                 stiffness = case.law["stiffness"] if bent is None else scene.system.slope(bent)[0]
             made[known] = Met(
-                magnitude=_force(case, acting.get(kind, scene.terms), bent, whole, exact[number]),
+                magnitude=_force(case, acting.get(kind, scene.terms), bent, whole, recorded and at_end),
                 stiffness=stiffness,
                 joined=not scene.system.is_separate,
                 q=near,
@@ -109,7 +91,7 @@ def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float
     """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
     quantum."""
     how = case.trajectory.arithmetic
-    plain = case.system.magnitude_of(terms, near, exact=exact)
+    plain = case.system.magnitude(near, terms, exact=exact)
     count = case.scene.system.pulls(terms)
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)

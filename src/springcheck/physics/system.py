@@ -165,24 +165,22 @@ class System:
 
         return total
 
-    def magnitude(self, near: Reals | None = None) -> Force:
-        """Like `force`, with every product and difference taken as a sum of absolute values.
+    def magnitude(
+        self, near: Reals | None = None, terms: Iterable[Term] | None = None, *, exact: bool = False
+    ) -> Force:
+        """Like the force of these terms, or of all, with every difference taken as a sum of absolute values.
 
         Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  It takes sizes
         of positions and momenta.  Nonlinear laws are evaluated at the states `near` (..., n), a step away
-        at most, or where these are not given at the worst place within the sizes.
+        at most (the positions to the last bit where they are `exact`), or where these are not given at the
+        worst place within the sizes.
         """
-        return self.magnitude_of(self.terms, near)
-
-    def magnitude_of(self, terms: Iterable[Term], near: Reals | None = None, *, exact: bool = False) -> Force:
-        """The magnitude of some terms' force; `exact` says that `near` are the positions to the last bit."""
-        parts = tuple(terms)
+        parts = tuple(self.terms if terms is None else terms)
 
         def law(q: Reals, p: Reals, *near: Reals) -> Reals:
             at = near[0] if near else None
-            return self._sum(parts, [partial(term.add_rounding, near=at, exact=exact) for term in parts])(
-                q, p
-            )
+            adding = [partial(term.add_rounding, near=at, exact=exact) for term in parts]
+            return self._sum(parts, adding)(q, p)
 
         return in_pieces(law, sum(map(len, parts)), *(() if near is None else (near,)))
 

@@ -83,6 +83,19 @@ class Scheme:
         # a stage takes its position from velocities, and these from the forces of stages before
         return reach if self.stages else 2 if np.any(uses @ uses) else int(np.any(uses))
 
+    @property
+    def evaluations(self) -> list[tuple[Kind, Coefficient, bool]]:
+        """Each evaluation of the force within a step: by which forces, for which part of the step, and
+        whether at the position where the step starts or ends."""
+        if not self.stages:
+            return [("kick", ONE, not any(row)) for row in self.a]
+        drifts = [kind == "drift" for kind, _ in self.stages]
+        return [
+            (kind, c, not any(drifts[:i]) or not any(drifts[i:]))
+            for i, (kind, c) in enumerate(self.stages)
+            if kind not in ("drift", "held", *FRICTION)
+        ]
+
     unnamed: bool = False
     """It stands for whatever somebody brings without a name, whose step is fixed or not."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -20,17 +21,29 @@ Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 Message = Annotated[str, msgspec.Meta(max_length=1 << 20)]
 _DOUBLE = Arithmetic()
-_ARITHMETIC = {
-    "arithmetic": "name",
-    "state_roundoff": "state",
-    "force_roundoff": "force",
-    "force_quantum": "quantum",
-    "force_overflow": "overflow",
-    "parameter_precision": "parameters",
-    "force_excess": "excess",
-    "keeps_displacement": "keeps_displacement",
+KEPT = {
+    "scheme": "scheme",
+    "step": "step",
+    "every": "every",
+    "outcome": "outcome.status",
+    "outcome_step": "outcome.step",
+    "outcome_message": "outcome.message",
+    "start_seconds": "timing.start",
+    "run_seconds": "timing.run",
+    "force_calls": "force_calls",
+    "tolerance": "tolerance",
+    "arithmetic": "arithmetic.name",
+    "state_roundoff": "arithmetic.state",
+    "force_roundoff": "arithmetic.force",
+    "force_quantum": "arithmetic.quantum",
+    "force_overflow": "arithmetic.overflow",
+    "parameter_precision": "arithmetic.parameters",
+    "force_excess": "arithmetic.excess",
+    "keeps_displacement": "arithmetic.keeps_displacement",
+    "rebuilds_velocity": "rebuilds_velocity",
+    "off_axis": "off_axis",
 }
-"""Attributes, and the fields of `Arithmetic` that they keep."""
+"""Attributes, and the fields of a trajectory that they keep."""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -85,46 +98,30 @@ def record(place: str, known: Mapping[str, Any]) -> Record:
 
 def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
     """What `Draft.finish` stores of a trajectory besides its numbers, which are not looked at."""
+    kept = {name: attrgetter(field)(trajectory) for name, field in KEPT.items()}
     origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
-    return {
-        "method": trajectory.label,
-        "scheme": trajectory.scheme,
-        "step": trajectory.step,
-        "every": trajectory.every,
-        "outcome": trajectory.outcome.status,
-        "outcome_step": trajectory.outcome.step,
-        "outcome_message": trajectory.outcome.message,
-        "start_seconds": trajectory.timing.start,
-        "run_seconds": trajectory.timing.run,
-        "force_calls": trajectory.force_calls,
-        "tolerance": trajectory.tolerance,
-        **{name: getattr(trajectory.arithmetic, field) for name, field in _ARITHMETIC.items()},
-        "rebuilds_velocity": trajectory.rebuilds_velocity,
-        "off_axis": trajectory.off_axis,
-        **origin,
-    }
+    return {"method": trajectory.label, **kept, **origin}
 
 
 def trajectory(
     label: str, x: Record, known: Mapping[str, Any], arrays: Mapping[str, Floats], stride: int = 1
 ) -> Trajectory:
     """A trajectory, or every stride-th frame of it, from its record and its arrays."""
+    parts: dict[str, dict[str, Any]] = {"": {}, "outcome": {}, "timing": {}, "arithmetic": {}}
+    for name, field in KEPT.items():
+        part, _, own = field.rpartition(".")
+        parts[part][own] = getattr(x, name)
+    parts[""]["every"] *= stride
     empty = np.empty((0, x.particles))
     return Trajectory(
         label=label,
-        scheme=x.scheme,
         t=arrays["time"],
         q=arrays.get("q", empty),
         p=arrays.get("p", empty),
         energy=arrays.get("energy"),
-        step=x.step,
-        every=x.every * stride,
-        outcome=Outcome(status=x.outcome, step=x.outcome_step, message=x.outcome_message),
-        timing=Timing(start=x.start_seconds, run=x.run_seconds),
-        force_calls=x.force_calls,
-        tolerance=x.tolerance,
-        arithmetic=Arithmetic(**{field: getattr(x, name) for name, field in _ARITHMETIC.items()}),
-        rebuilds_velocity=x.rebuilds_velocity,
-        off_axis=x.off_axis,
+        outcome=Outcome(**parts["outcome"]),
+        timing=Timing(**parts["timing"]),
+        arithmetic=Arithmetic(**parts["arithmetic"]),
         origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
+        **parts[""],
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -29,16 +29,14 @@ WORTH = 1_000_000
 takes 0.15 s, loading saved code 5 ms, compiling it the first time 1 to 4 s."""
 
 
-class Advancing(Protocol):
-    """What fills rows."""
-
-    def advance(self, every: int, q: Floats, p: Floats) -> None: ...
+Carrier: TypeAlias = tiles.Whole | tiles.Tiled | vectors.Vectors
+"""What fills rows."""
 
 
 class Own:
     """A started run of an own method.  `compiled` says which way it goes."""
 
-    def __init__(self, how: Advancing, evaluations: tuple[int, int], *, compiled: bool) -> None:
+    def __init__(self, how: Carrier, evaluations: tuple[int, int], *, compiled: bool) -> None:
         self.force_calls = 0
         self.compiled = compiled
         self._first, self._each = evaluations
@@ -97,7 +95,7 @@ def prepare(
             if compiled:
                 raise
             ahead = False
-    tiled = ahead and job.tile is not None
+    tiled = ahead and job.reach > 0
     how = tiles.Tiled(job, threads or tiles.processors()) if tiled else tiles.Whole(job, compiled=ahead)
     return Own(how, plan.evaluations, compiled=ahead)
 
@@ -140,7 +138,7 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
     work = float(sum(n + sum(len(part[-1]) for part in layout.lists(some, scene.m)) for some in terms))
     joined = any(len(k) for *_, (k, _, _), _ in slots)
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
-    tile = None if slots[0][0] else tiles.Tile(joined=joined, reach=max(plan.evaluations))
+    reach = 0 if slots[0][0] else max(plan.evaluations)
     if plan.b is not None:
         return tiles.Job(
             kernel=kernels.tableau,
@@ -150,14 +148,15 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
             stages=len(plan.b),
             n=n,
             work=work * len(plan.b),
-            tile=tile,
+            joined=joined,
+            reach=reach,
         )
     code, slot, x = _codes(plan)
     y = np.array([o.y for o in plan.operations])
     solved = solver.NONE
     if plan.implicit_step:
         solved = solver.factors(scene, plan.implicit_step)
-        tile = None if joined else tile
+        reach = 0 if joined else reach
     rates = scene.system.friction_rates.astype(np.float64)
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
     return tiles.Job(
@@ -167,5 +166,6 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
         state=(q, p),
         n=n,
         work=work * len(code),
-        tile=tile,
+        joined=joined,
+        reach=reach,
     )

@@ -41,14 +41,6 @@ STAGGER = 9 * LANES
 same place in another page of 4 KiB."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tile:
-    """How particles may be cut: whether neighbours are joined, and over how many a step reaches."""
-
-    joined: bool
-    reach: int
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Job:
     """A kernel and what it works on.  `head` stands before the masses, and `work` counts spring-steps."""
@@ -62,8 +54,10 @@ class Job:
     """Masses (n,); None for the kernels of a single particle."""
     stages: int = 0
     """Stages of a tableau, 0 for a splitting."""
-    tile: Tile | None = None
-    """None where all particles must go together."""
+    reach: int = 0
+    """Over how many neighbours a step of joined particles reaches; 0 where all must go together."""
+    joined: bool = False
+    """Whether neighbours are joined."""
 
     def room(self, n: int) -> tuple[Any, ...]:
         """What the kernel needs beside the state of n particles."""
@@ -118,11 +112,9 @@ class Tiled:
 
     def __init__(self, job: Job, threads: int) -> None:
         assert job.m is not None
-        assert job.tile is not None
         self._job, self._threads = job, threads
         rows = [*_numbers(job.head), job.m, *job.state]
         apart = iter(staggered([row for row in rows if len(row) >= job.n - 1]))
-        self._tile = job.tile
         found = {id(row): next(apart) for row in rows if len(row) >= job.n - 1}
         self._head = _exchanged(job.head, found)
         self._m = found[id(job.m)]
@@ -132,10 +124,10 @@ class Tiled:
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
         steps = every * len(q)
-        if not self._tile.joined:
+        if not self._job.joined:
             self._each(self._alone, NARROW if steps >= MANY_STEPS else WIDTH, 0, every, q, p, steps)
             return
-        most = max(1, MARGIN // self._tile.reach)
+        most = max(1, MARGIN // self._job.reach)
         if self._job.n < 2 * WIDTH or steps < 4:
             self._each(self._alone, self._job.n, 0, every, q, p, 0)
             return
@@ -153,7 +145,7 @@ class Tiled:
             self._together(left, q[row : row + 1], p[row : row + 1])
 
     def _together(self, every: int, q: Floats, p: Floats) -> None:
-        self._each(self._with_margin, WIDTH, MARGIN + self._tile.reach, every, q, p, every * len(q))
+        self._each(self._with_margin, WIDTH, MARGIN + self._job.reach, every, q, p, every * len(q))
         self._q[:], self._p[:] = q[-1], p[-1]
 
     def _each(
