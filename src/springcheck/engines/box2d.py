@@ -17,6 +17,7 @@ from springcheck.engines.contract import (
     Label,
     Stopped,
     by_name,
+    installed_version,
     named,
 )
 from springcheck.errors import MethodError
@@ -24,13 +25,6 @@ from springcheck.physics.scene import Scene
 
 FURTHEST = 2.0
 """Longest way of a body in a step (`b2_maxTranslation`): Box2D shortens every longer one [L]."""
-
-
-def version() -> dict[str, str]:
-    """Version of pybox2d."""
-    from importlib.metadata import version
-
-    return {"box2d": version("box2d")}
 
 
 class _World(Bodies):
@@ -91,7 +85,7 @@ ENGINE = Engine(
         ),
     ),
     start=_World,
-    version=version,
+    version=installed_version("box2d"),
     arithmetic=single,
     step_seconds=5e-6,
 )

@@ -155,14 +155,16 @@ class Engine:
         return self.module or self.distribution.replace("-", "_")
 
 
-def by_name(
-    name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, adaptive: bool = False
+def by_default(
+    name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, **more: Any
 ) -> Method:
-    """A method that is run by its name alone, never by default."""
-    return Method(
-        name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), default=False,
-        adaptive=adaptive,
-    )  # fmt: skip
+    """A method of these terms and needs; `more` are further fields of `Method`."""
+    return Method(name=name, scheme=scheme, about=about, terms=terms, requires=frozenset(needs), **more)
+
+
+def by_name(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, **more: Any) -> Method:
+    """The same for a method that is run by its name alone, never by default."""
+    return by_default(name, scheme, about, terms, *needs, default=False, **more)
 
 
 def named(*methods: Method) -> dict[str, Method]:
@@ -173,6 +175,17 @@ def named(*methods: Method) -> dict[str, Method]:
 def version_of(module: str, name: str = "") -> Callable[[], dict[str, str]]:
     """The function `version` of a library with a `__version__`, under the name of its module or another."""
     return lambda: {name or module: str(import_module(module).__version__)}
+
+
+def installed_version(distribution: str) -> Callable[[], dict[str, str]]:
+    """The function `version` of a library that does not say it itself, from its installed metadata."""
+
+    def version() -> dict[str, str]:
+        from importlib import metadata
+
+        return {distribution: metadata.version(distribution)}
+
+    return version
 
 
 def deferred(module: str, *more: str) -> dict[str, Any]:

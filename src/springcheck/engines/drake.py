@@ -7,18 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.engines.contract import Engine, Label, Method, Need, by_name, named
+from springcheck.engines.contract import Engine, Label, Method, Need, by_name, installed_version, named
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
-
-
-def version() -> dict[str, str]:
-    """Version of Drake."""
-    from importlib.metadata import version
-
-    return {"drake": version("drake")}
 
 
 class _Plant:
@@ -93,6 +86,6 @@ ENGINE = Engine(
         ),
     ),
     start=_Plant,
-    version=version,
+    version=installed_version("drake"),
     step_seconds=3e-5,
 )  # fmt: skip

@@ -17,6 +17,7 @@ from springcheck.engines.contract import (
     Label,
     Method,
     Stopped,
+    by_name,
     named,
     version_of,
 )
@@ -99,13 +100,12 @@ ENGINE = Engine(
     distribution="scipy",
     methods=named(
         *(
-            Method(
-                name=name,
-                scheme=f"scipy-{name}",
-                about=f"scipy.integrate.{solver}, as solve_ivp steps it",
+            by_name(
+                name,
+                f"scipy-{name}",
+                f"scipy.integrate.{solver}, as solve_ivp steps it",
+                EVERY_FORCE,
                 adaptive=True,
-                default=False,
-                terms=EVERY_FORCE,
                 kinds=EVERY_KIND,
             )
             for name, solver in SOLVERS.items()

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Method, deferred, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, by_default, deferred, named
 
 ENGINE = Engine(
     name="ase",
     title="ASE",
     distribution="ase",
     methods=named(
-        Method(
-            name="velocity-verlet",
-            scheme="velocity-verlet",
-            about="ase.md.verlet.VelocityVerlet",
-            terms=EVERY_POTENTIAL,
-        )
+        by_default("velocity-verlet", "velocity-verlet", "ase.md.verlet.VelocityVerlet", EVERY_POTENTIAL)
     ),
     step_seconds=3e-4,
     **deferred(f"{__name__}.simulation", "arithmetic"),

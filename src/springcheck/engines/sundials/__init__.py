@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_FORCE, EVERY_KIND, SPRINGS, Engine, Method, deferred, named
+from springcheck.engines.contract import EVERY_FORCE, EVERY_KIND, SPRINGS, Engine, by_default, deferred, named
 
-
-def _method(name: str, about: str) -> Method:
-    return Method(
-        name=name,
-        scheme=name,
-        about=about,
-        adaptive=True,
-        terms=EVERY_FORCE,
-        kinds=EVERY_KIND,
-    )
-
+_SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 
 ENGINE = Engine(
     name="sundials",
@@ -22,17 +12,15 @@ ENGINE = Engine(
     distribution="scikit-sundae",
     module="sksundae",
     methods=named(
-        _method("adams", "CVODE, Adams-Moulton of orders 1 to 12"),
-        _method("bdf", "CVODE, backward differentiation of orders 1 to 5"),
-        Method(
-            name="ida",
-            scheme="ida",
-            about="IDA: Kirchhoff's laws as they stand, unsolved for the currents",
-            adaptive=True,
-            terms=SPRINGS | {"damping"},
-            kinds=frozenset({"circuit"}),
+        by_default("adams", "adams", "CVODE, Adams-Moulton of orders 1 to 12", EVERY_FORCE, **_SOLVER),
+        by_default(
+            "bdf", "bdf", "CVODE, backward differentiation of orders 1 to 5", EVERY_FORCE, **_SOLVER
+        ),
+        by_default(
+            "ida", "ida", "IDA: Kirchhoff's laws as they stand, unsolved for the currents",
+            SPRINGS | {"damping"}, adaptive=True, kinds=frozenset({"circuit"}),
         ),
     ),
     step_seconds=6e-5,
     **deferred(f"{__name__}.simulation", "internal_steps"),
-)
+)  # fmt: skip

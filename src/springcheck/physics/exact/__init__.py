@@ -1,7 +1,7 @@
 """The exact (analytic) solution of a scene, in extended precision.
 
 Linear scenes move in normal modes (`linear`).  Single particles in a quartic potential or on a pendulum,
-and pairs on a Morse bond, have closed forms of their own (`wells`), by Jacobi's elliptic functions
+and pairs on a Morse bond, have closed forms of their own (`solution`), by Jacobi's elliptic functions
 (`elliptic`).  Where the particles of a scene fall into groups that nothing joins, its motion is known if
 that of every group is.  Its error is some roundings of that width times the angle turned through: a phase
 of 1e6 is known to 1e-13, and to 1e-9 where `long double` is no wider than double (`arrays.ROUNDOFF`).
