@@ -486,9 +486,13 @@ def a_scene_that_no_machine_holds(file: Any, rng: random.Random, folder: Path) -
         node.attrs.create("scene", text, dtype=h5py.string_dtype("utf-8"))
 
 
+SPARSE = 14_000_000_000
+"""Bytes of two arrays that take none of the disk."""
+
+
 @kind
 def a_sparse_file(file: Any, rng: random.Random, folder: Path) -> None:
-    rows = 14_000_000_000 // 16
+    rows = SPARSE // 16
     for name, shape, of in (("q/value", (rows, 1), "<f8"), ("p/value", (rows, 1), "<f8")):
         kept = dict(file[f"{BASE}/{name}"].attrs)
         del file[f"{BASE}/{name}"]
