@@ -123,6 +123,12 @@ _spec.loader.exec_module(census)
         (411946, "named"),
         (504064, "named"),
         (505079, "named"),
+        # at the largest phase of fourth-order splittings, which friction moves and rounding exceeds
+        (400569, "named"),
+        (502576, "named"),
+        (117172, "named"),
+        (204261, "named"),
+        (810392, "named"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

@@ -2,8 +2,8 @@
 
 Without friction a family is a curve over its phase.  A map that turns has one phase for each number of steps
 and of unseen turns, so the entries of its root and those of the curve there can be compared at once, for
-all families and roots.  With friction a map of the same phase differs from the curve by the order of g; where
-the phase has a largest value, which friction exceeds, there are curves of some frictions beside it.
+all families and roots.  With friction a map of the same phase differs from the curve by the order of g.
+Where the phase has a largest value, which friction exceeds, `folded` finds what has a determinant and trace.
 """
 
 from __future__ import annotations
@@ -12,10 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
@@ -43,12 +41,11 @@ critical damping: 1.7."""
 END = 0.05
 """Room beside the end of a curve."""
 
-FRICTIONS = 0.03, 0.1, 0.2, 0.3, 0.4
-"""Values of g that have curves of their own where the phase without friction turns back."""
+BEYOND = 1e-5, 0.02
+"""Phases by which a tabulated curve may end before its largest phase, and by which errors may exceed that."""
 
-BETWEEN = 0.05, 0.35
-"""Change of the log of the determinant up to which such a curve is looked at, half way to the next: a number,
-and a multiple of g beside it."""
+MEETING = 0.02
+"""Imaginary share of two steps of the same trace that may be one."""
 
 SMALL = 0.05
 """Size below which an entry is not asked to agree relatively."""
@@ -109,45 +106,69 @@ def _steps(strides: range) -> tuple[Floats, Floats]:
     return s, np.concatenate([np.arange(r // 2 + 1, dtype=np.float64) for r in strides])
 
 
-Key: TypeAlias = tuple[str, float]
-"""A family and the friction g of its curve."""
-
-
 @cache
-def keys(families: tuple[Family, ...]) -> tuple[tuple[Key, ...], tuple[tuple[int, ...], ...]]:
-    """The curves that stand behind families, each once, and the numbers of each family's own; none of what
-    has no step."""
-    own: list[tuple[Key, ...]] = []
+def keys(families: tuple[Family, ...]) -> tuple[tuple[str, ...], tuple[int | None, ...]]:
+    """The names of the families without friction whose curves stand behind these, each once, and the number
+    of each family's own; None of what has no step, or a curve that turns back under friction."""
+    own: list[str | None] = []
     for family in families:
-        base = (family.scheme if family.damped else family.name, 0.0)
-        if family.flow or family.held:
-            own.append(())
-        elif family.damped and len(_ranges(base)) > 1 and FAMILIES[base[0]].stages:
-            own.append((base, *((family.name, g) for g in FRICTIONS)))
-        else:
-            own.append((base,))
-    each = tuple(dict.fromkeys(key for row in own for key in row))
-    return each, tuple(tuple(each.index(key) for key in row) for row in own)
+        base = family.scheme if family.damped else family.name
+        own.append(None if family.flow or family.held or is_folded(family) else base)
+    each = tuple(dict.fromkeys(base for base in own if base is not None))
+    return each, tuple(None if base is None else each.index(base) for base in own)
 
 
 @cache
-def _ranges(key: Key) -> tuple[tuple[Floats, Floats], ...]:
+def is_folded(family: Family) -> bool:
+    """Whether friction moves the largest phase of a splitting."""
+    return family.damped and bool(family.stages) and not family.held and len(_ranges(family.scheme)) > 1
+
+
+@cache
+def _losses(family: Family) -> tuple[Floats, Floats]:
+    """Logs of a step's determinant, ascending, and the friction g of each, about none."""
+    g = np.linspace(-1, 2, 6001)
+    with np.errstate(all="ignore"):
+        loss = np.log(unit(family, np.zeros_like(g), g)[:, 1, 1])
+    middle = int(np.argmin(np.abs(g)))
+    falls = np.nan_to_num(np.diff(loss)) < 0
+    first = middle - int(np.argmin([*falls[:middle][::-1], False]))
+    last = middle + int(np.argmin([*falls[middle:], False]))
+    return loss[first : last + 1][::-1], g[first : last + 1][::-1]
+
+
+def folded(family: Family, log_det: Floats, trace: Floats) -> tuple[Integers, Floats, Floats]:
+    """Steps of a splitting with friction that have these determinants and traces (c,): the number of each,
+    its a and its g.  The determinant is a function of g alone, and the trace a polynomial of a."""
+    loss, of = _losses(family)
+    within = np.flatnonzero((log_det > loss[0]) & (log_det < loss[-1]))
+    g = np.interp(log_det[within], loss, of)
+    degree = min(sum(kind == "drift" for kind, _ in family.stages), len(family.stages) // 2)
+    nodes = np.arange(degree + 1.0)
+    steps = unit(family, np.tile(nodes, len(g)), np.repeat(g, degree + 1))
+    values = (steps[:, 0, 0] + steps[:, 1, 1]).reshape(len(g), degree + 1) - trace[within, None]
+    powers = np.asarray(values @ np.linalg.inv(np.vander(nodes)).T, np.float64)
+    companion = np.zeros((len(g), degree, degree))
+    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1
+    companion[:, 0] = -powers[:, 1:] / powers[:, :1]
+    a = np.linalg.eigvals(companion)
+    # at the largest phase two of them meet, and rounding makes them complex
+    row, column = np.nonzero(np.abs(a.imag) <= MEETING * np.abs(a.real))
+    return within[row], np.asarray(a.real[row, column]), g[row]
+
+
+@cache
+def _ranges(name: str) -> tuple[tuple[Floats, Floats], ...]:
     """(phase of one step ascending, h w) over each range of h w in which the phase grows or falls."""
-    family, g = FAMILIES[key[0]], key[1]
+    family = FAMILIES[name]
     top = min(family.limit, 60.0) if family.limit > 0 else 4.0
     # the phase bends like a square root at a limit of stability, so points crowd there
     x = top * np.sin(np.linspace(0, np.pi / 2, 2001)[1:-1])
     # and areas change with the square of a small step
     x = np.geomspace(1e-4, x[-1], 4000) if top == 60 else x
     x = np.concatenate([np.geomspace(1e-4, 0.05 * top, 500), x[x > 0.05 * top]]) if top < 60 else x
-    matrices = unit(family, np.square(x), np.full(len(x), g))
+    matrices = unit(family, np.square(x), np.zeros(len(x)))
     found = rotation(matrices)
-    if g:
-        # strong friction does not turn
-        turning = np.flatnonzero(found.angle > 0)
-        part = slice(turning[0], turning[-1] + 1)
-        x, matrices = x[part], matrices[part]
-        found = rotation(matrices)
     side = np.where(matrices[:, 0, 1] < 0, -1, 1)
     phase = np.unwrap(np.asarray(side * found.angle, dtype=np.float64))
     rising = np.diff(phase) > 0
@@ -156,8 +177,7 @@ def _ranges(key: Key) -> tuple[tuple[Floats, Floats], ...]:
     ordered = [(y, z) if y[-1] > y[0] else (y[::-1], z[::-1]) for y, z in parts]
     # a phase below that of the first tabulated step is as good as proportional to it
     first, x = ordered[0]
-    least = x[0] if g else 0.0
-    return (np.append(0.0, first), np.append(least, x)) if first[0] > 0 else ordered[0], *ordered[1:]
+    return (np.append(0.0, first), np.append(0.0, x)) if first[0] > 0 else ordered[0], *ordered[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,8 +185,6 @@ class Curves:
     """Curves (b,) of several families: `base` is the number of each one's family."""
 
     base: Integers
-    g: Floats
-    """Friction (b, 1) of each curve."""
     low: Floats
     high: Floats
     normal: Floats
@@ -178,10 +196,6 @@ class Curves:
     """Phases of all curves, `APART` one from the next, with h w and log of the determinant there."""
     x: Floats
     loss: Floats
-
-    def next_to(self, loss: Floats) -> NDArray[np.bool_]:
-        """Whether a curve with friction is the nearest one, of these differences (b, c) of log det."""
-        return np.asarray(np.abs(loss) <= BETWEEN[0] + BETWEEN[1] * self.g)
 
     @cached_property
     def most(self) -> float:
@@ -225,11 +239,12 @@ class Curves:
         one, other = root.normal[:, chosen]
         low = self.log_det[:, cell]
         loss = low + (self.log_det[:, cell + 1] - low) * part - log_det
-        plain = self.g == 0
-        worth = (phase > self.low) & (phase < self.high) & (plain | self.next_to(loss))
+        # a phase that is known to within an error may lie beyond the largest
+        beyond = min(BEYOND[0] + SIDE[0] * error, BEYOND[1])
+        worth = (phase > self.low - beyond) & (phase < self.high + beyond)
         if damped and not growing:
             # friction shrinks areas
-            worth &= (loss > 0) | ~plain
+            worth &= loss > 0
         elif not (damped or far):
             worth &= np.abs(loss) <= 2 * (room + self.most)
         which, index = np.nonzero(worth)
@@ -258,19 +273,18 @@ class Curves:
 
     def at(self, which: Integers, phase: Floats) -> tuple[Floats, Floats]:
         """h w, and log of the determinant of a step, where these curves have these phases."""
-        at = which * APART + phase
+        at = which * APART + np.clip(phase, self.low[which, 0], self.high[which, 0])
         return np.interp(at, self.axis, self.x), np.interp(at, self.axis, self.loss)
 
 
 @lru_cache(maxsize=64)
-def curves(of: Sequence[Key]) -> Curves:
-    """The curves of these families and frictions."""
+def curves(of: Sequence[str]) -> Curves:
+    """The curves of these families."""
     each = [_curve(key) for key in of]
     base = np.repeat(np.arange(len(of)), [len(x.low) for x in each])
     shift = np.repeat(APART * np.arange(len(base)), [len(y) for key in of for y, _ in _ranges(key)])
     return Curves(
         base,
-        np.concatenate([x.g for x in each]),
         np.concatenate([x.low for x in each]),
         np.concatenate([x.high for x in each]),
         np.concatenate([x.normal for x in each], axis=1),
@@ -283,7 +297,7 @@ def curves(of: Sequence[Key]) -> Curves:
 
 
 @cache
-def _curve(key: Key) -> Curves:
+def _curve(key: str) -> Curves:
     """The curves of one family, all at the beginning of the axis."""
     grid = np.linspace(0, np.pi, CELLS + 1)
     ranges = _ranges(key)
@@ -296,31 +310,34 @@ def _curve(key: Key) -> Curves:
             x = np.where(np.isfinite(better) & (np.abs(better - x) < 0.1 * x), better, x)
         cells = _normal(key, x.ravel())
     # a root beside the end of a curve lies between two cells of which one is beyond it
-    inside = (grid > ends[:, :1] - np.pi / CELLS) & (grid < ends[:, 1:] + np.pi / CELLS)
+    low, high = ends[:, :1], ends[:, 1:]
+    room = BEYOND[1] + np.pi / CELLS
+    inside = (grid > low - room) & (grid < high + room)
     normal, log_det = (np.where(inside, part.reshape(*part.shape[:-1], *x.shape), np.nan) for part in cells)
     # at the end of a curve straight lines miss more than can be seen beside it
     bend = np.full(x.shape, END)
     rows = np.array([*normal, log_det])
     bend[:, 1:-1] = np.max(np.abs(rows[..., 2:] - 2 * rows[..., 1:-1] + rows[..., :-2]), axis=0)
     bend[:, 0] = bend[:, 1]
+    bend[(np.abs(grid - low) < room) & (low > room) | (np.abs(grid - high) < room)] = END
     bend = np.where(np.isfinite(bend), bend, END)
     bend[:, :-1] = np.maximum(bend[:, :-1], bend[:, 1:])
     axis, every = (np.concatenate([part[i] for part in ranges]) for i in (0, 1))
     return Curves(
-        np.zeros(len(ranges), dtype=np.int64), np.full((len(ranges), 1), key[1]), ends[:, :1], ends[:, 1:],
-        normal, log_det, bend, axis, every, _normal(key, every)[1],
+        np.zeros(len(ranges), dtype=np.int64), low, high, normal, log_det, bend, axis, every,
+        _normal(key, every)[1],
     )  # fmt: skip
 
 
-def _phase(key: Key, x: Floats) -> Floats:
+def _phase(key: str, x: Floats) -> Floats:
     """The phase of a step of h w = x (b, c), between 0 and 2 pi."""
-    out = unit(FAMILIES[key[0]], np.square(x.ravel()), np.full(x.size, key[1]))
+    out = unit(FAMILIES[key], np.square(x.ravel()), np.zeros(x.size))
     angle = np.asarray(rotation(out).angle, np.float64)
     return np.where(out[:, 0, 1] < 0, 2 * np.pi - angle, angle).reshape(x.shape)
 
 
-def _normal(key: Key, x: Floats) -> tuple[Floats, Floats]:
+def _normal(key: str, x: Floats) -> tuple[Floats, Floats]:
     """M11 and M12 (2, c) over the root of the determinant, and its log (c,)."""
-    out = unit(FAMILIES[key[0]], np.square(x), np.full(len(x), key[1]))
+    out = unit(FAMILIES[key], np.square(x), np.zeros(len(x)))
     log_det = np.log(np.abs(np.linalg.det(out)))
     return np.asarray(out[:, 0, :].T * np.exp(-log_det / 2)), log_det

@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.coarse import irregular
-from springcheck.identify.curves import BETWEEN, curves, keys
+from springcheck.identify.curves import curves, folded, is_folded, keys
 from springcheck.identify.families import Family
 from springcheck.identify.fit import ROUNDING, least_squares
 from springcheck.identify.maps import Table, table, unit
@@ -320,16 +320,21 @@ def _starts(
             root = np.exp(found.log_det / (2 * s))
             a = (1 - root) ** 2 + 4 * root * np.sin(phase / 2) ** 2
             parts.append((np.full(len(s), k), s, turns, a, 1 + (1 - root**2) / a))
+        elif is_folded(family):
+            log_det = found.log_det / s
+            index, a, g = folded(family, log_det, 2 * np.exp(log_det / 2) * np.cos(phase))
+            good = (a > 0) & (g > 0)
+            index, a, g = index[good], a[good], g[good]
+            parts.append((np.full(len(a), k), s[index], turns[index], a, g))
         else:
             curve = curves(keys((family,))[0])
             at, index = np.nonzero((phase > curve.low) & (phase < curve.high))
             x, loss = curve.at(at, phase[index])
             off = loss - found.log_det / s[index]
-            g = curve.g[at, 0] + off if family.damped else np.zeros(len(x))
+            g = off if family.damped else np.zeros(len(x))
             # the area of a frame is known, and that of a scheme without friction beside it
             room = 0.02 * np.abs(loss) * s[index] + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
             good = (g > 0) if family.damped else np.abs(loss * s[index] - found.log_det) <= room
-            good &= (curve.g[at, 0] == 0) | (np.abs(off) <= BETWEEN[0] + BETWEEN[1] * curve.g[at, 0])
             parts.append(
                 (
                     np.full(np.count_nonzero(good), k), s[index][good], turns[index][good],

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify.curves import SIDE, Roots, curves, keys, roots
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.curves import SIDE, Roots, curves, folded, is_folded, keys, roots
+from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
 from springcheck.physics.arrays import Floats, Integers, Reals
@@ -35,10 +36,14 @@ CHUNK = 4096
 """Candidates that are solved at once, so that their arrays stay in the processor's cache."""
 
 BESIDE = 0.15
-"""Friction that a guess beside a curve with friction counts as `away` from it at least."""
+"""Friction that a guess which has it counts as `away` from its curve."""
 
 FLOW_TURNS = 8
 """Turns between two frames that the exact flow is looked for at."""
+
+
+Starts: TypeAlias = tuple[Integers, Integers, Floats, Floats, Floats]
+"""Families and roots, a, g and how far g is `away` from that of a curve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +111,10 @@ def starts(
         for k, family in enumerate(every.families)
         if family.held
     ]
+    wanted = GUESSED + (LOST[0] if far else SIDE[0] * error)
+    parts += [
+        _folded_starts(every, k, root, wanted) for k, family in enumerate(every.families) if is_folded(family)
+    ]
     of_curves, bases = keys(every.families)
     if of_curves:
         curve = curves(of_curves)
@@ -115,18 +124,14 @@ def starts(
         x, loss = curve.at(at, root.phase[index])
         a, g, away = np.square(x), np.zeros_like(x), np.zeros_like(x)
         if every.damped:
-            off = loss - root.log_det[index]
-            own = curve.g[at, 0]
-            # beside a curve with friction the determinant is no straight line of it
-            g = np.where(own > 0, np.maximum(own + off, own / 4), off)
-            away = np.where(own > 0, np.maximum(np.abs(off), BESIDE), np.abs(g))
+            g = loss - root.log_det[index]
             # friction shrinks areas; what grows beyond the scheme's own growth is no friction
             good = (g > 0) | terms.growing
-            at, index, g, away = at[good], index[good], g[good], away[good]
-            a = a[good] + np.square(off[good] / 2)
+            at, index, g, a = at[good], index[good], g[good], a[good] + np.square(g[good] / 2)
+            away = np.abs(g)
         ends = np.searchsorted(curve.base[at], np.arange(len(of_curves) + 1))
-        for k, own in enumerate(bases):
-            for base in own:
+        for k, base in enumerate(bases):
+            if base is not None:
                 mine = slice(ends[base], ends[base + 1])
                 which = np.full(ends[base + 1] - ends[base], k)
                 parts.append((which, index[mine], a[mine], g[mine], away[mine]))
@@ -152,7 +157,7 @@ def starts(
     return joined([turning, *flows])
 
 
-def _held_starts(k: int, root: Roots, room: float) -> tuple[Integers, Integers, Floats, Floats, Floats]:
+def _held_starts(k: int, root: Roots, room: float) -> Starts:
     """Guesses for a held force, whose step moves the position by the whole velocity."""
     entries = root.entries
     off = np.maximum(np.abs(entries[:, 0, 1] - 1), np.abs(entries[:, 1, 1] - 1))
@@ -160,6 +165,16 @@ def _held_starts(k: int, root: Roots, room: float) -> tuple[Integers, Integers, 
     a = -entries[index, 1, 0]
     g = (1 - entries[index, 0, 0]) / np.where(a == 0, 1, a)
     return np.full(len(index), k), index, a, g, np.abs(g)
+
+
+def _folded_starts(every: Table, k: int, root: Roots, room: float) -> Starts:
+    """Guesses for a splitting whose phase turns back: what has the determinant and the trace of a root."""
+    trace = root.entries[:, 0, 0] + root.entries[:, 1, 1]
+    index, a, g = folded(every.families[k], root.log_det, trace)
+    off = every.unit(np.full(len(a), k), a, g)[:, 0, 0] - root.entries[index, 0, 0]
+    good = (a > 0) & (np.abs(off) <= room)
+    index, a, g = index[good], a[good], g[good]
+    return np.full(len(a), k), index, a, g, np.full(len(a), BESIDE)
 
 
 def solved(
@@ -311,10 +326,15 @@ def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range)
             s_, a_ = (np.array(x, dtype=np.float64) for x in least[b])
             g = np.zeros_like(a_)
             good = np.ones(len(a_), dtype=bool)
-            if family.damped and len(a_):
+            if family.damped:
                 own = np.linalg.det(bases.unit(np.full(len(a_), b), a_, g))
                 g = np.log(np.abs(own)) - np.log(total) / s_
+                if is_folded(family):
+                    s_, a_, g = (
+                        np.append(x, y) for x, y in zip((s_, a_, g), _folded_real(family, found), strict=True)
+                    )
                 good = np.isfinite(g) & ((g > 0) | terms.growing)
+            good = good & (np.isin(s_, strides) | family.flow)
             n = int(np.count_nonzero(good))
             parts.append(
                 Guesses(
@@ -322,6 +342,15 @@ def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range)
                 )
             )
     return joined(parts)
+
+
+def _folded_real(family: Family, found: Map) -> tuple[Floats, Floats, Floats]:
+    """Strides, a and g of a splitting whose phase turns back, from two real eigenvalues."""
+    values = np.sort(np.real(np.linalg.eigvals(found.entries.astype(np.float64))))
+    s = np.arange(1.0, 5.0)[:: 1 if values[0] > 0 else 2]
+    each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
+    index, a, g = folded(family, np.log(np.prod(each, axis=1)), np.sum(each, axis=1))
+    return s[index], a, g
 
 
 def _decays(found: Map, strides: range) -> tuple[list[float], list[float]]:
