@@ -74,7 +74,7 @@ def _slipped(
     """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps longer by the
     share `slip`."""
     every, which, (a, g, log_mass, stride) = _numbers(matches, np.longdouble)
-    held = np.array([family.held for family in every.families])[which]
+    held = every.held[which]
     out = every.frame(
         which,
         a * (1 + slip) ** 2,
@@ -83,7 +83,7 @@ def _slipped(
         stride.astype(np.float64) if between else np.ones(len(matches)),
         found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
     )
-    return np.asarray(out.reshape(-1, 2, 2))
+    return np.asarray(out.T.reshape(-1, 2, 2))
 
 
 def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:

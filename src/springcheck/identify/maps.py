@@ -9,6 +9,7 @@ from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.identify.families import EULER, FAMILIES, POSITION, VERLET, Family, Stage
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
@@ -24,36 +25,26 @@ KINDS: dict[str, tuple[float, float, float]] = {
 }
 """(e, i, x) of a kick over the share c: v' = ((1 - e c g) v - c a q)/(1 + i c g), then times exp(-x c g)."""
 
-Selected: TypeAlias = Integers | slice
+Selected: TypeAlias = Integers | int
+
+WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
+
+Columns: TypeAlias = Mapping[np.dtype[Any], tuple[Reals, ...]]
+"""Numbers of every family, in double and in extended precision."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Slot:
-    """A kick and the drift after it, (F,) of every family: columns e, i, x, b, d with the shares in them, in
-    double and in extended precision."""
-
-    columns: Mapping[np.dtype[Any], tuple[Reals, ...]]
-    kicks: bool
-    damps: bool
-    decays: bool
-    drifts: bool
-
-
-def _slots(families: tuple[Family, ...]) -> tuple[Slot, ...]:
+def _slots(families: tuple[Family, ...]) -> Extended:
+    """Kicks with the drift after each, (slots, 5, F): e, i, x, b, d with the shares in them."""
     rows = [_pairs(family.stages) for family in families]
-    out = []
-    for at in range(max((len(row) for row in rows), default=0)):
-        table = np.array(
-            [row[at] if at < len(row) else np.zeros(5, np.longdouble) for row in rows], np.longdouble
-        ).T
-        e, i, x, b, d = (bool(np.any(column)) for column in table)
-        columns = {np.dtype(x): tuple(table.astype(x)) for x in (np.float64, np.longdouble)}
-        out.append(Slot(columns=columns, kicks=e or i or x or b, damps=e or i or x, decays=x, drifts=d))
-    return tuple(out)
+    most = max((len(row) for row in rows), default=0)
+    out = np.zeros((most, 5, len(families)), np.longdouble)
+    for k, row in enumerate(rows):
+        out[: len(row), :, k] = row if row else 0
+    return out
 
 
 def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
-    """Stages as kicks with a drift each, columns as in `Slot`."""
+    """Stages as kicks with a drift each, numbers as in `_slots`."""
     out: list[Extended] = []
     open_ = False
     for kind, share in stages:
@@ -75,43 +66,51 @@ class Table:
     """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
 
     families: tuple[Family, ...]
-    slots: tuple[Slot, ...]
-    rational: tuple[Extended, ...]
+    slots: tuple[Columns, ...]
+    """Kicks with the drift after each, as in `_slots`."""
+    flags: NDArray[np.bool_]
+    """Which numbers (slots, 5, F) of them are none."""
+    rational: Columns
     """Numerator and denominator (degree, F) of stability functions; whether friction is inside (F,)."""
     kinds: tuple[tuple[str, Any], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
+    held: NDArray[np.bool_]
     damped: bool
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
+        present = np.zeros(len(self.families), dtype=bool)
+        present[which] = True
+        # one number of one family, and a row of those of several
+        n: Selected = which if np.count_nonzero(present) > 1 else int(which[0]) if len(which) else which
         for kind, members in self.kinds:
-            at: Selected = slice(None) if np.all(members) else np.flatnonzero(members[which])
-            n, x, y = which[at], a[at], g[at]
-            if len(n):
-                out[:, :, at] = self._special(kind, n, x, y)
+            those = members[present]
+            if np.all(those):
+                out[:] = self._special(kind, n, a, g)
+            elif np.any(those):
+                at = np.flatnonzero(members[which])
+                out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        for slot in self.slots:
-            e, i, x, b, d = slot.columns[a.dtype]
-            if slot.kicks:
-                pull = b[which] * a
-                if damped and slot.damps:
-                    below = 1 + i[which] * g
-                    v *= 1 - e[which] * g
-                    v -= pull * q
-                    v /= below
-                    if slot.decays:
-                        v *= np.exp(-x[which] * g)
-                else:
-                    v -= pull * q
-            if slot.drifts:
-                q += d[which] * v
+        for slot, flags in zip(self.slots, np.any(self.flags[:, :, present], axis=2), strict=True):
+            e, i, x, b, d = slot[a.dtype]
+            explicit, implicit, decays, kicks, drifts = flags
+            if damped and explicit:
+                v *= 1 - e[n] * g
+            if kicks:
+                v -= b[n] * a * q
+            if damped and implicit:
+                v /= 1 + i[n] * g
+            if damped and decays:
+                v *= np.exp(-x[n] * g)
+            if drifts:
+                q += d[n] * v
         return out.transpose(2, 0, 1)
 
-    def _special(self, kind: str, n: Integers, a: Reals, g: Reals) -> Reals:
+    def _special(self, kind: str, n: Selected, a: Reals, g: Reals) -> Reals:
         if kind == "held":
             return _matrices(1 - g * a, np.ones_like(a), -a, np.ones_like(a))
         if kind == "flow":
@@ -119,13 +118,13 @@ class Table:
         if kind == "formula":
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
-                at = n == i
+                at = n == i if np.ndim(n) else slice(None)
                 out[:, :, at] = FORMULAS[self.families[i].formula](a[at])
             return out
-        over, under, inside = (x.astype(a.dtype)[..., n] for x in self.rational)
+        over, under, inside = (x[..., n] for x in self.rational[a.dtype])
         return _rational(over, under, a, g * inside)
 
-    def sums(self, which: Integers, a: Floats, g: Floats) -> Floats:
+    def sums(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """Sums (c, 2, 2) of the sizes of all that a step adds up, which its roundings are relative to."""
         out = np.zeros((2, 2, len(a)))
         out[0, 0] = out[1, 1] = 1
@@ -136,14 +135,14 @@ class Table:
                 size = np.abs(self._special(kind, n, x, y))
                 size[0, 0] = 1 + np.abs(x * y) if kind == "held" else size[0, 0]
             else:
-                over, under, inside = (part.astype(np.float64)[..., n] for part in self.rational)
+                over, under, inside = (part[..., n] for part in self.rational[a.dtype])
                 one = np.ones((2, len(n))) * [[1.0], [0.0]]
                 terms = _rational(np.abs(over), one, -np.abs(x), -np.abs(y * inside))
                 size = np.einsum("ijc,jkc->ikc", np.abs(_rational(one, under, x, y * inside)), terms)
             out[:, :, at] = size
         q, v = out
         for slot in self.slots:
-            e, i, x, b, d = (part[which].astype(np.float64) for part in slot.columns[a.dtype])
+            e, i, x, b, d = (part[which] for part in slot[a.dtype])
             v *= 1 + np.abs(e * g)
             v += np.abs(b * a) * q
             v /= np.abs(1 + i * g)
@@ -152,12 +151,12 @@ class Table:
         return out.transpose(2, 0, 1)
 
     def frame(self, which: Integers, a: Reals, g: Reals, log_mass: Reals, s: Floats, ratio: Reals) -> Reals:
-        """Predicted entries (c, 4) over s steps on (q, v T), T = s h, `ratio` the unit of v T over q's."""
+        """Predicted entries (4, c) over s steps on (q, v T), T = s h, `ratio` the unit of v T over q's."""
         out = self.unit(which, a, g)
         if np.any(s != 1):
             out = power(out, s)
         up = np.exp(-log_mass) / s.astype(a.dtype) * ratio.astype(a.dtype)
-        return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]], axis=1)
+        return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]])
 
 
 @cache
@@ -181,12 +180,15 @@ def table(families: tuple[Family, ...]) -> Table:
         "formula": [bool(family.formula) for family in families],
         "rational": [bool(family.stability[0]) for family in families],
     }
+    slots = _slots(families)
     return Table(
         families=families,
-        slots=_slots(families),
-        rational=(parts[0], parts[1][:2], inside),
+        slots=tuple({x: tuple(row.astype(x)) for x in WIDTHS} for row in slots),
+        flags=slots != 0,
+        rational={x: tuple(y.astype(x) for y in (parts[0], parts[1][:2], inside)) for x in WIDTHS},
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
+        held=np.array(kinds["held"]),
         damped=any(family.damped for family in families),
     )
 

@@ -14,7 +14,7 @@ from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
 from springcheck.identify.starts import Guesses, Terms, joined, least_squares, real_starts, starts
-from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 
 CHANCE = 1e-7
 """Probability with which a right scheme may be refused: five standard errors."""
@@ -34,6 +34,9 @@ ROUNDS = 20
 SETTLED = 1e-4, 1e-12
 """Share of 1 + chi-squared by which another step must promise to bring it down, in double and in extended
 precision."""
+
+FEW = 8
+"""Candidates that are refined in extended precision at once."""
 
 OPERATIONS = 8
 """Roundings of double precision that a predicted entry may be off by, in units of `Targets.coherent`."""
@@ -121,13 +124,22 @@ class Targets:
     def log_masses(self, x: Guesses, values: Reals) -> Reals:
         if self.log_stiffness is None:
             if not self.scaled:
-                return values[:, 2]
-            return np.asarray(values[:, 2] + self.log_mass[x.of, x.s.astype(int)].astype(values.dtype))
-        return np.asarray(self.log_stiffness[x.of] - 2 * np.log(x.s) - np.log(np.abs(values[:, 0])))
+                return np.asarray(values[2])
+            return np.asarray(values[2] + self.log_mass[x.of, x.s.astype(int)].astype(values.dtype))
+        return np.asarray(self.log_stiffness[x.of] - 2 * np.log(x.s) - np.log(np.abs(values[0])))
 
     def entries(self, every: Table, x: Guesses, values: Reals) -> Reals:
+        """Predicted entries (4, c) of unknowns (3, c): a, g and the log of the mass."""
         masses = self.log_masses(x, values)
-        return every.frame(x.which, values[:, 0], values[:, 1], masses, x.s, self.ratio[x.of])
+        return every.frame(x.which, values[0], values[1], masses, x.s, self.ratio[x.of])
+
+    def turned(self, of: Integers, off: Reals) -> Floats:
+        """Differences of entries (4, m, c) along the axes of their errors."""
+        rows = off.astype(np.float64)
+        if len(self.axes) == 1:
+            rows = self.axes[0].T @ rows.reshape(4, -1)
+            return np.asarray(rows).reshape(off.shape)
+        return np.asarray(np.einsum("cji,jmc->imc", self.axes[of], rows))
 
 
 def match(
@@ -183,87 +195,79 @@ def _matched(
 ) -> None:
     """Candidates in double precision first, and what may be accepted then in extended precision."""
     free = [0, 1] if every.damped else [0]
-    values = np.stack([guesses.a, guesses.g, np.zeros_like(guesses.a)], axis=1)
+    values = np.stack([guesses.a, guesses.g, np.zeros_like(guesses.a)])
     if target.terms.mass_unknown and target.log_stiffness is None:
         free.append(2)
         predicted = target.entries(every, guesses, values)
-        observed = target.observed[guesses.of].astype(np.float64)
-        scale = np.abs(predicted[:, 1] / observed[:, 1]) * np.abs(observed[:, 2] / predicted[:, 2])
-        values[:, 2] = np.nan_to_num(np.log(scale) / 2)
+        observed = target.observed[guesses.of].astype(np.float64).T
+        scale = np.abs(predicted[1] / observed[1]) * np.abs(observed[2] / predicted[2])
+        values[2] = np.nan_to_num(np.log(scale) / 2)
     freedom = 4 - len(free)
     if far and not np.all(guesses.near):
         # what it predicts is wanted, and no best fit
         at = np.flatnonzero(~guesses.near)
-        entries = target.entries(every, guesses[at], values[at])
-        _best(
-            every, target, guesses[at], values[at], np.full(len(at), FAR), entries, 0 * entries, freedom, out
-        )
+        entries = target.entries(every, guesses[at], values[:, at])
+        chi2 = np.full(len(at), FAR)
+        _best(every, target, guesses[at], values[:, at], chi2, entries, 0 * entries[:3], freedom, out)
     at = np.flatnonzero(guesses.near)
-    chi2, values[at], entries, errors = _refined(every, target, guesses[at], values[at], free)
-    x, values = guesses[at], values[at]
-    if far:
-        _best(every, target, x, values, chi2, entries, errors, freedom, out)
-    # roundings of double precision, in standard errors of an entry
-    whole = target.coherent(every, x, values[:, 0], values[:, 1])
-    error = np.sqrt((target.terms.rounding * whole) ** 2 + target.variance[x.of, 0])
-    likely = np.flatnonzero(chi2 <= (np.sqrt(most(freedom)) + OPERATIONS * ROUNDING * whole / error) ** 2)
-    x, values = x[likely], values[likely].astype(np.longdouble)
-    if len(likely):
+    x, values = guesses[at], values[:, at]
+    if far or len(at) > FEW:
         chi2, values, entries, errors = _refined(every, target, x, values, free)
+        if far:
+            _best(every, target, x, values, chi2, entries, errors, freedom, out)
+        # roundings of double precision, in standard errors of an entry
+        whole = target.coherent(every, x, values[0], values[1])
+        error = np.sqrt((target.terms.rounding * whole) ** 2 + target.variance[x.of, 0])
+        room = np.sqrt(most(freedom)) + OPERATIONS * ROUNDING * whole / error
+        likely = np.flatnonzero(chi2 <= room**2)
+        x, values = x[likely], values[:, likely]
+    if len(x.s):
+        chi2, values, entries, errors = _refined(every, target, x, values.astype(np.longdouble), free)
         _best(every, target, x, values, chi2, entries, errors, freedom, out)
 
 
 def _refined(
     every: Table, target: Targets, x: Guesses, values: Reals, free: list[int]
 ) -> tuple[Floats, Reals, Reals, Floats]:
-    """Gauss-Newton on the four entries, by their covariance, in the width of the values: chi-squared,
-    values, entries and errors."""
-    n = len(values)
-    whole = target.terms.rounding * target.coherent(every, x, values[:, 0], values[:, 1])
-    weight = 1 / np.sqrt(target.variance[x.of] + whole[:, None] ** 2)
-    axes, observed = target.axes[x.of], target.observed[x.of].astype(values.dtype)
-    kept, entries = values.copy(), np.zeros((n, 4), dtype=values.dtype)
-    chi2, stalled, errors = np.full(n, np.inf), np.zeros(n, dtype=int), np.zeros((n, 3))
+    """Gauss-Newton on the four entries, by their covariance, in the width of the values (3, c): chi-squared
+    (c,), values, entries (4, c) and errors (3, c)."""
+    n = len(x.s)
+    whole = target.terms.rounding * target.coherent(every, x, values[0], values[1])
+    weight = 1 / np.sqrt(target.variance[x.of].T + whole**2)
+    observed = target.observed[x.of].T.astype(values.dtype)
+    kept, entries = values.copy(), np.zeros((4, n), dtype=values.dtype)
+    chi2, stalled, errors = np.full(n, np.inf), np.zeros(n, dtype=int), np.zeros((3, n))
     alive = np.arange(n)
     least = SETTLED[values.dtype.itemsize > 8]
     hopeless = 4 if len(free) == 1 else 8
+    # a difference quotient: its error slows the iteration, it does not move the end
     for turn in range(ROUNDS):
         if not len(alive):
             break
-        k, now = x[alive], values[alive]
-        shifts = [np.zeros_like(now)]
-        for i in free:
-            # a difference quotient: its error slows the iteration, it does not move the end
-            shifts.append(np.zeros_like(now))
-            shifts[-1][:, i] = np.abs(now[:, 0]) * 1e-5 if i == 0 else 1e-6
-        together = joined([k] * len(shifts))
-        predicted, *shifted = np.split(
-            target.entries(every, together, np.concatenate([now + d for d in shifts])), len(shifts)
+        now = values[:, alive]
+        d = np.stack([np.abs(now[0]) * 1e-5 if i == 0 else np.full(len(alive), 1e-6) for i in free])
+        tried = np.repeat(now[:, None], 1 + len(free), axis=1)
+        for k, i in enumerate(free):
+            tried[i, 1 + k] += d[k]
+        predicted = target.entries(every, x[np.tile(alive, 1 + len(free))], tried.reshape(3, -1)).reshape(
+            4, 1 + len(free), -1
         )
-        rows, turned = weight[alive], axes[alive]
-
-        def whitened(y: Reals, turned: Floats = turned, rows: Floats = rows) -> Floats:
-            return np.asarray(np.matmul(y.astype(np.float64)[:, None, :], turned)[:, 0] * rows)
-
-        miss = whitened(observed[alive] - predicted)
-        size = np.sum(miss**2, axis=1)
+        of, rows = x.of[alive], weight[:, alive]
+        predicted[:, 1:] = (predicted[:, 1:] - predicted[:, :1]) / d
+        best = predicted[:, 0].copy()
+        predicted[:, 0] = observed[:, alive] - best
+        miss, *slopes = np.moveaxis(target.turned(of, predicted) * rows[:, None], 1, 0)
+        size = np.sum(miss**2, axis=0)
         better = size < chi2[alive]
         stalled[alive] = np.where(size < 0.9 * chi2[alive], 0, stalled[alive] + 1)
         new = alive[better]
-        kept[new], entries[new], chi2[new] = now[better], predicted[better], size[better]
-        slopes = np.stack(
-            [
-                whitened((y - predicted) / d[:, [i]])
-                for i, y, d in zip(free, shifted, shifts[1:], strict=True)
-            ],
-            axis=2,
-        )
-        change, variance = least_squares(slopes, miss)
-        errors[np.ix_(new, free)] = np.sqrt(np.abs(variance[better]))
-        limit = 0.5 * np.abs(now[:, 0].astype(np.float64))
-        change[:, 0] = np.clip(change[:, 0], -limit, limit)
-        values[alive[:, None], free] += change
-        gain = np.sum(np.matmul(slopes, change[:, :, None])[:, :, 0] ** 2, axis=1)
+        kept[:, new], entries[:, new], chi2[new] = now[:, better], best[:, better], size[better]
+        change, variance = least_squares(np.array(slopes), miss)
+        errors[np.array(free)[:, None], new] = np.sqrt(np.abs(variance[:, better]))
+        limit = 0.5 * np.abs(now[0].astype(np.float64))
+        change[0] = np.clip(change[0], -limit, limit)
+        values[np.array(free)[:, None], alive] += change
+        gain = np.sum(sum(y * z for y, z in zip(slopes, change, strict=True)) ** 2, axis=0)
         going = (
             (gain > least * (1 + size))
             & (stalled[alive] < 2)
@@ -285,17 +289,14 @@ def _best(
     out: list[dict[tuple[str, int], Match]],
 ) -> None:
     """Put the best candidate of each map, family and stride into `out`: accepted, of few turns, close."""
-    physical = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=1)
+    physical = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=0)
     if every.damped and not target.terms.growing:
-        held = np.array([family.held for family in every.families])
-        physical &= (values[:, 1] > 0) | held[x.which]
+        physical &= (values[1] > 0) | every.held[x.which]
     masses: Any = target.log_masses(x, values)
     at = np.flatnonzero(physical)
     refused = chi2 > most(freedom)
     # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
-    close = (
-        np.where(refused | (freedom > 2), chi2, np.abs(values[:, 0])) if target.terms.mass_unknown else chi2
-    )
+    close = np.where(refused | (freedom > 2), chi2, np.abs(values[0])) if target.terms.mass_unknown else chi2
     order = at[np.lexsort((close[at], x.turns[at], refused[at], x.s[at], x.which[at], x.of[at]))]
     seen: set[tuple[int, str, int]] = set()
     for i in order.tolist():
@@ -308,13 +309,13 @@ def _best(
             family=name,
             stride=stride,
             turns=int(x.turns[i]),
-            a=float(values[i, 0]),
-            a_error=float(errors[i, 0]),
-            g=float(values[i, 1]),
-            g_error=float(errors[i, 1]),
+            a=float(values[0, i]),
+            a_error=float(errors[0, i]),
+            g=float(values[1, i]),
+            g_error=float(errors[1, i]),
             log_mass=float(masses[i]),
-            mass_error=float(errors[i, 2]),
+            mass_error=float(errors[2, i]),
             chi2=float(chi2[i]),
             freedom=freedom,
-            predicted=tuple(entries[i].astype(np.longdouble)),
+            predicted=tuple(entries[:, i].astype(np.longdouble)),
         )

@@ -154,7 +154,7 @@ def reproduced(
             # few are left that are cut to the wrong side, and those are outliers
             usual = np.median(np.abs(left), axis=1, keepdims=True)
             weight = 1 / (1 + (left / (usual + 0.1 * before)) ** 2)
-            values[:, free] -= least_squares(columns * weight[:, :, None], left * weight)[0]
+            values[:, free] -= least_squares(columns.T[:, :, None] * weight.T, (left * weight).T)[0].T
     return False
 
 

@@ -264,7 +264,7 @@ def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> 
     def frames(x: Extended) -> Extended:
         n = len(which)
         out = every.frame(which, x[:, 0], x[:, 1], np.zeros(n, np.longdouble), s, np.repeat(one, n))
-        return np.stack(_numbers(out.reshape(-1, 2, 2)), axis=1)
+        return np.stack(_numbers(out.T.reshape(-1, 2, 2)), axis=1)
 
     with np.errstate(all="ignore"):
         for _ in range(12):
