@@ -92,7 +92,7 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
     import dataclasses
 
     same = {name: dataclasses.replace(one, label=name) for name in ("own:euler", "x:a", "x:b", "y:c")}
-    (group,) = overlay.grouped(same)
+    (group,) = overlay.Runs(scene, same).groups
     assert looks.members(run.label for run in group.members).split() == [
         looks.mark("own")[1], "own", looks.mark("x")[1], "x", "(2)", looks.mark("y")[1], "y",
     ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from springcheck.figures import overlay
 from springcheck.figures.motion import Exact
-from springcheck.figures.overlay import TRUTH, Group, every
+from springcheck.figures.overlay import TRUTH, Runs
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
@@ -34,14 +34,14 @@ BLOCKS = 100
 """Of neighbours, over which errors are averaged: no picture resolves the short waves of a long chain."""
 
 
-def pictures(scene: Scene, groups: Sequence[Group], exact: Exact) -> dict[str, Figure]:
+def pictures(runs: Runs, exact: Exact) -> dict[str, Figure]:
     """The figures of a chain by name, none where a scene is no linear chain of at least three."""
-    system = scene.system
+    scene, system = runs.scene, runs.scene.system
     if scene.n < FEWEST or system.is_separate or not system.has_modes:
         return {}
-    out = {"modes": _modes(scene, groups, exact)}
+    out = {"modes": _modes(runs, exact)}
     if scene.n >= LONG and exact.known:
-        out["wave"] = _wave(scene, groups, exact)
+        out["wave"] = _wave(runs, exact)
     return out
 
 
@@ -53,24 +53,24 @@ def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
         return np.asarray((v * v + modes.w2 * (y - modes.centre()) ** 2) / 2, np.float64)
 
 
-def _modes(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+def _modes(runs: Runs, exact: Exact) -> Figure:
+    scene = runs.scene
     start = np.abs(_energies(scene, scene.q[None, :], scene.p[None, :])[0])
     total = float(np.sum(start)) or 1.0
     strongest = [int(i) for i in np.argsort(-start)[:MODES] if start[i] > WEAK * total] or [0]
     chosen = sorted(strongest, key=lambda i: float(scene.system.modes.w2[i]))
     unit = np.where(start > 0, start, 1.0)[chosen]
-    found = {run.label: _energies(scene, run.q, run.p)[:, chosen] / unit for run in every(groups)}
-    figure = Figure(figsize=(7.8, 1.9 * len(chosen) + 0.8), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(len(chosen), 1, sharex=True)).ravel()
-    dt, t_unit = overlay.time_unit(scene, groups)
+    found = {run.label: _energies(scene, run.q, run.p)[:, chosen] / unit for run in runs.every}
+    figure, panels, _ = overlay.panels(len(chosen), 1, (7.8, 0), (1.9, 0.8), shared="x")
+    dt, t_unit = runs.time_unit
     order = np.argsort(np.argsort(scene.system.modes.w2))
-    longest = max(every(groups), key=lambda run: len(run.t))
+    longest = runs.longest
     true = _energies(scene, *exact.at(longest))[:, chosen] / unit if exact.known else None
     for j, (axes, mode) in enumerate(zip(panels, chosen, strict=True)):
         mine = {label: x[:, j] for label, x in found.items()}
         if true is not None:
             axes.plot(dt * longest.t, true[:, j], **TRUTH)
-        _mode(axes, groups, mine, None if true is None else true[:, j], dt, t_unit)
+        _mode(axes, runs, mine, None if true is None else true[:, j])
         turn = abs(scene.step) * np.sqrt(max(float(scene.system.modes.w2[mode]), 0.0))
         share = f"{100 * start[mode] / total:.2g} % of the energy"
         name = f"mode {order[mode] + 1} of {scene.n}, $h\\,\\omega$ = {turn:.3g}, {share}"
@@ -79,21 +79,15 @@ def _modes(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
     panels[-1].set_xlabel(with_unit("time t", t_unit))
     what = "modes" if len(chosen) > 1 else "mode"
     overlay.heading(figure, f"{scene.title}: energy of the strongest {what}")
-    overlay.legend(figure, groups, *([overlay.truth_line()] if true is not None else []))
+    runs.legend(figure, truth=true is not None)
     return figure
 
 
-def _mode(
-    axes: Axes,
-    groups: Sequence[Group],
-    found: Mapping[str, Floats],
-    true: Floats | None,
-    dt: float,
-    unit: str,
-) -> None:
+def _mode(axes: Axes, runs: Runs, found: Mapping[str, Floats], true: Floats | None) -> None:
     """The energy of one mode."""
     ys = overlay.frame(list(found.values()), true, far=10.0)
-    overlay.overlay(axes, groups, lambda run: (dt * run.t, ys.within(found[run.label])))
+    dt, _ = runs.time_unit
+    runs.draw(axes, lambda run: (dt * run.t, ys.within(found[run.label])))
     inside = [x for x in found.values() if ys.leaves(x) is None]
     least = min((float(np.min(x)) for x in inside), default=0.0)
     if least > 0 and ys.high > DECADES * least:
@@ -101,27 +95,23 @@ def _mode(
         axes.set_ylim(least / 1.5, ys.high)
     else:
         axes.set_ylim(ys.low, ys.high)
-    overlay.note(axes, overlay.leaving(groups, lambda run: ys.leaves(found[run.label])), dt, unit)
+    runs.note(axes, lambda run: ys.leaves(found[run.label]))
 
 
-def _wave(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+def _wave(runs: Runs, exact: Exact) -> Figure:
     """Displacement over particle and time: the exact wave, and what each scheme's differs from it."""
-    modes = scene.system.modes
+    scene, modes, longest = runs.scene, runs.scene.system.modes, runs.longest
     rest = np.asarray(modes.out_of(modes.centre(), np.zeros_like(modes.w2))[0], np.float64)
-    longest = max(every(groups), key=lambda run: len(run.t))
-    dt, t_unit = overlay.time_unit(scene, groups)
+    dt, t_unit = runs.time_unit
     true = np.asarray(exact.at(longest)[0], np.float64) - rest
     images = [("exact solution", longest.t, true)]
-    for group in groups[: PANELS - 1]:
+    for group in runs.groups[: PANELS - 1]:
         run = group.members[0]
         images.append(
             (f"{group.title}\n{run.label}", run.t, np.asarray(run.q - exact.at(run)[0], np.float64))
         )
-    columns = min(3, len(images))
-    rows = -(-len(images) // columns)
-    figure = Figure(figsize=(3.6 * columns, 3.3 * rows + 0.5), layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
-    for j, (axes, (name, t, image)) in enumerate(zip(grid, images, strict=False)):
+    figure, grid, columns = overlay.panels(len(images), 3, (3.6, 0), (3.3, 0.5), shared="xy")
+    for j, (axes, (name, t, image)) in enumerate(zip(grid, images, strict=True)):
         axes.grid(False)
         size = float(np.max(np.abs(image))) or 1.0
         shown = image / size if j == 0 else _mean(image / size)
@@ -136,8 +126,6 @@ def _wave(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
             axes.set_ylabel(with_unit("time t", t_unit))
         if j >= len(images) - columns:
             axes.set_xlabel("particle")
-    for axes in grid[len(images) :]:
-        axes.set_axis_off()
     overlay.heading(figure, f"{scene.title}: the wave, and what schemes make of it", 40 * columns)
     return figure
 

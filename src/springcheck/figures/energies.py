@@ -10,10 +10,9 @@ from matplotlib.figure import Figure
 
 from springcheck.figures import overlay
 from springcheck.figures.motion import Exact, true_motion
-from springcheck.figures.overlay import TRUTH, Frame, Group, every
+from springcheck.figures.overlay import TRUTH, Frame, Runs
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 MOST = 1e3
@@ -32,7 +31,7 @@ FLOOR = 2.0**-53
 """Relative differences below this are none: they stand on the lower edge."""
 
 
-def energy(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+def energy(runs: Runs, exact: Exact) -> Figure:
     """Energy over time, and below it how far it is from that of the exact motion on a logarithmic scale.
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
@@ -41,6 +40,7 @@ def energy(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
     """
     figure = Figure(figsize=(7.8, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, sharex=True)
+    scene = runs.scene
     start = scene.system.initial_energy
     unit = float(scene.system.norm.unit) ** 2 or 1.0
     whole = abs(start - unit) <= 1e-12 * unit
@@ -56,25 +56,25 @@ def energy(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
         right = energies(*exact.at(run)) if damped else start
         return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
 
-    found = {run.label: energies(run.q, run.p) / unit for run in every(groups)}
-    dt, t_unit = overlay.time_unit(scene, groups)
+    found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
+    dt, t_unit = runs.time_unit
     true: Floats | None = None
-    if damped and (truth := true_motion(scene, every(groups))) is not None:
+    if damped and (truth := true_motion(scene, runs.every)) is not None:
         true = energies(*truth[1:]) / unit
         upper.plot(dt * truth[0], true, **TRUTH)
     elif not scene.system.is_damped:
         true = np.full(2, start / unit)
         upper.axhline(start / unit, **TRUTH)
     ys = _scale(upper, list(found.values()), true)
-    overlay.overlay(upper, groups, lambda run: (dt * run.t, ys.within(found[run.label])))
+    runs.draw(upper, lambda run: (dt * run.t, ys.within(found[run.label])))
     upper.set_ylabel(f"energy / {of}")
-    overlay.note(upper, overlay.leaving(groups, lambda run: ys.leaves(found[run.label])), dt, t_unit)
-    _decades(lower, groups, off, dt, t_unit)
+    runs.note(upper, lambda run: ys.leaves(found[run.label]))
+    _decades(lower, runs, off)
     lower.set_ylabel(f"|energy - {'exact' if damped else 'initial'}| / {of}")
     lower.set_xlabel(with_unit("time t", t_unit))
     lower.ticklabel_format(axis="x", useOffset=False)
     overlay.heading(figure, f"{scene.title}: energy")
-    overlay.legend(figure, groups, *([overlay.truth_line()] if true is not None else []))
+    runs.legend(figure, truth=true is not None)
     return figure
 
 
@@ -95,11 +95,10 @@ def _scale(axes: Axes, found: Sequence[Floats], true: Floats | None) -> Frame:
     return ys
 
 
-def _decades(
-    axes: Axes, groups: Sequence[Group], pick: Callable[[Trajectory], Floats], dt: float, t_unit: str
-) -> None:
+def _decades(axes: Axes, runs: Runs, pick: Callable[[Trajectory], Floats]) -> None:
     """Differences on a logarithmic scale."""
-    found = {run.label: pick(run) for run in every(groups)}
+    dt, _ = runs.time_unit
+    found = {run.label: pick(run) for run in runs.every}
     # the start is right; what is less than the floor at other frames stands on the lower edge
     positive = [x[1:][x[1:] > 0] for x in found.values()]
     low = max(min((float(np.min(x)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
@@ -113,26 +112,25 @@ def _decades(
         last = len(y) if end is None else end + 1
         return dt * run.t[1:last], np.clip(y[1:last], low, high * overlay.FAR)
 
-    overlay.overlay(axes, groups, shown)
+    runs.draw(axes, shown)
     axes.set_yscale("log")
     axes.set_ylim(low, high)
-    overlay.note(axes, overlay.leaving(groups, lambda run: _beyond(found[run.label], high)), dt, t_unit)
+    runs.note(axes, lambda run: _beyond(found[run.label], high))
 
 
 def _beyond(values: Floats, high: float) -> int | None:
     return int(np.argmax(values > high)) if np.any(values > high) else None
 
 
-def error(scene: Scene, groups: Sequence[Group], exact: Exact) -> Figure:
+def error(runs: Runs, exact: Exact) -> Figure:
     """Distance from the exact solution over time, on a logarithmic scale."""
     figure = Figure(figsize=(7.8, 4.6), layout="constrained")
     axes = figure.add_subplot()
-    dt, t_unit = overlay.time_unit(scene, groups)
-    _decades(axes, groups, exact.error, dt, t_unit)
+    _decades(axes, runs, exact.error)
     axes.axhline(1.0, color="#888888", linewidth=0.8)
-    axes.set_xlabel(with_unit("time t", t_unit))
+    axes.set_xlabel(with_unit("time t", runs.time_unit[1]))
     axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_ylabel("error / initial energy norm")
-    overlay.heading(figure, f"{scene.title}: distance from the exact solution")
-    overlay.legend(figure, groups)
+    overlay.heading(figure, f"{runs.scene.title}: distance from the exact solution")
+    runs.legend(figure)
     return figure

@@ -59,41 +59,70 @@ class Group:
         return looks.title(self.scheme)
 
 
-def grouped(runs: Mapping[str, Trajectory]) -> list[Group]:
-    """Trajectories by scheme; what has but its start is left out."""
-    found: dict[str, list[Trajectory]] = {}
-    for run in runs.values():
-        if len(run.t) > 1:
-            found.setdefault(run.scheme, []).append(run)
-    return [Group(name, tuple(members)) for name, members in found.items()]
-
-
-def every(groups: Sequence[Group]) -> list[Trajectory]:
-    """All runs."""
-    return [run for group in groups for run in group.members]
-
-
 Pick = Callable[[Trajectory], tuple[Floats, Floats]]
 
 
-def overlay(
-    axes: Axes, groups: Sequence[Group], pick: Pick, *, joined: bool = True, faint: bool = False
-) -> None:
-    """The first run of each scheme as a line (`joined`) or dots, and marks of every engine.
+class Runs:
+    """Trajectories of a scene by their schemes; what has but its start is left out."""
 
-    `faint`: lines between the dots that are seen to be none of the motion.
-    """
-    for group in groups:
-        look = looks.look(group.scheme)
-        for j, run in enumerate(group.members):
-            x, y = pick(run)
-            if j == 0 and joined:
-                axes.plot(x, y, color=look.color, linestyle=look.linestyle, label=group.title, zorder=2)
-            elif j == 0:
-                axes.plot(x, y, ".", color=look.color, markersize=3, label=group.title, zorder=2)
-                if faint:
-                    axes.plot(x, y, color=look.color, linewidth=0.7, alpha=0.4, zorder=1.5)
-            _marks(axes, x, y, look.color, j, run.label)
+    def __init__(self, scene: Scene, runs: Mapping[str, Trajectory]) -> None:
+        self.scene = scene
+        found: dict[str, list[Trajectory]] = {}
+        for run in runs.values():
+            if len(run.t) > 1:
+                found.setdefault(run.scheme, []).append(run)
+        self.groups = [Group(name, tuple(members)) for name, members in found.items()]
+        self.every = [run for group in self.groups for run in group.members]
+
+    @property
+    def longest(self) -> Trajectory:
+        """The one with the most frames."""
+        return max(self.every, key=lambda run: len(run.t))
+
+    @property
+    def time_unit(self) -> tuple[float, str]:
+        """Factor and unit of a readable axis of time."""
+        last = max(abs(float(run.t[-1])) for run in self.every)
+        return looks.prefixed(last, units(self.scene).t)
+
+    def draw(self, axes: Axes, pick: Pick, *, joined: bool = True, faint: bool = False) -> None:
+        """The first run of each scheme as a line (`joined`) or dots, and marks of every engine.
+
+        `faint`: lines between the dots that are seen to be none of the motion.
+        """
+        for group in self.groups:
+            look = looks.look(group.scheme)
+            for j, run in enumerate(group.members):
+                x, y = pick(run)
+                if j == 0 and joined:
+                    axes.plot(x, y, color=look.color, linestyle=look.linestyle, label=group.title, zorder=2)
+                elif j == 0:
+                    axes.plot(x, y, ".", color=look.color, markersize=3, label=group.title, zorder=2)
+                    if faint:
+                        axes.plot(x, y, color=look.color, linewidth=0.7, alpha=0.4, zorder=1.5)
+                _marks(axes, x, y, look.color, j, run.label)
+
+    def note(self, axes: Axes, when: Callable[[Trajectory], int | None]) -> None:
+        """Say above a picture which schemes leave it for good, and when: at which frame, None where never."""
+        factor, unit = self.time_unit
+        firsts = {group.title: group.members[0] for group in self.groups}
+        frames = {name: when(run) for name, run in firsts.items()}
+        said = [
+            f"{name} at {factor * abs(float(firsts[name].t[i])):.3g} {unit}".rstrip()
+            for name, i in frames.items()
+            if i is not None
+        ]
+        if len(said) > MOST_LEAVING:
+            said = [*said[: MOST_LEAVING - 1], f"{len(said) - MOST_LEAVING + 1} more"]
+        if said:
+            text = "outside: " + ", ".join(said)
+            axes.set_title(textwrap.fill(text, 76), loc="right", fontsize=7.5, color="#555555")
+
+    def legend(self, figure: Figure, *extra: Line2D, truth: bool = False) -> None:
+        """One entry for each scheme, with the marks of its engines; first the `truth`, and `extra` lines."""
+        first = [Line2D([], [], **{name: TRUTH[name] for name in ("color", "linewidth", "label")})]
+        labels = {x.scheme: [run.label for run in x.members] for x in self.groups}
+        scheme_legend(figure, labels, *(first if truth else []), *extra)
 
 
 def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> None:
@@ -113,13 +142,8 @@ def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> 
     )
 
 
-def legend(figure: Figure, groups: Sequence[Group], *extra: Line2D) -> None:
-    """One entry for each scheme, with the marks of its engines; `extra` lines first."""
-    scheme_legend(figure, {x.scheme: [run.label for run in x.members] for x in groups}, *extra)
-
-
 def scheme_legend(figure: Figure, methods: Mapping[str, Sequence[str]], *extra: Line2D) -> None:
-    """The same of labels by scheme."""
+    """One entry for each scheme, with the marks of the engines of its methods; `extra` lines first."""
     handles = list(extra)
     for scheme, labels in methods.items():
         look = looks.look(scheme)
@@ -128,11 +152,6 @@ def scheme_legend(figure: Figure, methods: Mapping[str, Sequence[str]], *extra: 
     figure.legend(
         handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
     )
-
-
-def truth_line() -> Line2D:
-    """The exact solution in a legend."""
-    return Line2D([], [], color=TRUTH["color"], linewidth=TRUTH["linewidth"], label=TRUTH["label"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,28 +240,23 @@ def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
     return tuple(np.asarray(w / scale * its.half + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
 
 
-def note(axes: Axes, leaving: Mapping[str, float], factor: float, unit: str) -> None:
-    """Say above a picture which schemes leave it for good, and when (times [T] by scheme)."""
-    said = [f"{name} at {factor * t:.3g} {unit}".rstrip() for name, t in leaving.items()]
-    if len(said) > MOST_LEAVING:
-        said = [*said[: MOST_LEAVING - 1], f"{len(said) - MOST_LEAVING + 1} more"]
-    if said:
-        text = "outside: " + ", ".join(said)
-        axes.set_title(textwrap.fill(text, 76), loc="right", fontsize=7.5, color="#555555")
-
-
-def time_unit(scene: Scene, groups: Sequence[Group]) -> tuple[float, str]:
-    """Factor and unit of a readable axis of time."""
-    last = max(abs(float(run.t[-1])) for run in every(groups))
-    return looks.prefixed(last, units(scene).t)
-
-
-def leaving(groups: Sequence[Group], when: Callable[[Trajectory], int | None]) -> dict[str, float]:
-    """The time at which each scheme leaves a picture, of those that do."""
-    found = {group.title: (group.members[0], when(group.members[0])) for group in groups}
-    return {name: abs(float(run.t[i])) for name, (run, i) in found.items() if i is not None}
-
-
 def heading(figure: Figure, text: str, width: int = 66) -> None:
     """A title over all axes of a figure, broken where the legend begins."""
     figure.suptitle(textwrap.fill(text, width), x=0.02, ha="left", fontsize=10)
+
+
+def panels(
+    count: int, most: int, width: tuple[float, float], height: tuple[float, float], *, shared: str = ""
+) -> tuple[Figure, list[Axes], int]:
+    """A figure of so many panels, and how many of them stand beside each other, at the `most`.
+
+    `width` and `height` of a panel, and of what the figure has besides [in]; `shared`: of x, y or both.
+    """
+    columns = min(most, count)
+    rows = -(-count // columns)
+    size = width[0] * columns + width[1], height[0] * rows + height[1]
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex="x" in shared, sharey="y" in shared).ravel()
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    return figure, list(grid[:count]), columns

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from springcheck.figures import looks, overlay
 from springcheck.figures.motion import Motion, periods, smooth
-from springcheck.figures.overlay import TRUTH, Frame, Group, every
+from springcheck.figures.overlay import TRUTH, Frame, Runs
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -33,27 +33,19 @@ SEPARATRIX = Line2D([], [], color="#666666", linewidth=0.9, linestyle=(0, (2, 2)
 _BEGIN = Line2D([], [], color="k", linestyle="none", marker="+", markersize=9, label="start")
 
 
-def phase_portraits(
-    scene: Scene, groups: Sequence[Group], shown: Sequence[View], truth: Motion | None
-) -> Figure:
+def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Figure:
     """Momentum over position: a panel for each view."""
-    columns = 1 if len(shown) == 1 else 2
-    rows = -(-len(shown) // columns)
-    size = (7.8, 5.2) if len(shown) == 1 else (9.8, 3.4 * rows + 0.4)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    width, height = ((7.8, 0), (5.2, 0)) if len(shown) == 1 else ((4.9, 0), (3.4, 0.4))
+    figure, grid, _ = overlay.panels(len(shown), 2, width, height)
     crossed = []
-    for axes, view in zip(grid, shown, strict=False):
-        crossed.append(_phase_portrait(axes, scene, groups, view, truth))
+    for axes, view in zip(grid, shown, strict=True):
+        crossed.append(_phase_portrait(axes, runs, view, truth))
         if len(shown) > 1:
             axes.set_title(view.title, fontsize=9, loc="left")
-        elif scene.units == "reduced" and not view.turn:
+        elif runs.scene.units == "reduced" and not view.turn:
             _equal(axes)
-    for axes in grid[len(shown) :]:
-        axes.set_axis_off()
-    overlay.heading(figure, _title(scene, "phase portrait", shown))
-    extra = [overlay.truth_line()] if truth is not None else []
-    overlay.legend(figure, groups, *extra, *([SEPARATRIX] if any(crossed) else []), _BEGIN)
+    overlay.heading(figure, _title(runs.scene, "phase portrait", shown))
+    runs.legend(figure, *([SEPARATRIX] if any(crossed) else []), _BEGIN, truth=truth is not None)
     return figure
 
 
@@ -70,12 +62,10 @@ def _equal(axes: Axes) -> None:
         axes.set_aspect("equal", adjustable="box")
 
 
-def _phase_portrait(
-    axes: Axes, scene: Scene, groups: Sequence[Group], view: View, truth: Motion | None
-) -> bool:
+def _phase_portrait(axes: Axes, runs: Runs, view: View, truth: Motion | None) -> bool:
     """One panel; returns whether it shows a separatrix."""
     true = None if truth is None else view.pick(truth[1], truth[2])
-    picked = {run.label: view.pick(run.q, run.p) for run in every(groups)}
+    picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     xs, ys = _frames(list(picked.values()), true, view)
     dx, x_unit = looks.prefixed(max(abs(xs.low), abs(xs.high)), view.x_unit)
     dy, y_unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.y_unit)
@@ -93,10 +83,8 @@ def _phase_portrait(
             )  # fmt: skip
     if true is not None:
         axes.plot(*near(*true), **TRUTH)
-    overlay.overlay(
-        axes, groups, lambda run: near(*picked[run.label]), joined=_joined(groups, true)
-    )  # fmt: skip
-    axes.plot(*near(*view.pick(scene.q[None, :], scene.p[None, :])), "k+", markersize=10, zorder=4)
+    runs.draw(axes, lambda run: near(*picked[run.label]), joined=_joined(runs, true))
+    axes.plot(*near(*view.pick(runs.scene.q[None], runs.scene.p[None])), "k+", markersize=10, zorder=4)
     axes.set_xlim(dx * xs.low, dx * xs.high)
     axes.set_ylim(dy * ys.low, dy * ys.high)
     if view.turn:
@@ -110,7 +98,7 @@ def _phase_portrait(
 
     # where the motion itself runs away all of them leave
     if _steep(picked, true) is None:
-        overlay.note(axes, overlay.leaving(groups, when), *overlay.time_unit(scene, groups))
+        runs.note(axes, when)
     return bool(curves)
 
 
@@ -157,40 +145,38 @@ def _beginning(x: Floats) -> Frame:
     return Frame(min(edges), max(edges), True)
 
 
-def _joined(groups: Sequence[Group], true: State | None) -> bool:
+def _joined(runs: Runs, true: State | None) -> bool:
     """Whether frames stand so close that a line between them follows the motion."""
     if true is None:
         return True
-    frames = max(len(run.t) for run in every(groups))
-    return frames >= FRAMES * periods(true[0])
+    return len(runs.longest.t) >= FRAMES * periods(true[0])
 
 
-def positions(scene: Scene, groups: Sequence[Group], shown: Sequence[View], truth: Motion | None) -> Figure:
+def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Figure:
     """Positions over time: a row for each view; of many periods the first and the last."""
     rows = len(shown)
-    spans = _spans(groups, shown, truth)
+    spans = _spans(runs, shown, truth)
     size = (8.2 if len(spans) == 1 else 10.6, 4.2 if rows == 1 else 1.75 * rows + 1)
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows, len(spans), squeeze=False, sharex="col", sharey="row")
-    _, unit = overlay.time_unit(scene, groups)
+    _, unit = runs.time_unit
     for row, view in zip(grid, shown, strict=True):
         for axes, span in zip(row, spans, strict=True):
-            unit_x = _position(axes, scene, groups, view, truth, span)
+            unit_x = _position(axes, runs, view, truth, span)
         row[0].set_ylabel(with_unit(view.x_name, unit_x))
         if rows > 1:
             row[0].set_title(view.title, fontsize=9, loc="left")
     for axes in grid[-1]:
         axes.set_xlabel(with_unit("time t", unit))
     parts = "" if len(spans) == 1 else f" (the first and the last {SHOWN} periods)"
-    overlay.heading(figure, _title(scene, shown[0].what, shown) + parts, 66 if len(spans) == 1 else 90)
-    overlay.legend(figure, groups, *([overlay.truth_line()] if truth is not None else []))
+    overlay.heading(figure, _title(runs.scene, shown[0].what, shown) + parts, 66 if len(spans) == 1 else 90)
+    runs.legend(figure, truth=truth is not None)
     return figure
 
 
-def _spans(groups: Sequence[Group], shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
+def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
     """The times that are shown: all, or the first and the last periods of many."""
-    runs = every(groups)
-    first, last = (float(f([f(np.abs(run.t)) for run in runs])) for f in (np.min, np.max))
+    first, last = (float(f([f(np.abs(run.t)) for run in runs.every])) for f in (np.min, np.max))
     if truth is None:
         return [(first, last)]
     count = max(periods(view.pick(truth[1], truth[2])[0]) for view in shown)
@@ -200,21 +186,14 @@ def _spans(groups: Sequence[Group], shown: Sequence[View], truth: Motion | None)
     return [(first, first + length), (last - length, last)]
 
 
-def _position(
-    axes: Axes,
-    scene: Scene,
-    groups: Sequence[Group],
-    view: View,
-    truth: Motion | None,
-    span: tuple[float, float],
-) -> str:
+def _position(axes: Axes, runs: Runs, view: View, truth: Motion | None, span: tuple[float, float]) -> str:
     """One panel; returns the unit of its axis."""
     true = None if truth is None else view.pick(truth[1], truth[2])
-    states = {run.label: view.pick(run.q, run.p) for run in every(groups)}
+    states = {run.label: view.pick(run.q, run.p) for run in runs.every}
     picked = {label: x for label, (x, _) in states.items()}
     steep = _steep(states, true) is not None
     ys = overlay.frame(list(picked.values()), None if true is None else true[0])
-    dt, t_unit = overlay.time_unit(scene, groups)
+    dt, _ = runs.time_unit
     dy, unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
 
     def cut(run: Trajectory) -> State:
@@ -222,17 +201,16 @@ def _position(
         return dt * run.t[here], dy * ys.within(picked[run.label])[here]
 
     # a part of many periods needs a finer line than all of them
-    fine = smooth(scene, *span)
+    fine = smooth(runs.scene, *span)
     if fine is not None:
         axes.plot(dt * fine[0], dy * ys.within(view.pick(fine[1], fine[2])[0]), **TRUTH)
-    overlay.overlay(axes, groups, cut, joined=_joined(groups, true), faint=True)
+    runs.draw(axes, cut, joined=_joined(runs, true), faint=True)
     axes.set_ylim(dy * ys.low, dy * ys.high)
     if steep:
         _logarithmic(axes, dy, [*picked.values(), *([] if true is None else [true[0]])], ys)
     axes.ticklabel_format(axis="x", useOffset=False)
     if span[0] == 0:
-        leaving = overlay.leaving(groups, lambda run: ys.leaves(picked[run.label]))
-        overlay.note(axes, leaving, dt, t_unit)
+        runs.note(axes, lambda run: ys.leaves(picked[run.label]))
     return unit
 
 

@@ -91,12 +91,9 @@ def _lines(shown: Mapping[str, Line], choice: Choice) -> Figure:
 
 
 def _maps(shown: Mapping[str, Map], choice: Choice) -> Figure:
-    count = min(3, len(shown))
-    rows = -(-len(shown) // count)
-    figure = Figure(figsize=(3.4 * count + 1.2, 2.9 * rows + 0.5), layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, count, sharex=True, sharey=True)).ravel()
+    figure, grid, count = overlay.panels(len(shown), 3, (3.4, 1.2), (2.9, 0.5), shared="xy")
     colors, bar = _colors(choice.quantity, [x.values for x in shown.values()])
-    for axes, (method, one) in zip(grid, shown.items(), strict=False):
+    for axes, (method, one) in zip(grid, shown.items(), strict=True):
         # what is exact has the first colour of a logarithmic scale
         values = np.maximum(one.values, colors["norm"].vmin or 0) if choice.quantity in SIZES else one.values
         drawn = axes.pcolormesh(edges(one.x), edges(one.y), values, rasterized=True, **colors)
@@ -106,9 +103,7 @@ def _maps(shown: Mapping[str, Map], choice: Choice) -> Figure:
         axes.set_facecolor(UNKNOWN)
         axes.grid(visible=False)
         axes.set_title(method)
-    for axes in grid[len(shown) :]:
-        axes.set_axis_off()
-    for axes in grid[max(0, len(shown) - count) : len(shown)]:
+    for axes in grid[max(0, len(shown) - count) :]:
         axes.tick_params(labelbottom=True)
     said = _fixed(shown)
     if not all(np.isfinite(one.values).all() for one in shown.values()):
@@ -117,7 +112,7 @@ def _maps(shown: Mapping[str, Map], choice: Choice) -> Figure:
         figure.suptitle("; ".join(said), x=0.02, ha="left", fontsize=8, color="#555555")
     figure.supxlabel(choice.over[0], fontsize=9)
     figure.supylabel(choice.over[1], fontsize=9)
-    made = figure.colorbar(drawn, ax=list(grid), **bar)
+    made = figure.colorbar(drawn, ax=figure.axes, **bar)
     if choice.quantity == "outcome":
         made.set_ticks(range(len(OUTCOMES)), labels=OUTCOMES)
     return figure

@@ -9,6 +9,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from springcheck.figures import overlay
 from springcheck.physics.arrays import Floats
 from springcheck.studies.extremes.planes import planes
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
@@ -29,12 +30,9 @@ def pictures(atlas: Atlas) -> dict[str, Figure]:
 def picture(atlas: Atlas) -> Figure:
     """One panel for each method of fixed step."""
     found = planes(atlas.cells)
-    columns = min(3, len(found))
-    rows = -(-len(found) // columns)
-    figure = Figure(figsize=(3.7 * columns, 2.25 * rows + 0.9), layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    figure, grid, columns = overlay.panels(len(found), 3, (3.7, 0), (2.25, 0.9))
     gaps = False
-    for j, (axes, one) in enumerate(zip(grid, found, strict=False)):
+    for j, (axes, one) in enumerate(zip(grid, found, strict=True)):
         turns, forces = one.turns, one.decades
         plane = np.array(
             [[np.nan if x is None else OUTCOMES.index(x.outcome) for x in row] for row in one.cells]
@@ -59,8 +57,6 @@ def picture(atlas: Atlas) -> Figure:
             axes.set_ylabel("$h\\,\\omega$")
         if j >= len(found) - columns:
             axes.set_xlabel("$\\log_{10}$ force")
-    for axes in grid[len(found) :]:
-        axes.set_axis_off()
     named = [one for one in zip(SHADES, OUTCOMES, strict=True) if one[1] != RARE or atlas.counts()[RARE]]
     handles = [Patch(facecolor=shade, label=name) for shade, name in named]
     if gaps:

@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.physics import exact
-from springcheck.physics.arrays import Arithmetic, Floats, Reals
+from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
@@ -116,44 +116,45 @@ def shifted(scene: Scene, size: float) -> Scene:
     return replace(scene, terms=tuple(term.shifted(size * reach) for term in scene.terms))
 
 
-def verlet(scene: Scene, *, first: float = 0.5, second: float = 0.5, mass: float = 0.0) -> Step:
+def by_hand(step: Callable[[Floats, Floats, Force, float, Floats, float], State]) -> Make:
+    """The engine takes a step that is written out: step(q, p, force, h, m, size)."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        force, h, m = scene.system.force, scene.step, scene.m
+        return lambda i, q, p: step(q, p, force, h, m, size)
+
+    return stepping(broken)
+
+
+def verlet(
+    q: Floats, p: Floats, force: Force, h: float, m: Floats | float, first: float = 0.5, second: float = 0.5
+) -> State:
     """Velocity Verlet with other coefficients, or another mass in its drift."""
-    force = scene.system.force
-    h, m = scene.step, mass or scene.m
-
-    def step(i: int, q: Floats, p: Floats) -> State:
-        p = p + first * h * force(q, p)
-        q = q + h * (p / m)
-        return q, np.asarray(p + second * h * force(q, p), np.float64)
-
-    return step
+    p = p + first * h * force(q, p)
+    q = q + h * (p / m)
+    return q, np.asarray(p + second * h * force(q, p), np.float64)
 
 
-def swapped_halves(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+def swapped_halves(q: Floats, p: Floats, force: Force, h: float, m: Floats, size: float) -> State:
     """h/2 where h*h/2 belongs, in the position form of velocity Verlet."""
-    force = scene.system.force
-    h, m = scene.step, scene.m
-
-    def step(i: int, q: Floats, p: Floats) -> State:
-        f = force(q, p)
-        q = np.asarray(q + h * (p / m) + h / 2 * (f / m), np.float64)
-        return q, np.asarray(p + h / 2 * (f + force(q, p)), np.float64)
-
-    return step
+    f = force(q, p)
+    q = np.asarray(q + h * (p / m) + h / 2 * (f / m), np.float64)
+    return q, np.asarray(p + h / 2 * (f + force(q, p)), np.float64)
 
 
-def old_second_kick(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+def old_second_kick(q: Floats, p: Floats, force: Force, h: float, m: Floats, size: float) -> State:
     """The second half kick with the force of the old position."""
-    force = scene.system.force
-    h, m = scene.step, scene.m
+    f = force(q, p)
+    p = p + h / 2 * f
+    q = q + h * (p / m)
+    return q, np.asarray(p + h / 2 * f, np.float64)
 
-    def step(i: int, q: Floats, p: Floats) -> State:
-        f = force(q, p)
-        p = p + h / 2 * f
-        q = q + h * (p / m)
-        return q, np.asarray(p + h / 2 * f, np.float64)
 
-    return step
+def one_iteration(q: Floats, p: Floats, force: Force, h: float, m: Floats, size: float) -> State:
+    """Implicit Euler by one fixed-point iteration instead of a solution."""
+    new = q + h * (p / m)
+    p = np.asarray(p + h * force(new, p), np.float64)
+    return q + h * (p / m), p
 
 
 def stale_force(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
@@ -329,19 +330,6 @@ def restarted(scene: Scene, size: float, i: int, state: State) -> State:
     if i != scene.steps // 2:
         return state
     return significant(state[0], size), significant(state[1], size)
-
-
-def one_iteration(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """Implicit Euler by one fixed-point iteration instead of a solution."""
-    force = scene.system.force
-    h, m = scene.step, scene.m
-
-    def step(i: int, q: Floats, p: Floats) -> State:
-        new = q + h * (p / m)
-        p = np.asarray(p + h * force(new, p), np.float64)
-        return q + h * (p / m), p
-
-    return step
 
 
 def claims_single(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from springcheck.figures import looks, overlay
+from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
-
-Document = Mapping[str, Any]
 
 ROOM = 30.0
 """Errors above this are left of the picture: nothing is read off them."""
@@ -22,29 +21,28 @@ ROOM = 30.0
 
 def pictures(study: PrecisionStudy) -> dict[str, Figure]:
     """The one figure of a study, fresh or stored, by name; none where it has no errors."""
-    document = study.document()
-    return {"precision": picture(document)} if any(x["max_error"] for x in document["points"]) else {}
+    return {"precision": picture(study)} if any(x.error > 0 for x in study.points) else {}
 
 
-def picture(document: Document) -> Figure:
+def picture(study: PrecisionStudy) -> Figure:
     """The two panels, with one legend beside them."""
     figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    drawn = [method for method in document["methods"] if _of(document, method["method"], "run_seconds")]
-    groups = looks.by_scheme(method["method"] for method in drawn)
-    for axes, cost in ((left, "run_seconds"), (right, "force_calls")):
+    groups = looks.by_scheme(x.method for x in study.methods if _of(study, x.method, "seconds"))
+    for axes, cost in ((left, "seconds"), (right, "force_calls")):
         for scheme, labels in groups.items():
             # as many force calls are the same curve: one line, and the marks of every engine
-            longest = max(labels, key=lambda label: len(_of(document, label, "force_calls")))
+            longest = max(labels, key=lambda label: len(_of(study, label, "force_calls")))
             for label in labels:
-                _line(axes, document, label, cost, scheme, line=cost == "run_seconds" or label == longest)
+                points = _of(study, label, cost)
+                _line(axes, label, points, cost, scheme, line=cost == "seconds" or label == longest)
         axes.set_xscale("log")
         axes.set_yscale("log")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(LogLocator(numticks=20))
             axis.set_minor_formatter(NullFormatter())
-    _frame(left, document)
-    floors = _floors(document, groups)
+    _frame(left, study)
+    floors = _floors(study, groups)
     for scheme, y in floors.items():
         look = looks.look(scheme)
         for axes in (left, right):
@@ -53,29 +51,25 @@ def picture(document: Document) -> Figure:
             f"{y:.0e}", (1.0, y), xycoords=("axes fraction", "data"), xytext=(-2, 2),
             textcoords="offset points", ha="right", fontsize=7, color=look.color,
         )  # fmt: skip
-    _slopes(right, document)
+    _slopes(right, study)
     left.set_xlabel("run time of the engine alone (s)")
     right.set_xlabel("force calls")
     left.set_ylabel("largest error / initial energy norm")
-    overlay.heading(figure, f"{document['scene']}: error against cost, to the same final time", 90)
+    overlay.heading(figure, f"{study.scene.name}: error against cost, to the same final time", 90)
     extra = [Line2D([], [], color="#666666", linewidth=0.8, linestyle=(0, (1, 3)), label="rounding floor")]
     overlay.scheme_legend(figure, groups, *(extra if floors else []))
     return figure
 
 
-def _of(document: Document, method: str, cost: str) -> list[Mapping[str, Any]]:
-    return [
-        point
-        for point in document["points"]
-        if point["method"] == method and point["max_error"] and point[cost]
-    ]
+def _of(study: PrecisionStudy, method: str, cost: str) -> list[Point]:
+    """The points of a method that have an error and this cost."""
+    return [x for x in study.of(method) if x.error > 0 and (getattr(x, cost) or 0) > 0]
 
 
-def _line(axes: Axes, document: Document, label: str, cost: str, scheme: str, *, line: bool) -> None:
+def _line(axes: Axes, label: str, points: Sequence[Point], cost: str, scheme: str, *, line: bool) -> None:
     """One method's points, those of the largest errors left out."""
-    points = _of(document, label, cost)
-    x = np.array([point[cost] for point in points], dtype=float)
-    y = np.array([point["max_error"] for point in points], dtype=float)
+    x = [getattr(point, cost) for point in points]
+    y = [point.error for point in points]
     look = looks.look(scheme)
     marks: dict[str, Any] = {
         "marker": looks.mark(looks.engine(label))[0],
@@ -94,28 +88,23 @@ MOST_MARKS = 14
 """Of each line."""
 
 
-def _floors(document: Document, groups: Mapping[str, list[str]]) -> dict[str, float]:
+def _floors(study: PrecisionStudy, groups: Mapping[str, list[str]]) -> dict[str, float]:
     """The lowest rounding floor that was found of each scheme."""
-    found = {}
-    for scheme, labels in groups.items():
-        floors = [
-            method["floor"]
-            for method in document["methods"]
-            if method["method"] in labels and method["floor"] is not None
-        ]
-        if floors:
-            found[scheme] = min(floors)
-    return found
+    found = {x.method: x.floor for x in study.methods if x.floor is not None}
+    of_schemes = {
+        scheme: [found[label] for label in labels if label in found] for scheme, labels in groups.items()
+    }
+    return {scheme: min(floors) for scheme, floors in of_schemes.items() if floors}
 
 
-def _frame(axes: Axes, document: Document) -> None:
-    errors = [point["max_error"] for point in document["points"] if point["max_error"]]
+def _frame(axes: Axes, study: PrecisionStudy) -> None:
+    errors = [point.error for point in study.points if point.error > 0]
     axes.set_ylim(10.0 ** np.floor(np.log10(min(errors))), min(ROOM, 2 * max(errors)))
 
 
-def _slopes(axes: Axes, document: Document) -> None:
+def _slopes(axes: Axes, study: PrecisionStudy) -> None:
     """Short lines of the orders that were found, from one point at the lower left, where no curve runs."""
-    orders = sorted({round(m["order"]) for m in document["methods"] if m["order"] is not None})
+    orders = sorted({round(x.order) for x in study.methods if x.order is not None})
     x = axes.get_xlim()[0] * np.array([1.8, 1.8 * 10**0.7])
     low, high = np.log10(axes.get_ylim())
     start = 10 ** (low + 0.6 * (high - low))

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from springcheck.figures import chain, energies, overlay, portraits
+from springcheck.figures import chain, energies, portraits
 from springcheck.figures.motion import Exact, true_motion
-from springcheck.figures.overlay import every
+from springcheck.figures.overlay import Runs
 from springcheck.figures.views import views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -36,18 +36,18 @@ def of_runs(
     """
     if not any(len(run.t) > 1 for run in runs.values()):
         return {}
-    usable, parts = overlay.grouped(runs), overlay.grouped(followed)
+    usable, parts = Runs(scene, runs), Runs(scene, followed)
     exact = Exact(scene)
     shown = views(scene, particle)
-    truth = true_motion(scene, every(parts))
+    truth = true_motion(scene, parts.every)
     ending = "" if particle is None else f"-particle-{particle}"
     out = {
-        f"phase-portrait{ending}": portraits.phase_portraits(scene, parts, shown, truth),
-        f"position{ending}": portraits.positions(scene, parts, shown, truth),
+        f"phase-portrait{ending}": portraits.phase_portraits(parts, shown, truth),
+        f"position{ending}": portraits.positions(parts, shown, truth),
     }
     if particle is None:
-        out["energy"] = energies.energy(scene, usable, exact)
+        out["energy"] = energies.energy(usable, exact)
         if exact.known:
-            out["error"] = energies.error(scene, usable, exact)
-        out |= chain.pictures(scene, usable, exact)
+            out["error"] = energies.error(usable, exact)
+        out |= chain.pictures(usable, exact)
     return out

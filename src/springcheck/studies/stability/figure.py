@@ -76,11 +76,8 @@ def limits(found: Sequence[Limit], fastest: float | None = None) -> Figure:
 
 def regions(found: Sequence[Region]) -> Figure:
     """Where each method is stable in the damped plane, theory's border on top."""
-    columns = min(2, len(found))
-    rows = -(-len(found) // columns)
-    figure = Figure(figsize=(4.3 * columns, 3.4 * rows + 0.5), layout="constrained")
-    grid = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
-    for axes, region in zip(grid, found, strict=False):
+    figure, grid, columns = overlay.panels(len(found), 2, (4.3, 0), (3.4, 0.5), shared="xy")
+    for j, (axes, region) in enumerate(zip(grid, found, strict=True)):
         axes.grid(False)
         axes.pcolormesh(
             region.turn, region.ratio, region.stable, cmap=ListedColormap(["#ffffff", "#9ecae1"]),
@@ -96,11 +93,8 @@ def regions(found: Sequence[Region]) -> Figure:
         axes.axhline(1.0, color="#777777", linewidth=0.8, linestyle=":")
         axes.set_title(region.method)
         _say(axes, f"{region.points} points, {region.wrong} against theory")
-    for j, axes in enumerate(grid):
         # the axis is shared, and the panel below may be missing
         axes.tick_params(labelbottom=j >= len(found) - columns)
-        if j >= len(found):
-            axes.set_axis_off()
     figure.supxlabel("step times frequency, $h\\,\\omega$", fontsize=9)
     figure.supylabel("damping ratio, $c\\,/\\,2\\sqrt{km}$", fontsize=9)
     figure.suptitle(
@@ -118,8 +112,8 @@ def _say(axes: Axes, text: str) -> None:
 
 def resonances(found: Sequence[Resonance]) -> Figure:
     """Growth per step along h w of the fast spring."""
-    figure = Figure(figsize=(8.0, 3.8 * len(found)), layout="constrained")
-    for axes, one in zip(np.atleast_1d(figure.subplots(len(found), 1)).ravel(), found, strict=True):
+    figure, grid, _ = overlay.panels(len(found), 1, (8.0, 0), (3.8, 0))
+    for axes, one in zip(grid, found, strict=True):
         axes.plot(
             one.turn, one.radius_predicted - 1, color="#b3b3b3", linewidth=3, label="the exact map"
         )  # fmt: skip
