@@ -21,7 +21,7 @@ import pytest
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison
-from springcheck.store import seal, trust
+from springcheck.store import checking, seal, trust
 from test_store import LABELS, scene, trajectory
 
 READERS: list[Callable[[Path], object]] = [
@@ -98,6 +98,21 @@ def test_a_changed_number_is_named_and_not_read(whole: Path, tmp_path: Path) -> 
         if extent.name.endswith(("q/value", "p/value", "energy/value", "/time")):
             with pytest.raises(StoreError, match="damaged"):
                 store.read(path)
+
+
+def test_of_a_store_too_long_to_check_a_command_is_told_so(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = seal.find(whole)
+    assert known is not None
+    path = flipped(whole, tmp_path / "s.h5", known.extents[0].offset)
+    monkeypatch.setattr(checking, "LONGEST_CHECK", known.end - 1)
+    (found,) = store.doubts(path)
+    assert found.place == "/observables"
+    assert "not checked" in found.what
+    monkeypatch.setattr(checking, "LONGEST_CHECK", known.end)
+    (found,) = store.doubts(path)
+    assert found.place == known.extents[0].name
 
 
 @pytest.mark.parametrize("share", [0.0, 0.0005, 0.1, 0.5, 0.97, 0.9999])

@@ -12,23 +12,23 @@ from springcheck.schemes.attached import ATTACHED
 from springcheck.schemes.catalogue import SCHEMES, Kind, Scheme
 
 # as an imported module, a scheme that an engine has brought stays for the life of the process
-_KNOWN: dict[str, Scheme] = SCHEMES | ATTACHED
+_brought: dict[str, Scheme] = dict(ATTACHED)
 
 
 def scheme(name: str) -> Scheme:
     """The scheme of this name, of the catalogue or brought by an engine.  MethodError where there is none."""
-    found = _KNOWN.get(name)
+    found = SCHEMES.get(name) or _brought.get(name)
     if found is None:
         raise MethodError(
             f"scheme {name!r} is neither in the catalogue nor brought by an engine that is here"
-            f"{nearest(name, tuple(_KNOWN))}"
+            f"{nearest(name, (*SCHEMES, *_brought))}"
         )
     return found
 
 
 def title(name: str) -> str:
     """The title of a scheme, or its name where its engine is not here."""
-    found = _KNOWN.get(name)
+    found = SCHEMES.get(name) or _brought.get(name)
     return found.title if found else name
 
 
@@ -36,12 +36,12 @@ def bring(found: Scheme) -> None:
     """Make the scheme of an engine known.  MethodError where it makes no sense, or its name is taken."""
     if not isinstance(found, Scheme):
         raise MethodError(f"a scheme is of type {type(found).__name__}, not springcheck.schemes.Scheme")
-    if _KNOWN.get(found.name, found) != found:
+    if (SCHEMES | _brought).get(found.name, found) != found:
         raise MethodError(f"its scheme {found.name!r} is not the one that is known by this name")
     wrong = _flaw(found)
     if wrong:
         raise MethodError(f"its scheme {found.name!r}: {wrong}")
-    _KNOWN[found.name] = found
+    _brought[found.name] = found
 
 
 def _flaw(found: Scheme) -> str:

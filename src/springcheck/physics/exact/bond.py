@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
 
-def _bonds(scene: Scene) -> list[tuple[Morse, _Bond]] | None:
+def _bonds(scene: Scene) -> tuple[Morse, _Bond] | None:
     """One bond each that pulls together."""
-    terms = [term for term in scene.terms if isinstance(term, Morse)]
-    if not one_each(scene) or not all(np.all((t.depth > 0) & (t.steepness != 0)) for t in terms):
+    (term,) = (term for term in scene.terms if isinstance(term, Morse))
+    if not one_each(scene) or not np.all((term.depth > 0) & (term.steepness != 0)):
         return None
-    return [(term, _bond(scene, term)) for term in terms]
+    return term, _bond(scene, term)
 
 
 MOST = np.log(np.finfo(np.longdouble).max) - 64
@@ -106,23 +106,23 @@ def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Ex
         return extended(u), extended(pull), extended(excess)
 
 
-def _morse(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: Extended) -> States:
+def _morse(scene: Scene, bonds: tuple[Morse, _Bond], t: Extended) -> States:
     """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
 
     w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass goes straight on.
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
-    for term, bond in bonds:
-        stretch, speed = _stretched(bond, wide(term.steepness), t)
-        u, pull = stretch / term.steepness, bond.mass * speed / term.steepness
-        ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
-        total = wide(scene.p[term.a]) + scene.p[term.b]
-        share = bond.share
-        qa, qb = wide(scene.q[term.a]), wide(scene.q[term.b])
-        centre = share * qa + (1 - share) * qb + total / (ma + mb) * t
-        length = term.rest + u
-        q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
-        p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
+    term, bond = bonds
+    stretch, speed = _stretched(bond, wide(term.steepness), t)
+    u, pull = stretch / term.steepness, bond.mass * speed / term.steepness
+    ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
+    total = wide(scene.p[term.a]) + scene.p[term.b]
+    share = bond.share
+    qa, qb = wide(scene.q[term.a]), wide(scene.q[term.b])
+    centre = share * qa + (1 - share) * qb + total / (ma + mb) * t
+    length = term.rest + u
+    q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
+    p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
     return q, p
 
 
@@ -157,24 +157,25 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     )
 
 
-def _morse_doubt(scene: Scene, bonds: list[tuple[Morse, _Bond]], t: np.longdouble) -> States:
+def _morse_doubt(scene: Scene, bonds: tuple[Morse, _Bond], t: np.longdouble) -> States:
     q, p = np.empty((2, scene.n), dtype=np.longdouble)
-    for term, bond in bonds:
-        a = np.abs(wide(term.steepness))
-        root = np.sqrt(bond.energy)
-        speed = np.sqrt(2 * term.depth * bond.energy / bond.mass)
-        time = np.abs(t) + np.abs(bond.start) / np.where(bond.rate > 0, bond.rate, 1) + 2 / bond.w
-        bound = bond.excess < 0
-        reach = np.where(
-            bound, -np.log(np.where(bound, -bond.excess, 1) / (1 + root)) / a, np.abs(bond.u) + speed * time
-        )
-        force = 2 * term.depth * a * (1 + root) * root
-        ends = term.a, term.b
-        drift = sum(np.abs(wide(scene.p[end])) for end in ends) / (scene.m[term.a] + scene.m[term.b])
-        far = sum(np.abs(wide(scene.q[end])) for end in ends) + np.abs(term.rest) + drift * np.abs(t)
-        for end in ends:
-            q[end] = LAST * (far + np.abs(bond.u) + reach + speed * time)
-            p[end] = LAST * (sum(np.abs(wide(scene.p[e])) for e in ends) + bond.mass * speed + force * time)
+    term, bond = bonds
+    a = np.abs(wide(term.steepness))
+    root = np.sqrt(bond.energy)
+    speed = np.sqrt(2 * term.depth * bond.energy / bond.mass)
+    time = np.abs(t) + np.abs(bond.start) / np.where(bond.rate > 0, bond.rate, 1) + 2 / bond.w
+    bound = bond.excess < 0
+    reach = np.where(
+        bound, -np.log(np.where(bound, -bond.excess, 1) / (1 + root)) / a, np.abs(bond.u) + speed * time
+    )
+    force = 2 * term.depth * a * (1 + root) * root
+    ends = term.a, term.b
+    pushed = sum(np.abs(wide(scene.p[end])) for end in ends)
+    far = sum(np.abs(wide(scene.q[end])) for end in ends) + np.abs(term.rest)
+    far = far + pushed / (scene.m[term.a] + scene.m[term.b]) * np.abs(t)
+    for end in ends:
+        q[end] = LAST * (far + np.abs(bond.u) + reach + speed * time)
+        p[end] = LAST * (pushed + bond.mass * speed + force * time)
     return q, p
 
 

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
 
-def _swings(scene: Scene) -> list[tuple[Cosine, _Swing]] | None:
-    terms = [term for term in scene.terms if isinstance(term, Cosine)]
-    if not one_each(scene) or any(np.any(term.depth == 0) for term in terms):
-        return None
-    return [(term, _swing(scene, term)) for term in terms]
+def _swings(scene: Scene) -> tuple[Cosine, _Swing] | None:
+    (term,) = (term for term in scene.terms if isinstance(term, Cosine))
+    return None if np.any(term.depth == 0) or not one_each(scene) else (term, _swing(scene, term))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,29 +69,29 @@ def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extende
         return extended(np.array([half, sine, cosine, m1], dtype=object))
 
 
-def _pendulum(scene: Scene, swings: list[tuple[Cosine, _Swing]], t: Extended) -> States:
+def _pendulum(scene: Scene, swings: tuple[Cosine, _Swing], t: Extended) -> States:
     """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
 
     R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
     """
     q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
-    for term, found in swings:
-        a, r = _swung(found, t)
-        q[:, term.i] = scene.q[term.i] + found.length * (2 * (a - found.half))
-        p[:, term.i] = found.mass * found.length * 2 * found.w * r
+    term, found = swings
+    a, r = _swung(found, t)
+    q[:, term.i] = scene.q[term.i] + found.length * (2 * (a - found.half))
+    p[:, term.i] = found.mass * found.length * 2 * found.w * r
     return q, p
 
 
-def _pendulum_doubt(scene: Scene, swings: list[tuple[Cosine, _Swing]], t: np.longdouble) -> States:
+def _pendulum_doubt(scene: Scene, swings: tuple[Cosine, _Swing], t: np.longdouble) -> States:
     q, p = np.empty((2, scene.n), dtype=np.longdouble)
-    for term, found in swings:
-        root = np.sqrt(found.m)
-        size = 2 * found.length * np.minimum(root, PI / 2)
-        speed = 2 * found.length * found.w * root
-        time = np.abs(t) + latency(found.m1 / np.maximum(found.m, 1)) / found.w
-        force = found.mass * found.w**2 * np.minimum(size, found.length)
-        q[term.i] = LAST * (np.abs(scene.q[term.i]) + size + speed * time)
-        p[term.i] = LAST * (found.mass * speed + force * time)
+    term, found = swings
+    root = np.sqrt(found.m)
+    size = 2 * found.length * np.minimum(root, PI / 2)
+    speed = 2 * found.length * found.w * root
+    time = np.abs(t) + latency(found.m1 / np.maximum(found.m, 1)) / found.w
+    force = found.mass * found.w**2 * np.minimum(size, found.length)
+    q[term.i] = LAST * (np.abs(scene.q[term.i]) + size + speed * time)
+    p[term.i] = LAST * (found.mass * speed + force * time)
     return q, p
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from springcheck.errors import SceneError
 from springcheck.physics import builders
 from springcheck.physics.arrays import Floats
-from springcheck.physics.scene import Kind, Scene, Units
+from springcheck.physics.scene import Scene, Units
 from springcheck.physics.scenefile import tables
 from springcheck.physics.terms import Column, Damping, Spring, Term, WallSpring
 
@@ -22,14 +22,21 @@ class MistakeError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bodies:
-    """What moves: m, q, p (n,), what it is, and what it is called in the file."""
+    """What moves: m, q, p (n,), and what it is called in the file."""
 
     m: Floats
     q: Floats
     p: Floats
-    kind: Kind
     name: str
     terms: tuple[Term, ...] = ()
+
+    def number(self, value: int, field: str) -> int:
+        """The number of a body, as a field of the file gives it.  MistakeError where there is none."""
+        n = len(self.m)
+        if not 0 <= value < n:
+            several = tables.BODIES[self.name].several
+            raise MistakeError(f"{field} = {value}: there are {n} {several}, numbered 0 to {n - 1}")
+        return value
 
 
 PLACES = {
@@ -49,12 +56,13 @@ def scene(table: Any, *, name: str) -> Scene:
     if time.every is not None and table.record.every is not None:
         raise MistakeError("record.every and time.every are both given; keep record.every")
     bodies = _bodies(table)
-    if table.kind not in (None, bodies.kind):
+    kind = tables.BODIES[bodies.name].kind
+    if table.kind not in (None, kind):
         raise MistakeError(
             f"kind = {table.kind!r}, but what moves is given by [[{bodies.name}]]: "
             "particles come as [[particle]] or [chain], rotors as [[rotor]], circuits as [[inductor]]"
         )
-    units: Units = table.units or ("si" if bodies.kind == "circuit" else "reduced")
+    units: Units = table.units or ("si" if kind == "circuit" else "reduced")
     terms = tuple(_terms(table, bodies))
     try:
         return Scene(
@@ -62,7 +70,7 @@ def scene(table: Any, *, name: str) -> Scene:
             title=table.title,
             source=table.source,
             units=units,
-            kind=bodies.kind,
+            kind=kind,
             m=bodies.m,
             q=bodies.q,
             p=bodies.p,
@@ -81,7 +89,7 @@ def scene(table: Any, *, name: str) -> Scene:
 
 
 def _bodies(table: Any) -> _Bodies:
-    given = [name for name in ("particle", "rotor", "inductor", "chain") if getattr(table, name)]
+    given = [name for name in tables.BODIES if getattr(table, name)]
     if not given:
         raise MistakeError(
             "nothing moves: a scene needs [[particle]], or [[rotor]], or [[inductor]], or [chain]"
@@ -91,18 +99,13 @@ def _bodies(table: Any) -> _Bodies:
     name = given[0]
     if name == "chain":
         made = _chain(table.chain)
-        return _Bodies(m=made.m, q=made.q, p=made.p, kind="particles", name=name, terms=made.terms)
-    columns = {
-        "particle": ("mass", "position", "momentum"),
-        "rotor": ("inertia", "angle", "momentum"),
-        "inductor": ("inductance", "charge", "flux"),
-    }[name]
-    kinds: dict[str, Kind] = {"particle": "particles", "rotor": "rotor", "inductor": "circuit"}
+        return _Bodies(m=made.m, q=made.q, p=made.p, name=name, terms=made.terms)
+    columns = tables.BODIES[name].columns
     m, q, p = (np.array([getattr(row, column) for row in getattr(table, name)]) for column in columns)
-    return _Bodies(m=m, q=q, p=p, kind=kinds[name], name=name)
+    return _Bodies(m=m, q=q, p=p, name=name)
 
 
-def _chain(table: tables.ChainTable) -> Scene:
+def _chain(table: Any) -> Scene:
     """The chain of a [chain]; its time grid is of no account."""
     n = table.masses
     if table.wave and (table.position or table.momentum):
@@ -124,32 +127,25 @@ def _chain(table: tables.ChainTable) -> Scene:
         raise MistakeError(f"chain: {error}") from error
 
 
-def _number(value: int, bodies: _Bodies, field: str) -> int:
-    n = len(bodies.m)
-    if not 0 <= value < n:
-        several = {"particle": "particles", "rotor": "rotors", "inductor": "inductors", "chain": "masses"}
-        raise MistakeError(f"{field} = {value}: there are {n} {several[bodies.name]}, numbered 0 to {n - 1}")
-    return value
-
-
 def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from bodies.terms
     yield from _springs(table.spring, bodies)
     yield from _capacitors(table, bodies)
     for key, (term, _) in tables.of_terms().items():
-        rows = getattr(table, tables.identifier(key))
-        if rows:
-            yield _by_columns(term, rows, bodies)
-    yield from _friction(table, bodies)
+        yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
+    yield from _by_columns(Damping, table.damping, bodies)
+    loops = [bodies.number(row.loop, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
+    if loops:
+        yield Damping(i=np.array(loops), c=np.array([row.resistance for row in table.resistor]))
 
 
-def _springs(springs: Sequence[tables.SpringTable], bodies: _Bodies) -> Iterator[Term]:
+def _springs(springs: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
     rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, spring in enumerate(springs):
         field = f"spring[{j}].ends"
         for end in spring.ends:
             if end != "wall":
-                _number(end, bodies, field)
+                bodies.number(end, field)
         match spring.ends:
             case ("wall", "wall"):
                 raise MistakeError(f"{field}: a spring between two walls moves nothing")
@@ -181,11 +177,11 @@ def _two_ends(one: int, other: int, field: str) -> None:
 
 def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
     """A capacitor is a spring of stiffness 1/C: in one loop towards 0, between two towards each other."""
-    if (table.capacitor or table.resistor) and bodies.kind != "circuit":
+    if (table.capacitor or table.resistor) and bodies.name != "inductor":
         raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
     rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, capacitor in enumerate(table.capacitor):
-        loops = [_number(loop, bodies, f"capacitor[{j}].loops") for loop in capacitor.loops]
+        loops = [bodies.number(loop, f"capacitor[{j}].loops") for loop in capacitor.loops]
         if len(loops) == 2:
             _two_ends(loops[0], loops[1], f"capacitor[{j}].loops")
         kind = WallSpring if len(loops) == 1 else Spring
@@ -193,24 +189,25 @@ def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from _of_rows(rows)
 
 
-def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Term:
-    """A term from rows of its table: what it acts on, and an array for each column."""
-    values = {}
+def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+    """A term of the rows of its table, if any: what it acts on, and an array for each column."""
+    if not rows:
+        return
+    fields = {}
     for column in term.columns:
         if column.inverse:
-            values[column.field] = np.array([_inverse(term, column, j, row) for j, row in enumerate(rows)])
+            values = [_inverse(term, column, j, row) for j, row in enumerate(rows)]
         else:
-            values[column.field] = np.array([getattr(row, tables.identifier(column.name)) for row in rows])
-    if len(term.ends) == 1:
-        field = f"{term.key}[{{}}].particle"
-        ends = [[_number(row.particle, bodies, field.format(j)) for j, row in enumerate(rows)]]
-    else:
-        for j, row in enumerate(rows):
-            one, other = (_number(end, bodies, f"{term.key}[{j}].ends") for end in row.ends)
-            _two_ends(one, other, f"{term.key}[{j}].ends")
-        ends = [list(end) for end in zip(*(row.ends for row in rows), strict=True)]
-    found: Term = term(**dict(zip(term.ends, map(np.array, ends), strict=True)), **values)
-    return found
+            values = [getattr(row, tables.identifier(column.name)) for row in rows]
+        fields[column.field] = np.array(values)
+    ends: list[tuple[int, ...]] = []
+    for j, row in enumerate(rows):
+        if len(term.ends) == 1:
+            ends.append((bodies.number(row.particle, f"{term.key}[{j}].particle"),))
+        else:
+            ends.append(tuple(bodies.number(end, f"{term.key}[{j}].ends") for end in row.ends))
+            _two_ends(row.ends[0], row.ends[1], f"{term.key}[{j}].ends")
+    yield term(**dict(zip(term.ends, map(np.array, zip(*ends, strict=True)), strict=True)), **fields)
 
 
 def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
@@ -224,10 +221,3 @@ def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
     if value is None:
         raise MistakeError(f"{term.key}[{j}] lacks the field {column.name!r}")
     return float(1 / value)
-
-
-def _friction(table: Any, bodies: _Bodies) -> Iterator[Term]:
-    rows = [(row.particle, row.coefficient, f"damping[{j}].particle") for j, row in enumerate(table.damping)]
-    rows += [(row.loop, row.resistance, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
-    found = [(_number(particle, bodies, field), c) for particle, c, field in rows]
-    yield from _of_rows({(Damping, False): found} if found else {})

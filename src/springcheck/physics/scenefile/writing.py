@@ -12,15 +12,10 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.builders import standing
 from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Spring, WallSpring
 
-BODIES = {
-    "particles": ("particle", "mass", "position", "momentum"),
-    "rotor": ("rotor", "inertia", "angle", "momentum"),
-    "circuit": ("inductor", "inductance", "charge", "flux"),
-}
-"""For each kind of scene the table of what moves, and its names of m, q and p."""
 MOST_WAVES = 64
 """Standing waves up to which the start of a chain is written as such."""
 
@@ -35,7 +30,7 @@ def text(scene: Scene) -> str:
     if is_chain:
         lines += _chain(scene)
     else:
-        table, *names = BODIES[scene.kind]
+        table, names = next((name, of.columns) for name, of in BODIES.items() if of.kind == scene.kind)
         for row in zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True):
             lines.append(_table(f"[[{table}]]", zip(names, row, strict=True)))
     for term in scene.terms:
@@ -88,14 +83,9 @@ def _waves(q: Floats) -> list[tuple[int, float]] | None:
 
 
 def _rows(scene: Scene, term: Term) -> Iterator[str]:
-    if isinstance(term, Damping):
-        name = (
-            ("[[resistor]]", "loop", "resistance")
-            if scene.kind == "circuit"
-            else ("[[damping]]", "particle", "coefficient")
-        )
-        for i, c in term.rows():
-            yield _table(name[0], [(name[1], i), (name[2], c)])
+    if isinstance(term, Damping) and scene.kind == "circuit":
+        for loop, resistance in term.rows():
+            yield _table("[[resistor]]", [("loop", loop), ("resistance", resistance)])
     elif isinstance(term, WallSpring | Spring) and scene.kind == "circuit" and _are_capacitors(term):
         for *loops, k, _ in term.rows():
             yield _table("[[capacitor]]", [("loops", loops), ("capacitance", 1 / k)])
