@@ -129,6 +129,12 @@ _spec.loader.exec_module(census)
         (117172, "named"),
         (204261, "named"),
         (810392, "named"),
+        # an uneven clock is seen before a constant, which its steps look like
+        (407594, "named"),
+        (506412, "named"),
+        (500265, "named"),
+        # the equilibrium of a motion that grows by 1e21 shows in its first frames
+        (407564, "named"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

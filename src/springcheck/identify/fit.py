@@ -134,6 +134,8 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     weight = _pair_weights(z, quanta, first) * chosen
     w = weight[:, None].astype(np.longdouble)
     before, after = w * z[:-1], w * z[1:]
+    slips, part = _following(record, before, w, after)
+    after = after - part
     x = least_squares(before, after)
     left = after - before @ x
     centre = np.zeros(2, dtype=np.longdouble)
@@ -164,16 +166,6 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
                 entries, resting = y[:2], free
             x, left, centre = entries, resting, at
     z = z - centre
-    slips = None
-    if record.slips is not None and pairs > 2 * FEWEST_PAIRS:
-        moved = w * z[:-1]
-        wide = np.concatenate([moved, record.slips[:, None] * 1e12 * moved], axis=1)
-        y = least_squares(wide, w * z[1:])
-        free = w * z[1:] - wide @ y
-        # a clock is known, so that even errors within the rounding of a step show whether steps follow it
-        lost, rest = float(np.sum(left**2)), float(np.sum(free**2))
-        if lost - rest > 100 * max(rest / pairs, floor / pairs / 256):
-            x, left, slips = y[:2], free, record.slips
     rss = np.sum(left**2, axis=0)
     spread = (w * z[:-1]).astype(np.float64)
     gram = spread.T @ spread
@@ -200,12 +192,35 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     return _seen_through_storage(found, quanta, inverse, text=record.text)
 
 
+def _following(
+    record: Record, before: Extended, w: Extended, after: Extended
+) -> tuple[Extended | None, Extended]:
+    """The record's slips, where steps follow them, and what these do to the weighted states (f - 1, 2)."""
+    pairs = int(np.count_nonzero(w))
+    if record.slips is not None and pairs > 2 * FEWEST_PAIRS:
+        plain = np.concatenate([before, w], axis=1)
+        x = least_squares(plain, after)
+        rest = np.linalg.pinv((np.eye(2) - x[:2].T).astype(np.float64)) @ x[2]
+        wide = np.concatenate([plain, record.slips[:, None] * 1e12 * (before - w * rest)], axis=1)
+        y = least_squares(wide, after)
+        lost, left = (float(np.sum((after - columns @ u) ** 2)) for columns, u in ((plain, x), (wide, y)))
+        floor = float(np.sum((4 * ROUNDING * before) ** 2))
+        # a clock is known, so that even errors within the rounding of a step show whether steps follow it
+        if lost - left > 100 * max(left / pairs, floor / pairs / 256):
+            return record.slips, wide[:, 3:] @ y[3:]
+    return None, np.zeros_like(after)
+
+
 def _preliminary(z: Extended, chosen: NDArray[np.bool_]) -> Floats:
-    """The equilibrium (2,) as pairs of equal weight show it, 0 where they show none."""
+    """The equilibrium (2,) as pairs show it that count by their size, 0 where they show none."""
     before, after = z[:-1][chosen].astype(np.float64), z[1:][chosen].astype(np.float64)
     if len(before) <= FEWEST_PAIRS:
         return np.zeros(2)
-    wide = np.concatenate([before, np.ones((len(before), 1))], axis=1)
+    # of a motion that grows the first frames show it, however small they are beside the last
+    weight = np.sqrt(np.sum(before**2 + after**2, axis=1, keepdims=True))
+    weight = 1 / np.maximum(weight, LEAST_NOISE * np.max(weight))
+    before, after = weight * before, weight * after
+    wide = np.concatenate([before, weight], axis=1)
     y, x = (np.linalg.lstsq(columns, after, rcond=None)[0] for columns in (wide, before))
     one, other = (float(np.sum((after - c @ b) ** 2)) for c, b in ((wide, y), (before, x)))
     floor = float(np.sum((8 * ROUNDING * before) ** 2))
