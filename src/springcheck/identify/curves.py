@@ -107,15 +107,16 @@ def _steps(strides: range) -> tuple[Floats, Floats]:
 
 
 @cache
-def keys(families: tuple[Family, ...]) -> tuple[tuple[str, ...], tuple[int | None, ...]]:
-    """The names of the families without friction whose curves stand behind these, each once, and the number
-    of each family's own; None of what has no step, or a curve that turns back under friction."""
+def keys(families: tuple[Family, ...]) -> tuple[tuple[str, ...], tuple[Integers, Integers]]:
+    """The names of the families without friction whose curves stand behind these, each once, and which of
+    them are whose; none of what has no step, or a curve that turns back under friction."""
     own: list[str | None] = []
     for family in families:
         base = family.scheme if family.damped else family.name
         own.append(None if family.flow or family.held or is_folded(family) else base)
     each = tuple(dict.fromkeys(base for base in own if base is not None))
-    return each, tuple(None if base is None else each.index(base) for base in own)
+    which = [(k, each.index(base)) for k, base in enumerate(own) if base is not None]
+    return each, (np.array([k for k, _ in which], np.int64), np.array([b for _, b in which], np.int64))
 
 
 @cache

@@ -13,7 +13,8 @@ from scipy.special import chdtri
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
-from springcheck.identify.starts import Guesses, Terms, joined, least_squares, real_starts, starts
+from springcheck.identify.solve import least_squares
+from springcheck.identify.starts import Guesses, Terms, joined, real_starts, starts
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 
 CHANCE = 1e-7

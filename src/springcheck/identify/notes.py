@@ -11,7 +11,8 @@ from springcheck.identify.fit import Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.record import Record
 from springcheck.identify.search import Joint, coincident, numbers, search, separation
-from springcheck.identify.starts import Terms, solved
+from springcheck.identify.solve import solved
+from springcheck.identify.starts import Terms
 from springcheck.text.wording import count, either
 
 APART = 10.0

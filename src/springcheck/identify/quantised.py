@@ -19,7 +19,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.maps import KINDS
 from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.identify.starts import least_squares
+from springcheck.identify.solve import least_squares
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 

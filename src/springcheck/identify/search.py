@@ -13,7 +13,8 @@ from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.match import Match, match
 from springcheck.identify.record import Record
-from springcheck.identify.starts import Terms, solved
+from springcheck.identify.solve import solved
+from springcheck.identify.starts import Terms
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.schemes import SCHEMES
 

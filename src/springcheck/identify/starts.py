@@ -11,42 +11,21 @@ from springcheck.identify.curves import SIDE, Roots, curves, folded, is_folded, 
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import Table, table
-from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.identify.solve import GUESSED, LOST, compared, solved
+from springcheck.physics.arrays import Floats, Integers
 
 NEAR = 3e-4
 """Distance of the entries of one step, of size 1, within which a family is worth an exact comparison."""
 
-GUESSED = 0.05
-"""The same for a first guess without friction, which is good to 1e-3 where the family is right."""
-
-LOST = 30.0, 2.0, 0.5, 0.02, 1e-4
-"""The same before each step with friction.  Measured on 2,900 maps of up to 0.9 of the critical damping, all
-but one in a thousand: 26, 1.3, 0.28, 0.0076 and 9e-6 at most."""
-
-DAMPED_LOST = 200.0
-"""The same in units of (g/x)**(2**n) of the guess, n steps later: 100, 60, 70, 100 at most."""
-
-CURVED = 30.0
-"""What a step of relative length 1 may leave over beside what further steps take away, in units of its
-square: 8.4 at most in the right families of 11,600 maps of up to 0.9 of the critical damping."""
-
-QUOTIENT = 1e-5
-"""The same in units of the step: difference quotients are as far off."""
-
-FARTHEST = 0.3
-"""Steps of that relative length say nothing of what is left over."""
-
 SURE = 1e-6, 1e4
 """Distance, and how many errors of an entry, beyond which a converged guess cannot be accepted."""
 
-FOUND = 1e-14
-"""Distance of the entries at which a guess is not improved any further."""
-
-CHUNK = 4096
-"""Candidates that are solved at once, so that their arrays stay in the processor's cache."""
-
 BESIDE = 0.15
 """Friction that a guess which has it counts as `away` from its curve."""
+
+DRIFT = 2.0
+"""Way of a step of a splitting whose phase turns back, in units of v h, at most, beside the log of its
+determinant: 1.7 at most, and 2.5 where that is 2."""
 
 FLOW_TURNS = 8
 """Turns between two frames that the exact flow is looked for at."""
@@ -123,7 +102,9 @@ def starts(
     ]
     wanted = GUESSED + (LOST[0] if far else SIDE[0] * error)
     parts += [
-        _folded_starts(every, k, root, wanted) for k, family in enumerate(every.families) if is_folded(family)
+        _folded_starts(every, k, root, wanted, free_scale=terms.mass_unknown)
+        for k, family in enumerate(every.families)
+        if is_folded(family)
     ]
     of_curves, bases = keys(every.families)
     if of_curves:
@@ -139,12 +120,12 @@ def starts(
             good = (g > 0) | terms.growing
             at, index, g, a = at[good], index[good], g[good], a[good] + np.square(g[good] / 2)
             away = np.abs(g)
+        # every family of a curve gets its guesses
+        families, base = bases
         ends = np.searchsorted(curve.base[at], np.arange(len(of_curves) + 1))
-        for k, base in enumerate(bases):
-            if base is not None:
-                mine = slice(ends[base], ends[base + 1])
-                which = np.full(ends[base + 1] - ends[base], k)
-                parts.append((which, index[mine], a[mine], g[mine], away[mine]))
+        counts = np.diff(ends)[base]
+        mine = np.arange(np.sum(counts)) + np.repeat(ends[base] - np.cumsum(counts) + counts, counts)
+        parts.append((np.repeat(families, counts), index[mine], a[mine], g[mine], away[mine]))
     parts = parts or [(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))]
     which, index, a, g, away = (np.concatenate(x) for x in zip(*parts, strict=True))
     wide = spread * np.maximum(1.0, np.sin(root.phase[index]) / sine)
@@ -183,127 +164,20 @@ def _held_starts(k: int, root: Roots, room: float) -> Starts:
     return np.full(len(index), k), index, a, g, np.abs(g)
 
 
-def _folded_starts(every: Table, k: int, root: Roots, room: float) -> Starts:
+def _folded_starts(every: Table, k: int, root: Roots, room: float, *, free_scale: bool) -> Starts:
     """Guesses for a splitting whose phase turns back: what has the determinant and the trace of a root."""
-    trace = root.entries[:, 0, 0] + root.entries[:, 1, 1]
-    index, a, g = folded(every.families[k], root.log_det, trace)
-    off = every.unit(np.full(len(a), k), a, g)[:, 0, 0] - root.entries[index, 0, 0]
-    good = (a > 0) & (np.abs(off) <= room)
-    index, a, g = index[good], a[good], g[good]
+    upper = root.normal[1]
+    likely = np.flatnonzero(free_scale | (np.abs(upper) <= (1 + room) * (DRIFT + np.abs(root.log_det))))
+    entries = root.entries[likely]
+    index, a, g = folded(every.families[k], root.log_det[likely], entries[:, 0, 0] + entries[:, 1, 1])
+    off = np.abs(every.unit(np.full(len(a), k), a, g)[:, 0] - entries[index, 0])
+    good = (
+        (a > 0)
+        & (off[:, 0] <= room)
+        & (free_scale | (off[:, 1] <= room * (1 + np.abs(upper[likely][index]))))
+    )
+    index, a, g = likely[index[good]], a[good], g[good]
     return np.full(len(a), k), index, a, g, np.full(len(a), BESIDE)
-
-
-def solved(
-    every: Table,
-    which: Integers,
-    a: Floats,
-    g: Floats,
-    wanted: Floats,
-    *,
-    free_scale: bool,
-    away: Floats | None = None,
-    turns: int = 0,
-    spread: Floats | float = 0.0,
-    far: bool = False,
-) -> tuple[Floats, Floats, Floats]:
-    """Gauss-Newton for a and g on the entries of one step, in double precision, and how far it is off; the
-    friction of guesses is `away` from that of their curve."""
-    away = np.abs(g) if away is None else away
-    spread = np.broadcast_to(spread, np.shape(a))
-    if len(a) > CHUNK:
-        parts = [
-            solved(
-                every, which[i : i + CHUNK], a[i : i + CHUNK], g[i : i + CHUNK], wanted[i : i + CHUNK],
-                away=away[i : i + CHUNK], free_scale=free_scale, turns=turns, spread=spread[i : i + CHUNK],
-                far=far,
-            )
-            for i in range(0, len(a), CHUNK)
-        ]  # fmt: skip
-        one, other, off = (np.concatenate(x) for x in zip(*parts, strict=True))
-        return one, other, off
-    if not len(a):
-        return a, g, np.zeros(0)
-    free = 1 + every.damped
-    values = np.array([a, g], np.float64)
-    target = _compared(wanted, free_scale=free_scale)
-    size = np.maximum(np.abs(target), 1e-2)
-    # every entry counts by its size, the lower left one by that of a
-    least = 1e-3 if free_scale else np.array([[1e-3], [1e-3], [1e-300], [1e-3]])
-    weight = 1 / np.maximum(np.abs(target), least)
-    off = np.full(len(a), np.inf)
-    alive = np.arange(len(a))
-    rounds = turns or (6 if every.damped else 3)
-    with np.errstate(all="ignore"):
-        share = away / np.sqrt(np.abs(a))
-        for turn in range(rounds + 1):
-            x, n = values[:, alive], len(alive)
-            d = np.stack([1e-6 * np.abs(x[0]), 1e-6 * np.maximum(np.abs(x[1]), 1e-3)])
-            # the entries, and those with each unknown changed
-            tried = np.repeat(x[:, None], 1 + free * (turn < rounds), axis=1)
-            for i in range(tried.shape[1] - 1):
-                tried[i, 1 + i] += d[i]
-            units = every.unit(np.tile(which[alive], tried.shape[1]), *tried.reshape(2, -1))
-            out = _compared(units, free_scale=free_scale).reshape(len(target), -1, n)
-            miss = target - out[:, 0]
-            now = np.max(np.abs(miss) / size, axis=0)
-            off[alive] = np.where(np.isnan(now), np.inf, now)
-            if turn == rounds:
-                break
-            slopes = np.moveaxis(out[:, 1:] - out[:, :1], 1, 0) / d[:free, None] * weight
-            change = least_squares(slopes, miss * weight)[0]
-            # what has been found to rounding stays where it is
-            good = ~(now <= FOUND)
-            if far and turn < (len(LOST) if every.damped else 1):
-                room = (
-                    np.minimum(LOST[turn], DAMPED_LOST * share[alive] ** 2**turn) if every.damped else GUESSED
-                )
-                good &= now <= room + spread[alive]
-            elif not (far or turns):
-                # what a step leaves over, but for its square, no further step takes away
-                left = np.max(np.abs(miss - np.sum(slopes * change[:, None], axis=0) / weight) / size, axis=0)
-                step = np.abs(change[0] / x[0]) + (
-                    np.abs(change[1]) / np.sqrt(np.abs(x[0])) if free > 1 else 0
-                )
-                room = spread[alive] + QUOTIENT * step + CURVED * step**2
-                good &= (left <= room) | (now <= spread[alive]) | (step > FARTHEST)
-            limit = 0.5 * np.abs(x[0])
-            change[0] = np.clip(change[0], -limit, limit)
-            values[:free, alive[good]] += change[:, good]
-            if not np.all(good):
-                alive, target, size, weight = alive[good], target[:, good], size[:, good], weight[:, good]
-            if not len(alive):
-                break
-    return values[0], values[1], off
-
-
-def _compared(units: Reals, *, free_scale: bool) -> Floats:
-    """What of one-step maps (c, 2, 2) is compared (i, c): all entries, or what a scale of v leaves alone."""
-    out = np.asarray(units.transpose(1, 2, 0).reshape(4, -1), np.float64)
-    return np.stack([out[0], out[3], out[1] * out[2]]) if free_scale else out
-
-
-def least_squares(slopes: Floats, miss: Floats) -> tuple[Floats, Floats]:
-    """Solutions x (k, c) of the sum over k of slopes (k, i, c) x = miss (i, c), the shortest ones, and
-    variances (k, c) of x for errors of 1; columns may differ by many powers of ten."""
-    size = np.sqrt(np.sum(slopes**2, axis=1))
-    size = np.where(np.isfinite(size) & (size > 0), size, 1.0)
-    even = slopes / size[:, None]
-    # what is no number changes nothing
-    lost = ~np.isfinite(np.sum(even, axis=(0, 1)) + np.sum(miss, axis=0))
-    if np.any(lost):
-        even[:, :, lost], miss = 0.0, np.where(lost, 0.0, miss)
-    right = np.sum(even * miss, axis=1)
-    if len(even) == 1:
-        present = np.sum(even**2, axis=1) > 0
-        return right * present / size, present / size**2
-    if len(even) == 2:
-        # columns of length 1: eigenvalues 1 + r and 1 - r, of the sum and the difference
-        r = np.sum(even[0] * even[1], axis=0)
-        plus, minus = (np.where(x > 1e-15, 0.5 / np.maximum(x, 1e-15), 0.0) for x in (1 + r, 1 - r))
-        inner = plus + minus
-        return (inner * right + (plus - minus) * right[::-1]) / size, inner / size**2
-    inverse = np.linalg.pinv(np.einsum("aic,bic->cab", even, even), hermitian=True)
-    return np.einsum("cab,bc->ac", inverse, right) / size, np.einsum("caa->ac", inverse) / size**2
 
 
 GRID = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
@@ -326,8 +200,8 @@ def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range)
             s = np.repeat(np.arange(1.0, 2.0 if base.flow else 5.0), len(GRID))
             x = np.tile(GRID, len(s) // len(GRID))
             frames = bases.frame(np.full(len(x), b), x, 0 * x, 0 * x, s, ratio)
-            shown = _compared(frames.T.reshape(-1, 2, 2), free_scale=terms.mass_unknown)
-            off = np.sum((shown - _compared(found.entries[None], free_scale=terms.mass_unknown)) ** 2, axis=0)
+            shown = compared(frames.T.reshape(-1, 2, 2), free_scale=terms.mass_unknown)
+            off = np.sum((shown - compared(found.entries[None], free_scale=terms.mass_unknown)) ** 2, axis=0)
             off = np.where(np.isfinite(off), off, np.inf).reshape(-1, len(GRID))
             row, low = np.nonzero(
                 (off[:, 1:-1] <= off[:, :-2]) & (off[:, 1:-1] <= off[:, 2:]) & (off[:, 1:-1] < 1)
@@ -394,7 +268,7 @@ def _flow_starts(every: Table, found: Map, which: int, of: int, terms: Terms, mo
         a = np.asarray(np.square(phase + 2 * np.pi * turns) + (g / 2) ** 2)
         gs = np.full(len(turns), g)
         units = every.unit(np.full(len(turns), which), a, gs)
-        out, target = (_compared(x, free_scale=terms.mass_unknown) for x in (units, b[None]))
+        out, target = (compared(x, free_scale=terms.mass_unknown) for x in (units, b[None]))
         off = np.max(np.abs(out - target) / np.maximum(np.abs(target), 1e-2), axis=0)
         found.found[asked] = turns, a, gs, off
     turns, a, gs, off = found.found[asked]
