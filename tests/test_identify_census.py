@@ -135,6 +135,9 @@ _spec.loader.exec_module(census)
         (500265, "named"),
         # the equilibrium of a motion that grows by 1e21 shows in its first frames
         (407564, "named"),
+        # several bad frames, all where the motion is largest, or smallest, are no interruptions
+        (508115, "cause named"),
+        (716834, "error seen"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

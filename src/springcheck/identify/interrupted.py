@@ -22,6 +22,10 @@ LARGER = 10.0
 """Size of some frames, of the median, from which a force that is not linear shows in them alone."""
 
 
+AT_AN_END = 3
+"""Pairs at an end of their order by size, in units of the bad ones, within which these do not lie by chance."""
+
+
 def few_bad_frames(e: Evidence) -> list[Explanation]:
     """A motion that a few pairs of frames interrupt."""
     kept = np.ones(e.pairs, dtype=bool)
@@ -58,13 +62,19 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     whose = f" of {title(fitting[0].scheme)}" if fitting else ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
+    ranks = np.argsort(np.argsort(size))[bad]
+    several = len(runs) > 1 and float(np.max(size)) > LARGER * float(np.min(size))
+    if several and float(np.max(ranks)) < AT_AN_END * len(bad):
+        # several interruptions, all where the motion is smallest: an error of one size, which shows there
+        return []
     cause, remedy = _interruption(e, found, runs[0], whose)
     if len(runs) > 2 and len(spacing) == 1:
         cause = f"{cause}, and so every {spacing.pop()} steps"
     elif len(runs) > 1:
         at = ", ".join(str(run[0] + 1) for run in runs[1:5])
         cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
-    if len(bad) > 1 and float(np.min(size[bad])) > max(float(np.max(size[kept])) / 2, LARGER * middle):
+    largest = float(np.min(size[bad])) > max(float(np.max(size[kept])) / 2, LARGER * middle)
+    if (len(bad) > 1 and largest) or (several and float(np.min(ranks)) >= e.pairs - AT_AN_END * len(bad)):
         cause = (
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic or changes in time"
