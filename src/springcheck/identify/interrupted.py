@@ -23,7 +23,7 @@ LARGER = 10.0
 
 
 AT_AN_END = 3
-"""Pairs at an end of their order by size, in units of the bad ones, within which these do not lie by chance."""
+"""Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
 
 
 def few_bad_frames(e: Evidence) -> list[Explanation]:

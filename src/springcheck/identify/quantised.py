@@ -89,7 +89,8 @@ def reproduced(
     def missed(values: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
         """What frames miss (c, 2 f - 2) where steps have these a and g (c, 2)."""
         a, g = values.T[:, :, None]
-        x, y = q[:-1], v[:-1]
+        # explicit Euler moves positions by no unknown
+        x, y = (np.broadcast_to(z[:-1], (len(values), len(z) - 1)) for z in (q, v))
         if leaps:
             # stored half a step early, and half a kick of the exact force added where it was read
             y = y + a * x / 2
