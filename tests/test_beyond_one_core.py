@@ -85,17 +85,17 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
     assert all(errors(many)[place] == errors(alone)[place] for place in both)
     for method in OWN:
         points = [point for point in many.of(method) if point.complete]
-        timed = [bool(point.run_repeats) for point in points]
+        timed = [bool(point.run_seconds_repeats) for point in points]
         # coarse to fine: those that are timed come first, no point stands twice
         assert timed == sorted(timed, reverse=True)
         assert len({point.steps for point in points}) == len(points)
-    assert any(point.run_repeats for point in many.points)
+    assert any(point.run_seconds_repeats for point in many.points)
     assert precision.stored(tmp_path / "two.h5").points == many.points
     # who measured: the workers' errors and the times of this process
     assert {piece for piece, _ in store.measured_by(tmp_path / "two.h5")} == {f"precision/{x}" for x in OWN}
-    untimed = [replace(x, run_repeats=()) if x == many.points[0] else x for x in many.points]
+    untimed = [replace(x, run_seconds_repeats=()) if x == many.points[0] else x for x in many.points]
     before, after = (
-        sum(x.complete and not x.run_repeats for x in points) for points in (many.points, untimed)
+        sum(x.complete and not x.run_seconds_repeats for x in points) for points in (many.points, untimed)
     )
     said = "\n".join(map(str, text.lines(replace(many, points=tuple(untimed)))))
     assert after == before + 1

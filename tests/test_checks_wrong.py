@@ -410,13 +410,13 @@ def test_what_is_no_number_stays_in_the_errors_of_a_study() -> None:
     with np.errstate(all="ignore"):
         errors(run.t, row(run.q, 7, NAN), run.p, None)
         found = errors.result
-    assert np.isnan([found.largest, found.energy, found.phase]).all()
+    assert np.isnan([found.max_error, found.energy_error, found.phase_error]).all()
 
 
 def point(error: float, seconds: float, size: float = 0.1) -> Point:
     return Point(
-        method="m", step=size, tolerance=None, steps=10, outcome="complete", run_repeats=(seconds,),
-        accuracy=accuracy.Accuracy(largest=error, end=error, phase=None, energy=0.0, rounding=0.0),
+        method="m", step=size, tolerance=None, steps=10, outcome="complete", run_seconds_repeats=(seconds,),
+        accuracy=accuracy.Accuracy(max_error=error, end_error=error, energy_error=0.0, rounding_error=0.0),
     )  # fmt: skip
 
 

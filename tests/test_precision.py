@@ -73,10 +73,8 @@ def made_up(
             tolerance=None,
             steps=2**i,
             outcome="complete",
-            accuracy=Accuracy(
-                largest=error, end=error, phase=None, energy=0.0, rounding=rounding[i] if rounding else None
-            ),
-            run_repeats=(seconds[i] if seconds else 2.0**i,),
+            accuracy=Accuracy(max_error=error, rounding_error=rounding[i] if rounding else None),
+            run_seconds_repeats=(seconds[i] if seconds else 2.0**i,),
         )
         for i, error in enumerate(errors)
     ]
@@ -114,7 +112,9 @@ def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], 
     # against its own closed form the fault is plain, and ten million times the rounding
     rounding = [point.rounding for point in points]
     assert all(part is not None and part > 1e-4 for part in rounding)
-    fit = fits.order([replace(p, accuracy=replace(p.accuracy, rounding=None)) for p in points if p.accuracy])
+    fit = fits.order(
+        [replace(p, accuracy=replace(p.accuracy, rounding_error=None)) for p in points if p.accuracy]
+    )
     assert fit is None or abs(fit.order - 1) > 0.02 or fit.standard_error > 0.01
 
 
@@ -171,9 +171,9 @@ def test_the_phase_error_of_semi_implicit_euler_is_that_of_its_frequency() -> No
     h = known.duration / 23
     turned = 23 * (2 * np.arcsin(h * w / 2) - h * w)
     assert point.accuracy is not None
-    assert point.accuracy.phase is not None
+    assert point.accuracy.phase_error is not None
     # the phase runs ahead steadily; the ellipse on which the scheme turns adds up to h w / 2 in between
-    assert abs(point.accuracy.phase - float(turned)) <= float(h * w / 2) * 1.1
+    assert abs(point.accuracy.phase_error - float(turned)) <= float(h * w / 2) * 1.1
 
 
 def test_a_phase_is_followed_past_half_a_turn() -> None:
@@ -186,7 +186,7 @@ def test_a_phase_is_followed_past_half_a_turn() -> None:
     q, p = np.sin(1.05 * w * t)[:, None], np.cos(1.05 * w * t)[:, None]
     for piece in (slice(0, 100), slice(100, 101), slice(101, 401)):
         errors(t[piece], q[piece], p[piece], None)
-    assert errors.result.phase == pytest.approx(0.05 * t[-1], rel=1e-12)
+    assert errors.result.phase_error == pytest.approx(0.05 * t[-1], rel=1e-12)
 
 
 def test_the_energy_error_of_explicit_euler_is_its_growth() -> None:
@@ -195,8 +195,8 @@ def test_the_energy_error_of_explicit_euler_is_its_growth() -> None:
     h = accuracy.truth(scene).duration / 1000
     growth = (1 + h * h * 2.9 / 3.7) ** 1000 - 1
     assert point.accuracy is not None
-    assert point.accuracy.energy == pytest.approx(growth, rel=1e-10)
-    assert point.accuracy.end == point.accuracy.largest
+    assert point.accuracy.energy_error == pytest.approx(growth, rel=1e-10)
+    assert point.accuracy.end_error == point.accuracy.max_error
 
 
 def test_the_error_of_a_mode_at_rest_has_no_phase() -> None:
@@ -204,8 +204,8 @@ def test_the_error_of_a_mode_at_rest_has_no_phase() -> None:
     free = replace(scene, terms=(replace(scene.terms[0], k=np.zeros(1)),))  # type: ignore[type-var]
     (point,) = measure(free, "own:semi-implicit-euler", [50])
     assert point.accuracy is not None
-    assert point.accuracy.phase is None
-    assert point.accuracy.largest < 1e-14
+    assert point.accuracy.phase_error is None
+    assert point.accuracy.max_error < 1e-14
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -300,7 +300,7 @@ def test_an_interrupted_study_keeps_every_finished_point(tmp_path: Path) -> None
     kept = [point for table in store.tables_of(path).values() for point in POINTS.found(table)]
     # three methods and one round of timings a level: 12 calls are three levels less one timing
     assert len(kept) == 6
-    assert all(point.complete and point.run_repeats for point in kept)
+    assert all(point.complete and point.run_seconds_repeats for point in kept)
 
 
 def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
@@ -430,7 +430,7 @@ def test_the_least_number_of_steps_between_two_points_is_the_one_that_a_search_f
         run = simulate.play(one, label, errors)
         return Point(
             method=name, step=one.step, tolerance=None, steps=steps, outcome="complete",
-            accuracy=errors.result, force_calls=run.force_calls, run_repeats=(1e-8 * steps,),
+            accuracy=errors.result, force_calls=run.force_calls, run_seconds_repeats=(1e-8 * steps,),
         )  # fmt: skip
 
     coarse = 704 if target == 1e-2 else 1408

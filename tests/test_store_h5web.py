@@ -178,7 +178,7 @@ def test_a_region_of_stability_lies_on_even_axes(tmp_path: Path) -> None:
     image = drawn(tmp_path / "s.h5")
     assert np.array_equal(image.signal, region.radius)
     assert image.labels == ["log10_damping_ratio", "log10_h_w", "radius"]
-    for axis, wanted in zip(image.axes, (region.ratio, region.turn), strict=True):
+    for axis, wanted in zip(image.axes, (region.damping_ratio, region.h_w), strict=True):
         assert axis is not None
         np.testing.assert_allclose(10**axis, wanted, rtol=1e-14)
 

@@ -34,9 +34,12 @@ STAGES = {
 
 def lines(name: str) -> Iterator[str]:
     """What a name stands for, all of it.  SpringcheckError where it stands for nothing."""
-    found = _checks(name) or _schemes(name)
-    if found:
-        return found
+    if name in _CHECKS:
+        return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
+    if ":" in name:
+        return _method(name)
+    if name in SCHEMES:
+        return scheme_lines(SCHEMES[name])
     # heavier to import, and rarely asked for
     from springcheck.identify.meanings import MEANINGS
 
@@ -56,17 +59,6 @@ def lines(name: str) -> Iterator[str]:
 
 
 _CHECKS = {check.name: check for check in checks.ALL}
-
-
-def _checks(name: str) -> Iterator[str] | None:
-    check = _CHECKS.get(name)
-    return chain(check_lines(check), _seen(check)) if check else None
-
-
-def _schemes(name: str) -> Iterator[str] | None:
-    if ":" in name:
-        return _method(name)
-    return scheme_lines(SCHEMES[name]) if name in SCHEMES else None
 
 
 def check_lines(check: Any) -> Iterator[str]:

@@ -74,7 +74,9 @@ class Cluster:
             ) from None
         how: dict[str, Any] = {"address": self.place}
         with ExitStack() as stack:
-            stack.enter_context(_silent())
+            # what is logged of connections that are lost is not for users: what is to be said is raised
+            stack.callback(logging.disable, logging.root.manager.disable)
+            logging.disable(logging.CRITICAL)
             cluster = None
             if "://" not in self.place:
                 if not Path(self.place).is_file():
@@ -242,28 +244,6 @@ def _answers(
             raise
         raise SpringcheckError(GONE) from error
     client.cancel(list(number), force=True)
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """What the library logs of connections that are lost is not for users: what is to be said is raised."""
-    names = (
-        "distributed",
-        "distributed.client",
-        "distributed.core",
-        "tornado",
-        "tornado.application",
-        "asyncio",
-    )
-    loggers = [logging.getLogger(name) for name in names]
-    before = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, before, strict=True):
-            logger.setLevel(level)
 
 
 def _alive(client: Any) -> None:

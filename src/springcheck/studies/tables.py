@@ -1,7 +1,8 @@
 """Results as tables of a store and back, bit for bit, by the fields of their dataclasses.
 
-A field is a column of its own name, or of the one that `column` gives it.  Unknown numbers (None) are NaN
-and unknown counts -1; a tuple of numbers is a row of a column of two dimensions, filled up with NaN.
+A field is a column of its name; of a dictionary of numbers each of the `keys` in its metadata is one.
+Unknown numbers (None) are NaN and unknown counts -1; a tuple of numbers is a row of a column of two
+dimensions, filled up with NaN.
 """
 
 from __future__ import annotations
@@ -18,11 +19,6 @@ from numpy.typing import NDArray
 from springcheck.store import Table
 
 T = TypeVar("T")
-
-
-def column(name: str = "", *, keys: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Metadata of a field kept under another name; `keys`: a dictionary of numbers, a column for each."""
-    return {"column": name, "keys": keys}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,20 +78,20 @@ class Record(Form[T]):
         for one in _fields(self.kind):
             value = getattr(found, one.name)
             if one.is_array:
-                kept[one.column] = value if isinstance(value, np.ndarray) else np.reshape(value, (-1, 2))
+                kept[one.name] = value if isinstance(value, np.ndarray) else np.reshape(value, (-1, 2))
             elif one.name != self.named:
-                more[one.column] = value
+                more[one.name] = value
         return kept, more
 
     def found(self, table: Table) -> T:
         values = self._key(table)
         for one in _fields(self.kind):
             if one.is_array:
-                array = np.asarray(table.columns[one.column])
+                array = np.asarray(table.columns[one.name])
                 pairs = get_origin(one.hint) is tuple
                 values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
             elif one.name != self.named:
-                values[one.name] = table.attributes[one.column]
+                values[one.name] = table.attributes[one.name]
         return self.kind(**values)  # type: ignore[no-any-return]
 
 
@@ -125,7 +121,6 @@ class Documents(Form[T]):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Field:
     name: str
-    column: str
     hint: Any
     optional: bool
     keys: tuple[str, ...]
@@ -149,7 +144,6 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
         found.append(
             _Field(
                 name=one.name,
-                column=one.metadata.get("column") or one.name,
                 hint=hint,
                 optional=optional,
                 keys=one.metadata.get("keys", ()),
@@ -169,16 +163,16 @@ def _columns(parts: Sequence[_Field], named: str, rows: Sequence[Any]) -> Iterat
             for key in one.keys:
                 yield key, np.array([value.get(key, np.nan) for value in values], np.float64)
         elif one.hint is str:
-            yield one.column, [str(value) for value in values]
+            yield one.name, [str(value) for value in values]
         elif one.is_array:
             filled = np.full((len(values), max([1, *map(len, values)])), np.nan)
             for row, value in zip(filled, values, strict=True):
                 row[: len(value)] = value
-            yield one.column, filled
+            yield one.name, filled
         elif one.hint is int:
-            yield one.column, np.array([-1 if value is None else value for value in values], np.int64)
+            yield one.name, np.array([-1 if value is None else value for value in values], np.int64)
         else:
-            yield one.column, np.array([np.nan if value is None else value for value in values], np.float64)
+            yield one.name, np.array([np.nan if value is None else value for value in values], np.float64)
 
 
 def _values(one: _Field, table: Table) -> list[Any]:
@@ -193,7 +187,7 @@ def _values(one: _Field, table: Table) -> list[Any]:
         columns = {key: np.asarray(table.columns[key], np.float64).tolist() for key in one.keys}
         count = len(next(iter(columns.values())))
         return [{k: v[row] for k, v in columns.items() if not np.isnan(v[row])} for row in range(count)]
-    found = np.asarray(table.columns[one.column])
+    found = np.asarray(table.columns[one.name])
     if one.is_array:
         return [tuple(row[~np.isnan(row)].tolist()) for row in found]
     values: list[Any] = found.tolist()

@@ -22,7 +22,6 @@ from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.extremes.grid import Spec
-from springcheck.studies.tables import column
 
 Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"
@@ -50,7 +49,7 @@ class Cell:
 
     method: str
     block: str
-    parameters: dict[str, float] = field(metadata=column(keys=PARAMETERS))
+    parameters: dict[str, float] = field(metadata={"keys": PARAMETERS})
     outcome: Outcome
     reason: str
     value: float

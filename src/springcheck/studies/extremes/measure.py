@@ -197,24 +197,17 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
                 and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
             ):
                 calm.setdefault(decade(cell), []).append(cell.outcome in RIGHT)
-        decades = sorted(calm)
-        middle = [j for j, x in enumerate(decades) if 0 <= x <= 6 and all(calm[x])]
-        if not middle:
+        right = {x: all(calm[x]) for x in sorted(calm)}
+        spans = [list(span) for whole, span in groupby(right, right.__getitem__) if whole]
+        span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)
+        if span is None:
             continue
-        low = high = middle[0]
-        while low > 0 and all(calm[decades[low - 1]]):
-            low -= 1
-        while high < len(decades) - 1 and all(calm[decades[high + 1]]):
-            high += 1
-        whole = low == 0 and high == len(decades) - 1
         name = engines.engine(method.partition(":")[0]).title
-        span = f"1e{decades[low]} and 1e{decades[high]}"
-        sentence = f"{name} ({method}): right for forces between {span}, in the scene's unit of force"
-        if whole:
+        between = f"1e{span[0]} and 1e{span[-1]}"
+        sentence = f"{name} ({method}): right for forces between {between}, in the scene's unit of force"
+        if len(span) == len(calm):
             sentence += ", all that was tried"
-        found.append(
-            Window(method=method, sentence=sentence, low=10.0 ** decades[low], high=10.0 ** decades[high])
-        )
+        found.append(Window(method=method, sentence=sentence, low=10.0 ** span[0], high=10.0 ** span[-1]))
     return found
 
 

@@ -6,7 +6,7 @@ away (Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so none of them stands for a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.studies.tables import column
 
 CARRIES = 1e-3
 """Modes whose amplitude is at least this part of the largest have a phase worth naming: in a mode that
@@ -33,18 +32,18 @@ period as long as the run has fewer than 16, and every finer step meets the same
 class Accuracy:
     """Errors of one run, over its whole trajectory unless it says otherwise.
 
-    `largest` and `end` are relative to the initial energy norm (`System.norm`); `phase` is the
+    `max_error` and `end_error` are relative to the initial energy norm (`System.norm`); `phase_error` is the
     angle [rad] that a mode is ahead (> 0) or behind where that is largest, None where nothing turns;
-    `energy` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
-    `rounding` is the largest distance from the scheme's own motion in exact arithmetic, None where that
+    `energy_error` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
+    `rounding_error` is the largest distance from the scheme's own motion in exact arithmetic, None where that
     has no closed form.
     """
 
-    largest: float = field(metadata=column("max_error"))
-    end: float = field(metadata=column("end_error"))
-    phase: float | None = field(metadata=column("phase_error"))
-    energy: float = field(metadata=column("energy_error"))
-    rounding: float | None = field(metadata=column("rounding_error"))
+    max_error: float
+    end_error: float = np.nan
+    phase_error: float | None = None
+    energy_error: float = np.nan
+    rounding_error: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,11 +163,11 @@ class Errors:
     def result(self) -> Accuracy:
         """Errors so far."""
         return Accuracy(
-            largest=self._largest,
-            end=self._end,
-            phase=self._phase if len(self._last) else None,
-            energy=self._energy,
-            rounding=None if self._rounding is None else self._rounded,
+            max_error=self._largest,
+            end_error=self._end,
+            phase_error=self._phase if len(self._last) else None,
+            energy_error=self._energy,
+            rounding_error=None if self._rounding is None else self._rounded,
         )
 
     def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:

@@ -192,7 +192,9 @@ def _between(before: Point, after: Point, target: float) -> Point:
         steps=steps,
         step=None if after.step is None else after.step * after.steps / steps,
         force_calls=round(calls),
-        run_repeats=(before.seconds * (after.seconds / before.seconds) ** share,),
-        accuracy=Accuracy(largest=target, end=np.nan, phase=None, energy=np.nan, rounding=None),
+        run_seconds_repeats=(before.seconds * (after.seconds / before.seconds) ** share,),
+        accuracy=Accuracy(
+            max_error=target, end_error=np.nan, phase_error=None, energy_error=np.nan, rounding_error=None
+        ),
         message=f"between {before.steps} and {after.steps} steps",
     )

@@ -142,7 +142,7 @@ def _errors_first(
         for j, points, by in measured:
             sweep = left[j]
             ahead.update({(x.method, x.steps, x.tolerance): x for x in points})
-            spent += sum(point.spent for point in points) / kept.team.workers
+            spent += sum(point.spent_seconds for point in points) / kept.team.workers
             both, took = [*sweep.points, *points], before + spent
             kept.keep(points_of(scene), str(sweep.label), both, by, study_seconds=took)
             if kept.progress:
@@ -160,7 +160,7 @@ def errors_ahead(scene: Scene, label: Label, done: Sequence[Point], seconds: flo
     found: list[Point] = []
     began = last = perf_counter()
     while sweep.scene is not None:
-        point = replace(_errors(sweep, known), spent=perf_counter() - last)
+        point = replace(_errors(sweep, known), spent_seconds=perf_counter() - last)
         found.append(point)
         take(sweep, point)
         now = perf_counter()
@@ -177,7 +177,7 @@ def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
     if points is None:
         return 0.0
     for point in points:
-        if point.complete and not point.run_repeats:
+        if point.complete and not point.run_seconds_repeats:
             ahead[point.method, point.steps, point.tolerance] = point
         # what the end of that call cut off is this one's to measure
         elif point.outcome != CUT_OFF:
@@ -244,7 +244,7 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead
     for sweep, point, seconds in zip(sweeps, points, spent, strict=True):
         clock = timed.get(id(sweep))
         whole = point if clock is None else clock.onto(point)
-        take(sweep, replace(whole, spent=seconds + (clock.spent if clock else 0.0)))
+        take(sweep, replace(whole, spent_seconds=seconds + (clock.spent if clock else 0.0)))
 
 
 def _errors(sweep: Sweep, known: Truth) -> Point:
@@ -264,7 +264,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         message = f"after {count(outcome.step, 'step')}: {outcome.message}"
         return replace(blank(sweep, outcome.status, message), force_calls=record.force_calls)
     found = errors.result
-    if not (np.isfinite(found.largest) and np.isfinite(found.energy)):
+    if not (np.isfinite(found.max_error) and np.isfinite(found.energy_error)):
         return blank(sweep, "diverged", "the error is beyond the range of numbers")
     return replace(blank(sweep, "complete"), accuracy=found, force_calls=record.force_calls)
 
@@ -298,7 +298,7 @@ def _put_together(
     scene: Scene, points: Sequence[Point], methods: Sequence[MethodSummary], **rest: Any
 ) -> PrecisionStudy:
     """The study, with what follows from its points."""
-    timed = [point for point in points if point.complete and point.run_repeats]
+    timed = [point for point in points if point.complete and point.run_seconds_repeats]
     return PrecisionStudy(
         scene=scene,
         points=tuple(points),
@@ -318,7 +318,9 @@ def _summary(
 ) -> MethodSummary:
     """What the points of a method come to."""
     points = [point for point in points if point.complete]
-    timed = [point for point in points if point.run_repeats]
+    timed = [point for point in points if point.run_seconds_repeats]
+    read = [point for point in timed if point.read_seconds_repeats]
+    started = [point for point in timed if point.start_seconds_repeats]
     adaptive = engines.method(label).adaptive
     fit = None if adaptive else fits.order(points)
     # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
@@ -340,8 +342,8 @@ def _summary(
         seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
         seconds_per_force_call=min((p.seconds / p.force_calls for p in timed if p.force_calls), default=None),
         read_seconds_per_step=min(
-            (min(p.read_repeats) / p.steps for p in timed if p.read_repeats and p.steps), default=None
+            (min(p.read_seconds_repeats) / p.steps for p in read if p.steps), default=None
         ),
-        start_seconds=min((min(p.start_repeats) for p in timed if p.start_repeats), default=None),
+        start_seconds=min((min(p.start_seconds_repeats) for p in started), default=None),
         first_start_seconds=first_start,
     )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision.accuracy import Accuracy
-from springcheck.studies.tables import Rows, column
+from springcheck.studies.tables import Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,14 +26,14 @@ class Point:
     """"complete", or what else happened."""
     message: str = ""
     accuracy: Accuracy | None = None
-    run_repeats: tuple[float, ...] = field(metadata=column("run_seconds_repeats"), default=())
+    run_seconds_repeats: tuple[float, ...] = ()
     """Seconds inside the engine's stepping, nothing recorded."""
-    start_repeats: tuple[float, ...] = field(metadata=column("start_seconds_repeats"), default=())
+    start_seconds_repeats: tuple[float, ...] = ()
     """Seconds until the engine stood ready, its library imported and its code compiled before."""
-    read_repeats: tuple[float, ...] = field(metadata=column("read_seconds_repeats"), default=())
+    read_seconds_repeats: tuple[float, ...] = ()
     """Seconds of the same steps with each of them read."""
     force_calls: int | None = None
-    spent: float = field(metadata=column("spent_seconds"), default=0.0)
+    spent_seconds: float = 0.0
     """Seconds that all of its runs took, with their starts and comparisons."""
 
     @property
@@ -49,24 +49,24 @@ class Point:
     @property
     def error(self) -> float:
         """The largest error, NaN where there is none."""
-        return self.accuracy.largest if self.accuracy else float("nan")
+        return self.accuracy.max_error if self.accuracy else float("nan")
 
     @property
     def rounding(self) -> float | None:
         """The part of the error that is rounding, where it is known."""
-        return self.accuracy.rounding if self.accuracy else None
+        return self.accuracy.rounding_error if self.accuracy else None
 
     @property
     def seconds(self) -> float:
         """The smallest run time, NaN without one."""
-        return min(self.run_repeats, default=float("nan"))
+        return min(self.run_seconds_repeats, default=float("nan"))
 
     @property
     def quartiles(self) -> tuple[float, float] | None:
         """First and third quartile of the run times."""
-        if not self.run_repeats:
+        if not self.run_seconds_repeats:
             return None
-        low, high = np.quantile(self.run_repeats, [0.25, 0.75])
+        low, high = np.quantile(self.run_seconds_repeats, [0.25, 0.75])
         return float(low), float(high)
 
     @property
@@ -76,21 +76,16 @@ class Point:
 
     def document(self) -> dict[str, Any]:
         """For JSON."""
-        found = self.accuracy
         return {
             "method": self.method,
             "step": self.step,
             "tolerance": self.tolerance,
             "steps": self.steps,
-            "max_error": found.largest if found else None,
-            "end_error": found.end if found else None,
-            "phase_error": found.phase if found else None,
-            "energy_error": found.energy if found else None,
-            "rounding_error": found.rounding if found else None,
+            **{one.name: getattr(self.accuracy, one.name, None) for one in fields(Accuracy)},
             "run_seconds": self.seconds,
             "run_seconds_quartiles": self.quartiles,
-            "start_seconds": min(self.start_repeats, default=None),
-            "read_seconds": min(self.read_repeats, default=None),
+            "start_seconds": min(self.start_seconds_repeats, default=None),
+            "read_seconds": min(self.read_seconds_repeats, default=None),
             "force_calls": self.force_calls,
             "outcome": self.said,
         }

@@ -108,12 +108,12 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
 def take(sweep: Sweep, point: Point) -> None:
     """The next point of a sweep: what it cost foretells the one after it."""
     sweep.points.append(point)
-    if point.run_repeats:
-        before, sweep.cost = sweep.cost, min(point.run_repeats)
-        sweep.read = min(point.read_repeats, default=np.inf)
-        sweep.start = min(point.start_repeats)
+    if point.run_seconds_repeats:
+        before, sweep.cost = sweep.cost, min(point.run_seconds_repeats)
+        sweep.read = min(point.read_seconds_repeats, default=np.inf)
+        sweep.start = min(point.start_seconds_repeats)
         used = runs(sweep.cost + sweep.start) * sweep.cost
-        sweep.overhead = max(0.0, point.spent - used)
+        sweep.overhead = max(0.0, point.spent_seconds - used)
         if sweep.method.adaptive and before:
             sweep.growth = max(1.2, sweep.cost / before)
     sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)

@@ -33,7 +33,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
             out.append(
                 plain(f"  {method.method}: floor expected near {error:.0e}, {steps:.0e} steps{longer} a run")
             )
-    untimed = sum(point.complete and not point.run_repeats for point in study.points)
+    untimed = sum(point.complete and not point.run_seconds_repeats for point in study.points)
     if untimed:
         out.append(plain(f"  {count(untimed, 'point')} of errors alone: workers measure no times"))
     rest = [point for point in study.points if not point.complete]
@@ -98,10 +98,10 @@ def _points(points: Sequence[Point]) -> Table:
         cells = (
             point.method,
             where,
-            f"{found.largest:.1e}",
-            f"{found.end:.1e}",
-            "-" if found.phase is None else f"{found.phase:+.0e}",
-            f"{found.energy:.0e}",
+            f"{found.max_error:.1e}",
+            f"{found.end_error:.1e}",
+            "-" if found.phase_error is None else f"{found.phase_error:+.0e}",
+            f"{found.energy_error:.0e}",
             seconds(point.seconds),
             str(point.force_calls),
         )

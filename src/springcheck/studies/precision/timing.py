@@ -87,9 +87,9 @@ class Clock:
             return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
         return replace(
             point,
-            run_repeats=tuple(run.timing.run for run in self.runs),
-            start_repeats=tuple(run.timing.start for run in self.runs),
-            read_repeats=tuple(self.reads),
+            run_seconds_repeats=tuple(run.timing.run for run in self.runs),
+            start_seconds_repeats=tuple(run.timing.start for run in self.runs),
+            read_seconds_repeats=tuple(self.reads),
             force_calls=self.runs[0].force_calls,
         )
 

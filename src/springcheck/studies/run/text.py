@@ -32,9 +32,7 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
         return [*_report(found), *([verdicts_table(found.verdicts)] if verdicts else [])]
     out: Lines = []
     if found.verdicts:
-        out += [plain(), plain("Largest value of each check, as a fraction of its bound:")]
-        out.append(plain("below 1 passes; ! marks what does not", "dim"))
-        out += [*matrices(found.verdicts), *sights(found.verdicts)]
+        out += _fractions(found.verdicts)
         out += [*failures(found.verdicts), *unjudged(found.verdicts)]
         if verdicts:
             out.append(verdicts_table(found.verdicts))
@@ -60,9 +58,7 @@ def _report(report: Report) -> Lines:
         if run.outcome != "complete" or run.message
     ]
     out += _same_motions(report)
-    out += [plain(), plain("Is the engine right?  Largest value of each check, as a fraction of its bound:")]
-    out.append(plain("below 1 passes; ! marks what does not", "dim"))
-    out += [*matrices(report.verdicts), *sights(report.verdicts)]
+    out += _fractions(report.verdicts, "Is the engine right?  ")
     out += failures(v for v in report.verdicts if v.method not in report.faults)
     out += _faults(report)
     out += unjudged(report.verdicts)
@@ -72,6 +68,17 @@ def _report(report: Report) -> Lines:
         out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
     out += [plain(), *_summary(report)]
     return out
+
+
+def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
+    """What each check has found of each method."""
+    return [
+        plain(),
+        plain(f"{question}Largest value of each check, as a fraction of its bound:"),
+        plain("below 1 passes; ! marks what does not", "dim"),
+        *matrices(verdicts),
+        *sights(verdicts),
+    ]
 
 
 def _runs(runs: Sequence[MethodRun]) -> Table:

@@ -48,18 +48,18 @@ def limits(found: Sequence[Limit], fastest: float | None = None) -> Figure:
     for i, (name, mine) in enumerate(members.items()):
         look = looks.look(name)
         axes.plot(
-            mine[0].turn, mine[0].radius_predicted, color=look.color, linestyle=look.linestyle, label=name
+            mine[0].h_w, mine[0].radius_predicted, color=look.color, linestyle=look.linestyle, label=name
         )  # fmt: skip
         for j, limit in enumerate(mine):
             axes.plot(
-                limit.turn[(i + j) % 4 :: 4], limit.radius[(i + j) % 4 :: 4], linestyle="none",
+                limit.h_w[(i + j) % 4 :: 4], limit.radius[(i + j) % 4 :: 4], linestyle="none",
                 marker=looks.mark(looks.engine(limit.method))[0], markerfacecolor="white",
                 markeredgecolor=look.color, label=limit.method,
             )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("symlog", linthresh=2.0)
     axes.set_ylim(0, 200)
-    axes.set_xlim(0.09, 1.1 * max(float(limit.turn[-1]) for limit in found))
+    axes.set_xlim(0.09, 1.1 * max(float(limit.h_w[-1]) for limit in found))
     axes.set_yticks([0, 0.5, 1, 1.5, 2, 10, 100], ["0", "0.5", "1", "1.5", "2", "10", "100"])
     ticks = [x for x in (0.1, 0.5, 1, 2, 5, 16, 50) if x < axes.get_xlim()[1]]
     axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
@@ -80,12 +80,12 @@ def regions(found: Sequence[Region]) -> Figure:
     for j, (axes, region) in enumerate(zip(grid, found, strict=True)):
         axes.grid(False)
         axes.pcolormesh(
-            region.turn, region.ratio, region.stable, cmap=ListedColormap(["#ffffff", "#9ecae1"]),
+            region.h_w, region.damping_ratio, region.stable, cmap=ListedColormap(["#ffffff", "#9ecae1"]),
             vmin=0, vmax=1, shading="nearest", rasterized=True,
         )  # fmt: skip
         if not region.stable_predicted.all():
             axes.contour(
-                region.turn, region.ratio, region.stable_predicted.astype(float), levels=[0.5],
+                region.h_w, region.damping_ratio, region.stable_predicted.astype(float), levels=[0.5],
                 colors="#D55E00", linewidths=1.6,
             )  # fmt: skip
         axes.set_xscale("log")
@@ -115,10 +115,10 @@ def resonances(found: Sequence[Resonance]) -> Figure:
     figure, grid, _ = overlay.panels(len(found), 1, (8.0, 0), (3.8, 0))
     for axes, one in zip(grid, found, strict=True):
         axes.plot(
-            one.turn, one.radius_predicted - 1, color="#b3b3b3", linewidth=3, label="the exact map"
+            one.h_w, one.radius_predicted - 1, color="#b3b3b3", linewidth=3, label="the exact map"
         )  # fmt: skip
         axes.plot(
-            one.turn, one.radius - 1, linestyle="none", marker="o", markersize=2.2,
+            one.h_w, one.radius - 1, linestyle="none", marker="o", markersize=2.2,
             color=looks.look(looks.scheme_of(one.method)).color, label=f"{one.method}, measured",
         )  # fmt: skip
         axes.axvline(np.pi, color="#777777", linestyle=":", linewidth=1)
@@ -126,7 +126,7 @@ def resonances(found: Sequence[Resonance]) -> Figure:
         axes.text(np.pi + 0.05, 0.9 * top, "$\\pi$", color="#555555")
         for a, b in one.bands:
             at = (a + b) / 2
-            peak = float(np.max(np.where((one.turn >= a) & (one.turn <= b), one.radius - 1, 0)))
+            peak = float(np.max(np.where((one.h_w >= a) & (one.h_w <= b), one.radius - 1, 0)))
             axes.text(
                 at, peak + 0.05 * top, f"{a:.4f} to {b:.4f}", ha="right" if at < 4 else "center",
                 fontsize=7.5,

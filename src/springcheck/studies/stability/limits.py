@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs
-from springcheck.studies.tables import column
 
 FIRST, LAST, COARSE = 1e-9, 1e6, 4096
 """The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
@@ -55,7 +54,7 @@ class Limit:
     edge: float
     """Exponent of the growth in the number of steps at the limit itself; NaN where there is none."""
     edge_predicted: float
-    turn: Floats = field(metadata=column("h_w"))
+    h_w: Floats
     """h w of the points drawn (j,)."""
     radius: Floats
     """Measured spectral radius there."""
@@ -101,7 +100,7 @@ def measure(label: Label) -> Limit:
         growth_below_predicted=below[1],
         edge=edge[0],
         edge_predicted=edge[1],
-        turn=turn,
+        h_w=turn,
         radius=propagators.radius(propagators.measured(springs), rounding)[0],
         radius_predicted=propagators.radius(propagators.theory(springs), rounding)[0],
     )

@@ -41,12 +41,12 @@ def _limits(limits: Sequence[Limit]) -> Chart:
     for x in limits:
         group = scheme_of(x.method)
         theories.setdefault(
-            x.scheme, Curve(name=x.scheme.partition(":")[0], group=group, x=x.turn, y=x.radius_predicted)
+            x.scheme, Curve(name=x.scheme.partition(":")[0], group=group, x=x.h_w, y=x.radius_predicted)
         )
         note = f"limit {x.limit:.9g}, theory {x.theory:.9g}"
         notes = [f"theory {y!r}; {note}" for y in x.radius_predicted.tolist()]
         measured.append(
-            Curve(name=x.method, group=group, x=x.turn, y=x.radius, line=False, marks=True, notes=notes)
+            Curve(name=x.method, group=group, x=x.h_w, y=x.radius, line=False, marks=True, notes=notes)
         )
     edges = sorted({x.theory for x in limits if 0 < x.theory < np.inf})
     return Chart(
@@ -70,10 +70,10 @@ def _region(x: Region) -> Chart:
     kinds = np.where(x.stable, np.where(x.stable_predicted, 0, 2), np.where(x.stable_predicted, 3, 1))
     return Chart(
         title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",
-        x=Scale(name=TURN, values=x.turn.tolist()),
+        x=Scale(name=TURN, values=x.h_w.tolist()),
         y=Scale(
             name="damping ratio, c / 2\N{SQUARE ROOT}(k m)",
-            values=x.ratio.tolist(),
+            values=x.damping_ratio.tolist(),
         ),
         tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
     )
@@ -87,8 +87,8 @@ def _resonance(x: Resonance) -> Chart:
         x=Scale(name="outer step times fast frequency"),
         y=Scale(name="growth of one step"),
         curves=[
-            Curve(name="the exact map", group="exact", x=x.turn, y=x.radius_predicted - 1),
-            Curve(name=x.method, group=group, x=x.turn, y=x.radius - 1, line=False, marks=True),
+            Curve(name="the exact map", group="exact", x=x.h_w, y=x.radius_predicted - 1),
+            Curve(name=x.method, group=group, x=x.h_w, y=x.radius - 1, line=False, marks=True),
         ],
         rules=[Rule(axis="x", at=float(np.pi), name="\N{GREEK SMALL LETTER PI}")],
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Floats
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
-from springcheck.studies.tables import column
 
 TURN = (0.05, 20.0)
 """h w from and to."""
@@ -25,9 +24,9 @@ class Region:
     """Measured and predicted spectral radii on a grid."""
 
     method: str
-    turn: Floats = field(metadata=column("h_w"))
+    h_w: Floats
     """h w (i,)."""
-    ratio: Floats = field(metadata=column("damping_ratio"))
+    damping_ratio: Floats
     """Damping ratio (j,)."""
     radius: Floats
     """Measured (j, i)."""
@@ -77,8 +76,8 @@ def measure(label: Label, points: int = 200) -> Region:
     shape = (points, points)
     return Region(
         method=str(label),
-        turn=turn,
-        ratio=ratio,
+        h_w=turn,
+        damping_ratio=ratio,
         radius=radius.reshape(shape),
         radius_predicted=truth.reshape(shape),
         stable=stable.reshape(shape),

@@ -8,7 +8,7 @@ another step.  Biesiadecki & Skeel, J. Comput. Phys. 109 (1993) 318.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Stepper, by_engine
-from springcheck.studies.tables import column
 
 TURN = (1.0, 7.0)
 """h w of the fast spring, from and to."""
@@ -40,7 +39,7 @@ class Resonance:
 
     method: str
     scene: str
-    turn: Floats = field(metadata=column("h_w"))
+    h_w: Floats
     radius: Floats
     radius_predicted: Floats
     bands: tuple[tuple[float, float], ...]
@@ -70,7 +69,7 @@ def measure(scene: Scene, label: Label) -> Resonance:
     return Resonance(
         method=str(label),
         scene=scene.name,
-        turn=turn,
+        h_w=turn,
         radius=radius,
         radius_predicted=predicted,
         bands=_bands(turn, radius, lambda x: radii(scene, label, x, by_engine)),

@@ -121,7 +121,7 @@ def _limit(x: Limit) -> dict[str, Any]:
         "method", "scheme", "limit", "theory", "bound", "agrees",
         "growth_above", "growth_predicted", "growth_below", "edge",
     )  # fmt: skip
-    points = zip(x.turn, x.radius, x.radius_predicted, strict=True)
+    points = zip(x.h_w, x.radius, x.radius_predicted, strict=True)
     return {
         **_named(x, *names),
         "points": [{"h_w": a, "radius": b, "radius_predicted": c} for a, b, c in points],
@@ -183,7 +183,7 @@ REGIONS: Record[Region] = Record(
     auxiliary=("radius_predicted",),
     log=("radius",),
     # H5Web draws every image on even axes
-    extra=lambda x: {"log10_damping_ratio": np.log10(x.ratio), "log10_h_w": np.log10(x.turn)},
+    extra=lambda x: {"log10_damping_ratio": np.log10(x.damping_ratio), "log10_h_w": np.log10(x.h_w)},
 )
 RESONANCES: Record[Resonance] = Record(
     kind=Resonance,
