@@ -140,6 +140,8 @@ _spec.loader.exec_module(census)
         (716834, "error seen"),
         # explicit Euler moves positions by no force, however that is cut off
         (826175, "cause named"),
+        # a constant is no alternation, and no quadratic force, because each of these has one beside it
+        (824783, "cause named"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

@@ -177,6 +177,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     count = min(14, max(4, e.pairs // 8))
     linear = [q, v]
     groups: dict[str, list[Floats]] = {
+        "constant": [*linear, np.ones_like(q)],
         "drag": [*linear, np.abs(v) * v],
         "parity": [*_alternating(e).T],
         "quadratic": [*linear, np.ones_like(q), q * q],
@@ -203,6 +204,11 @@ def _shape(e: Evidence) -> list[Explanation]:
         for name, columns in groups.items()
         if counted > 3 * numbers.get(name, len(columns))
     }
+    if left.get("constant", 1.0) < 0.35:
+        # what a constant explains shows nothing of what has one beside it
+        left = {
+            name: share for name, share in left.items() if name == "constant" or 2 * share < left["constant"]
+        }
     size = float(np.max(e.found.residual))
     fitting = [name for name, share in left.items() if share < 0.35]
     if not fitting:
@@ -230,7 +236,8 @@ def _shape(e: Evidence) -> list[Explanation]:
 
 
 KIND = {
-    "drag": "depends on the velocity", "velocity": "depends on the velocity",
+    "constant": "has a constant beside it", "drag": "depends on the velocity",
+    "velocity": "depends on the velocity",
     "quadratic": "is anharmonic", "cubic": "is anharmonic", "anharmonic": "is anharmonic",
     "position": "is anharmonic", "parity": "alternates from step to step", "oscillation": "changes in time",
     "stiffness in time": "changes in time", "friction in time": "changes in time",
@@ -311,6 +318,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
             "look for a bond or a geometry that is not a linear spring",
         )
     causes = {
+        "constant": "A constant added to the position in every frame explains most of what a map misses: it",
         "quadratic": "The force is anharmonic: a quadratic part",
         "anharmonic": "The motion is anharmonic: the force is not linear in the position, which",
         "position": "The force is not linear in the position, as one that is clipped or anharmonic, which",
@@ -321,6 +329,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         "map in time": "The step or the stiffness changes in time, which",
     }
     remedies = {
+        "constant": "look for a drift that is not the velocity's, and then for what else is left",
         "stiffness in time": "look for a parameter or a clock that moves during the run",
         "oscillation": "look for a parameter or a clock that moves during the run",
         "friction in time": "look for a thermostat or a damping that is switched during the run",
