@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass
 from functools import partial
@@ -116,53 +116,66 @@ def _columns(options: Namespace) -> list[str]:
 def _identify(options: Namespace) -> int:
     from springcheck import identify
     from springcheck.doors import function
+    from springcheck.identify import text
 
     if bool(options.files) == (options.integrator is not None):
         raise SpringcheckError("identify needs a FILE, or --stepper FILE.py:FUNCTION, and not both")
+    answers: Iterable[tuple[str, Any]]
     if options.integrator is not None:
         # what it prints is not ours to show
         with redirect_stdout(sys.stderr):
             found = {options.integrator: identify.identify_stepper(function.load(options.integrator))}
-        return _identified(options.integrator, found, [], options)
-    stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}
-    parts = [
-        partial(_look, file, options.trajectory, _columns(options), stated, len(options.files) > 1)
-        for file in options.files
-    ]
-    if len(parts) > 1:
-        return _many(parts, options)
-    found, doubts = parts[0]()
-    return _identified(options.files[0], found, doubts, options)
-
-
-def _many(parts: Sequence[Callable[[], Any]], options: Namespace) -> int:
-    """What many files hold, in the order in which they were given."""
-    from springcheck.studies.team import Processes
-
-    known: dict[int, Any] = {}
+        answers = [(options.integrator, (found, []))]
+    else:
+        stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}
+        columns = _columns(options)
+        parts = [partial(_look, file, options.trajectory, columns, stated) for file in options.files]
+        answers = zip(options.files, _in_order(parts, options.workers), strict=True)
+    many = len(options.files) > 1
     documents: list[dict[str, Any]] = []
     statuses: list[int] = []
-    with closing(Processes(options.workers).carried_out(parts)) as found:
-        for i, answer in found:
-            known[i] = answer
-            while (j := len(statuses)) in known:
-                file, one = options.files[j], known.pop(j)
-                if isinstance(one, str):
-                    print(f"springcheck: {one}", file=sys.stderr)
-                    statuses.append(2)
-                    documents.append({"file": file, "error": one})
-                    continue
-                judged, doubts = one
-                statuses.append(_identified(file, judged, doubts, options, documents))
+    for file, answer in answers:
+        if isinstance(answer, Exception):
+            if not many:
+                raise answer
+            print(f"springcheck: {answer}", file=sys.stderr)
+            documents.append({"file": file, "error": str(answer)})
+            statuses.append(2)
+            continue
+        found, doubts = answer
+        output.warn(file, doubts)
+        each = [{"trajectory": label, **one.document()} for label, one in found.items()]
+        known = each[0] if len(each) == 1 else {"identifications": each}
+        documents.append({**({"file": file} if many else {}), **known, "not_trusted": doubts})
+        if not options.json:
+            titles = {label: label for label in found}
+            if many:
+                titles = {label: file if label == Path(file).name else f"{file}, {label}" for label in found}
+            output.show([x for label, one in found.items() for x in text.identification(titles[label], one)])
+        fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())
+        undecided = any(one.undecided for one in found.values())
+        statuses.append(1 if doubts or not fits else 2 if undecided else 0)
     if options.json:
-        output.document({"files": documents})
+        output.document({"files": documents} if many else documents[0])
     return 1 if 1 in statuses else max(statuses)
 
 
-def _look(
-    file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None], many: bool
-) -> Any:
-    """What a file holds and what of it cannot be trusted; of one of many also why it cannot be read."""
+def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]:
+    """What the parts return, in their order."""
+    from springcheck.studies.team import Processes
+
+    known: dict[int, Any] = {}
+    following = 0
+    with closing(Processes(min(workers, len(parts))).carried_out(parts)) as found:
+        for i, answer in found:
+            known[i] = answer
+            while following in known:
+                yield known.pop(following)
+                following += 1
+
+
+def _look(file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None]) -> Any:
+    """What a file holds and what of it cannot be trusted, or why it cannot be read."""
     from springcheck import formats
     from springcheck.identify import files
 
@@ -171,35 +184,7 @@ def _look(
             doubts = output.doubts(file) if formats.is_hdf5(Path(file)) else []
             return files.identify_file(Path(file), trajectory, columns, stated), doubts
     except (SpringcheckError, OSError) as error:
-        if not many:
-            raise
-        return str(error)
-
-
-def _identified(
-    file: str,
-    found: Any,
-    doubts: list[dict[str, str]],
-    options: Namespace,
-    documents: list[dict[str, Any]] | None = None,
-) -> int:
-    """Show what a file holds -> the exit status; one of many as a document among `documents`."""
-    from springcheck.identify import text
-
-    output.warn(file, doubts)
-    each = [{"trajectory": label, **one.document()} for label, one in found.items()]
-    document = {**(each[0] if len(each) == 1 else {"identifications": each}), "not_trusted": doubts}
-    if documents is not None:
-        documents.append({"file": file, **document})
-    elif options.json:
-        output.document(document)
-    if not options.json:
-        titles = {label: label for label in found}
-        if documents is not None:
-            titles = {label: file if label == Path(file).name else f"{file}, {label}" for label in found}
-        output.show([x for label, one in found.items() for x in text.identification(titles[label], one)])
-    fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())
-    return 1 if doubts or not fits else 2 if any(one.undecided for one in found.values()) else 0
+        return error
 
 
 def _judge(options: Namespace) -> int:

@@ -19,7 +19,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
+from springcheck.physics.trajectory import Trajectory
 from springcheck.store import Draft, Table
 from springcheck.studies import provenance
 from springcheck.studies import team as teams
@@ -37,9 +37,10 @@ __all__ = [
 
 T = TypeVar("T")
 
+open_new, need_space, size = store.open_new, store.need_space, store.size
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
 digest, attributes = store.digest, store.attributes
-"""Trajectories of a store, read in pieces, and what is known of one besides its frames."""
+"""Trajectories of a store, written as they go and read in pieces."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,31 +169,6 @@ class Keeper:
         if self.progress:
             self.progress(done, len(pieces), *(piece.what for piece in following))
 
-    def runs(self) -> tuple[str, ...]:
-        """Labels of the trajectories that are finished."""
-        return self._writing.finished()
-
-    def sources(self) -> dict[str, Path]:
-        """Label of each finished trajectory -> the file that holds it."""
-        return self._writing.sources()
-
-    def need_space(self, scene: Scene, runs: int) -> None:
-        """StoreError where there is no space for so many trajectories of a scene."""
-        store.need_space(self._writing.path, store.size(scene) * runs)
-
-    def draft(self, label: Label, scene: Scene) -> Draft:
-        """A writer of one trajectory."""
-        return self._writing.draft(str(label), scene)
-
-    def commit_run(self, scene: Scene, comparison: Comparison, verdicts: Sequence[Verdict]) -> None:
-        """Put the trajectories and what was found of them into the store."""
-        self._writing.commit(scene, comparison=comparison, verdicts=verdicts)
-
-    @property
-    def _writing(self) -> store.Journal:
-        assert self._journal is not None, "trajectories are kept in a store"
-        return self._journal
-
     def commit(self, name: str, document: Mapping[str, Any], scene: Scene | None = None) -> None:
         """Put everything that was kept, and the study's document, into the store."""
         if self._journal is not None:
@@ -226,7 +202,7 @@ def kept(
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
-    with store.open_new(path, command, force=force) as journal:
+    with open_new(path, command, force=force) as journal:
         found = Keeper(journal, progress, team)
         found.path = Path(path)
         yield found

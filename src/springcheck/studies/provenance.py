@@ -14,9 +14,13 @@ from hashlib import sha256
 import numpy as np
 
 from springcheck import engines
+from springcheck.text.wording import few
 
 PACKAGES = ("springcheck", "numpy", "numba", "scipy")
 """Packages on which numbers depend, beside those of the engines."""
+
+MOST_HOSTS = 4
+"""Of one kind of processor, that are named."""
 
 BITS = ("elementary functions", "sums", "linear algebra")
 """What is computed for comparison: the results differ where the processors' libraries round differently."""
@@ -68,13 +72,13 @@ def sentences(pieces: Iterable[tuple[str, Mapping[str, str]]]) -> list[str]:
     if len(counts) < 2:
         return []
     kinds = [kind for kind, _ in counts.most_common()]
-    parts = [f"{counts[kind]} on {kind[0]} ({_listed(hosts[kind])})" for kind in kinds]
+    parts = [f"{counts[kind]} on {kind[0]} ({few(list(hosts[kind]), MOST_HOSTS)})" for kind in kinds]
     said = [f"Pieces were measured on {len(kinds)} kinds of processors: {'; '.join(parts)}."]
-    most = _listed(hosts[kinds[0]])
+    most = few(list(hosts[kinds[0]]), MOST_HOSTS)
     for kind in kinds[1:]:
         differ = [name for name, one, other in zip(BITS, kinds[0][1:], kind[1:], strict=True) if one != other]
         if differ:
-            here = _listed(hosts[kind])
+            here = few(list(hosts[kind]), MOST_HOSTS)
             said.append(
                 f"The processors differ in a bit: {', '.join(differ)} round otherwise on {here} than on "
                 f"{most}; so may the last digits of what was measured there."
@@ -82,8 +86,3 @@ def sentences(pieces: Iterable[tuple[str, Mapping[str, str]]]) -> list[str]:
     if len(said) == 1:
         said.append(f"They agree bit for bit in {', '.join(BITS)}, as far as it was tried.")
     return said
-
-
-def _listed(names: Iterable[str], most: int = 4) -> str:
-    found = list(names)
-    return ", ".join(found[:most]) + (f" and {len(found) - most} more" if len(found) > most else "")

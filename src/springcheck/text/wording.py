@@ -17,6 +17,12 @@ def count(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
+def few(names: Sequence[str], most: int, joint: str = ", ") -> str:
+    """The first names, and how many more there are: a, b and 3 more."""
+    more = len(names) - most
+    return joint.join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
 def either(names: Sequence[str]) -> str:
     """One of several: a, b or c."""
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -41,7 +41,7 @@ def html(content: Content) -> str:
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
     around.filters |= {
-        "short": short,
+        "short": "{:.3g}".format,
         "fraction": fraction,
         "ordinal": ordinal,
         "words": lambda text: str(text).strip(),
@@ -105,16 +105,6 @@ def _json(data: Any) -> Markup:
 def _digest(text: str) -> str:
     """As a Content-Security-Policy names what may run."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def short(x: float) -> str:
-    """Three digits."""
-    return f"{x:.3g}"
-
-
-def words(text: object) -> str:
-    """A line or a cell, whose look is the page's own."""
-    return str(text).strip()
 
 
 def fraction(verdict: Verdict) -> str:

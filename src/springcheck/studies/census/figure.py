@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from springcheck.figures import looks
 from springcheck.studies.census.result import Census
+from springcheck.text.wording import few
 
 MOST_NAMES = 3
 
@@ -25,10 +26,8 @@ def portrait(census: Census) -> Figure:
     groups = census.grouped
     for name, members in groups.items():
         how = looks.look(name)
+        label = f"{looks.title(name)}\n{few([x.method for x in members], MOST_NAMES)}"
         for j, x in enumerate(members):
-            names = [y.method for y in members[:MOST_NAMES]]
-            more = len(members) - len(names)
-            label = f"{looks.title(name)}\n" + ", ".join(names) + (f" and {more} more" if more else "")
             axes.plot(
                 x.q,
                 x.p,

@@ -6,6 +6,7 @@ import numpy as np
 
 from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.charts import Bank, Chart, Curve, Scale
+from springcheck.text.wording import few
 
 MOST_NAMES = 2
 
@@ -19,8 +20,7 @@ def banks(census: Census) -> list[Bank]:
             same.setdefault(x.digest, []).append(x)
         for i, equal in enumerate(same.values()):
             names = [x.method for x in equal]
-            more = len(names) - MOST_NAMES
-            name = " = ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+            name = few(names, MOST_NAMES, " = ")
             x = equal[0]
             notes = [f"step {step}; bit for bit {', '.join(names)}" for step in range(len(x.q))]
             curves.append(Curve(name=name, group=scheme, x=x.q, y=x.p, notes=notes))

@@ -10,7 +10,7 @@ from springcheck.figures.looks import title
 from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, plain, table
-from springcheck.text.wording import seconds
+from springcheck.text.wording import few, seconds
 
 TITLES = (
     "method", "amplitude", "det - 1", "velocity", "friction", "arithmetic", "forces", "time", "same bits as"
@@ -50,7 +50,7 @@ def _row(x: Entry, partners: tuple[str, ...]) -> Row:
         x.precision,
         f"{x.force_calls:.3g}",
         seconds(x.seconds),
-        _few(partners),
+        few(partners, 2),
     ]
 
 
@@ -58,8 +58,3 @@ def _number(x: float, least: float) -> str:
     if np.isnan(x):
         return "-"
     return "0" if abs(x) < least else f"{x:+.2e}"
-
-
-def _few(names: tuple[str, ...]) -> str:
-    """The names, or two of them and how many more there are."""
-    return ", ".join(names) if len(names) <= 2 else f"{names[0]}, {names[1]} and {len(names) - 2} more"

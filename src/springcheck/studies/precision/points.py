@@ -100,16 +100,8 @@ POINTS: Rows[Point] = Rows(
     beginning="precision/",
     units={
         "phase_error": "rad",
-        **dict.fromkeys(
-            (
-                "run_seconds",
-                "run_seconds_repeats",
-                "start_seconds_repeats",
-                "read_seconds_repeats",
-                "spent_seconds",
-            ),
-            "s",
-        ),
+        "run_seconds": "s",
+        **{one.name: "s" for one in fields(Point) if "seconds" in one.name},
     },
     signal="max_error",
     axes=("run_seconds",),

@@ -123,14 +123,14 @@ def run(
     )
     bar = _Bar(progress, len(labels) * (1 + thorough))
     command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
-    with keeper.kept(path, command, force=force) as kept:
-        resumed = kept.runs()
-        kept.need_space(scene, len(labels) + len(wrong) - len(resumed))
+    with keeper.open_new(path, command, force=force) as journal:
+        resumed = journal.finished()
+        keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))
         for label in tuple(labels):
             if str(label) in resumed:
                 continue
             try:
-                with kept.draft(label, scene) as draft:
+                with journal.draft(str(label), scene) as draft:
                     told = bar.of(label, scene.steps)
                     made = simulate.play(scene, label, draft.append, progress=told)
                     draft.finish(keeper.attributes(made))
@@ -142,15 +142,15 @@ def run(
                 left.append(LeftOut(method=str(label), reason=str(error)))
         for one in wrong:
             if one.label not in resumed:
-                with kept.draft(Label(engine=FAULT, method=one.fault.name), scene) as draft:
+                with journal.draft(one.label, scene) as draft:
                     one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
-        sources = kept.sources()
+        sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
         report = replace(report, faults={one.label: one.about for one in wrong})
         if thorough:
             report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
-        kept.commit_run(scene, report.comparison, report.verdicts)
+        journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
     return report
 
 
@@ -343,17 +343,17 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
     place = beside if os.access(beside, os.W_OK) else None
     with interrupts.folder(dir=place, prefix=".springcheck-") as folder:
         again = folder / "again.h5"
-        with keeper.kept(again, "repeat") as kept:
+        with keeper.open_new(again, "repeat") as journal:
             bar = _Bar(progress, len(chosen))
             for name in chosen:
                 before = known[name].parameters
                 label = engines.parse(name)
                 quantities = ("q", "p", "energy") if "energy" in known[name].quantities else ("q", "p")
                 mine = replace(scene, quantities=quantities)
-                with kept.draft(label, mine) as draft:
+                with journal.draft(name, mine) as draft:
                     record = simulate.play(mine, label, draft.append, progress=bar.of(label, scene.steps))
                     digest = draft.finish(keeper.attributes(record))
-                source = kept.sources()[name]
+                source = journal.sources()[name]
                 found.append(
                     Repeat(
                         method=name,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -71,10 +71,7 @@ def _region(x: Region) -> Chart:
     return Chart(
         title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",
         x=Scale(name=TURN, values=x.h_w.tolist()),
-        y=Scale(
-            name="damping ratio, c / 2\N{SQUARE ROOT}(k m)",
-            values=x.damping_ratio.tolist(),
-        ),
+        y=Scale(name="damping ratio, c / 2\N{SQUARE ROOT}(k m)", values=x.damping_ratio.tolist()),
         tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
     )
 
@@ -96,36 +93,19 @@ def _resonance(x: Resonance) -> Chart:
 
 def _costs(costs: Sequence[Cost]) -> list[Chart]:
     ratio = "stiffness ratio" if costs[0].family == "two-scales" else "damping ratio"
-    what = {
-        "steps": "steps; those of unfinished runs are estimates",
-        "force_calls": "force calls of finished runs",
-        "error": "error of the slow motion",
-    }
+    what: tuple[tuple[str, str, Callable[[Cost], bool]], ...] = (
+        ("steps", "steps; those of unfinished runs are estimates", lambda x: True),
+        ("force_calls", "force calls of finished runs", lambda x: x.outcome == "complete"),
+        ("error", "error of the slow motion", lambda x: x.error < MOST_ERROR),
+    )
     charts = []
-    for name, title in what.items():
+    for name, title, shown in what:
         curves = []
         for method in dict.fromkeys(x.method for x in costs):
-            mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0]
-            if name == "force_calls":
-                mine = [x for x in mine if x.outcome == "complete"]
-            if name == "error":
-                mine = [x for x in mine if x.error < MOST_ERROR]
-            curves.append(
-                Curve(
-                    name=method,
-                    group=scheme_of(method),
-                    x=[x.ratio for x in mine],
-                    y=[float(getattr(x, name)) for x in mine],
-                    marks=True,
-                    notes=[x.outcome for x in mine],
-                )
-            )
-        charts.append(
-            Chart(
-                title=f"What stiffness costs: {title}.",
-                x=Scale(name=ratio, log=True),
-                y=Scale(name=title.partition(";")[0], log=True),
-                curves=curves,
-            )
-        )
+            mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0 and shown(x)]
+            x, y = [x.ratio for x in mine], [float(getattr(x, name)) for x in mine]
+            notes = [x.outcome for x in mine]
+            curves.append(Curve(name=method, group=scheme_of(method), x=x, y=y, marks=True, notes=notes))
+        scales = Scale(name=ratio, log=True), Scale(name=title.partition(";")[0], log=True)
+        charts.append(Chart(title=f"What stiffness costs: {title}.", x=scales[0], y=scales[1], curves=curves))
     return charts

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -64,16 +63,20 @@ def measure(scene: Scene, label: Label) -> Resonance:
     if reason:
         raise SceneError(f"{label}: {reason}")
     turn = np.linspace(*TURN, COPIES)
-    radius = radii(scene, label, turn, by_engine)
-    predicted = radii(scene, label, turn, _by_scheme)
+
+    def scanned(step: Stepper) -> tuple[Floats, tuple[tuple[float, float], ...]]:
+        radius = radii(scene, label, turn, step)
+        return radius, _bands(turn, radius, lambda x: radii(scene, label, x, step))
+
+    (radius, bands), (predicted, bands_predicted) = scanned(by_engine), scanned(_by_scheme)
     return Resonance(
         method=str(label),
         scene=scene.name,
         h_w=turn,
         radius=radius,
         radius_predicted=predicted,
-        bands=_bands(turn, radius, lambda x: radii(scene, label, x, by_engine)),
-        bands_predicted=_bands(turn, predicted, lambda x: radii(scene, label, x, _by_scheme)),
+        bands=bands,
+        bands_predicted=bands_predicted,
     )
 
 
@@ -95,7 +98,6 @@ def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
 
 
 def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
-    law: dict[str, Any] = {"parts": scene.system.parts}
     q, p = schemes.step(
         schemes.scheme(engines.method(label).scheme),
         scene.q.astype(np.longdouble),
@@ -103,7 +105,7 @@ def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
         h=scene.step,
         m=scene.m,
         force=scene.system.force,
-        **law,
+        parts=scene.system.parts,
     )
     return np.asarray(q, np.longdouble), np.asarray(p, np.longdouble)
 
