@@ -8,6 +8,7 @@ catalogue cannot hide itself.
 from __future__ import annotations
 
 import re
+import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
@@ -475,3 +476,14 @@ def test_a_number_of_substeps_that_digits_do_not_tell_is_a_range(digits: int, wo
     found = identify(0.05 * np.arange(101), q_, v=v_, mass=1.0)
     assert found.fits
     assert_said(found, words)
+
+
+def test_a_stiffness_that_wobbles_is_found_in_a_long_file_in_little_memory() -> None:
+    step = verlet(lambda i, q, p: -K * q * (1 + 1e-6 * np.sin(0.037 * i)))
+    t, q, p = march(step, 4000)
+    tracemalloc.start()
+    found = identify(t, q, p, **STATED)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert "stiffness changes in time" in found.statement
+    assert most < 5000 * len(t), "bytes, of which a frame needs few"

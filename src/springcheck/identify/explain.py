@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.identify.coarse import irregular
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched, title
@@ -16,7 +18,7 @@ from springcheck.identify.result import Explanation
 from springcheck.identify.search import FEW, distinct, search
 from springcheck.identify.starts import Terms
 from springcheck.identify.wrong import misfit, wrong_map
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.schemes import rotation
 
 FEWEST_MISSES = 24.0
@@ -118,6 +120,12 @@ def _left(columns: Floats, missing: Floats) -> float:
     return float(np.sqrt(np.mean((missing - fitted) ** 2) * share)) / total if total else 1.0
 
 
+LONG = 50_000
+"""Frames of which waves of 41 frequencies take 32 MiB."""
+
+Complexes: TypeAlias = NDArray[np.complex128]
+
+
 def _hats(x: Floats, count: int) -> Floats:
     """Piecewise linear functions of x that add up to 1, (f, count)."""
     at = np.linspace(float(np.min(x)), float(np.max(x)), count)
@@ -126,24 +134,38 @@ def _hats(x: Floats, count: int) -> Floats:
 
 def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[Floats]:
     """q, v and q times the sine and cosine in time that explain most of what is missing (f, 2)."""
-    n = np.arange(len(q))
+    n, frames, pull = np.arange(len(q)), len(q), weight * q
     across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
+    wanted = missing * weight[:, None]
+    wanted = wanted - across @ (across.T @ wanted)
+    summed, square = np.concatenate([wanted, across], axis=1).T * pull, pull**2
+    total = float(np.sum(square))
 
-    def apart(x: Floats) -> Floats:
-        return np.asarray(x - across @ (across.T @ x))
-
-    wanted = apart(missing * weight[:, None])
-    low, high, best = 0.5 * np.pi / len(q), np.pi, 0.0
-    for count in (4 * len(q), 41):
-        w = np.linspace(low, high, count)
-        c, s = (apart((weight * q)[:, None] * wave(np.outer(n, w))) for wave in (np.cos, np.sin))
-        cc, ss, cs = (np.sum(x * y, axis=0) for x, y in ((c, c), (s, s), (c, s)))
+    def best(w: Reals, waves: Complexes, double: Complexes) -> float:
+        """Which of frequencies (c,) explains most, from the sums (4, c) and (c,) with exp(i w n) and its
+        square."""
+        c, s = waves.real, waves.imag
+        cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
+        ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
+        cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
         det = np.maximum(cc * ss - cs * cs, 1e-9 * cc * ss + 1e-300)
-        x, y = wanted.T @ c, wanted.T @ s
-        gain = np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0)
-        best = float(w[int(np.argmax(gain))])
-        low, high = best - (w[1] - w[0]), best + (w[1] - w[0])
-    return [q, v, q * np.cos(best * n), q * np.sin(best * n)]
+        x, y = c[:2], s[:2]
+        return float(w[np.argmax(np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0))])
+
+    size = 1 << (8 * frames - 1).bit_length()
+    at = np.arange(size // (4 * frames), size // 2 + 1)
+    apart = 2 * np.pi / size
+    waves, double = np.fft.fft(summed, size).conj(), np.fft.fft(square, size // 2).conj()
+    frequency = best(apart * at, waves[:, at], double[at % (size // 2)])
+    for room in (apart, apart / 20):
+        w = frequency + room * np.linspace(-1, 1, 41)
+        parts = [
+            (summed @ x, square @ x**2)
+            for x in (np.exp(1j * np.outer(n, y)) for y in np.array_split(w, 1 + frames // LONG))
+        ]
+        waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
+        frequency = best(w, waves, double)
+    return [q, v, q * np.cos(frequency * n), q * np.sin(frequency * n)]
 
 
 def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
