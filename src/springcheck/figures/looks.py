@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -154,9 +155,7 @@ def members(labels: Iterable[str]) -> str:
     given = list(labels)
     if len(given) == 1:
         return f"{mark(engine(given[0]))[1]} {given[0]}"
-    count: dict[str, int] = {}
-    for label in given:
-        count[engine(label)] = count.get(engine(label), 0) + 1
+    count = Counter(map(engine, given))
     names = [f"{mark(name)[1]} {name}" + (f" ({n})" if n > 1 else "") for name, n in count.items()]
     more = [f"and {len(names) - MOST_MEMBERS} more"] if len(names) > MOST_MEMBERS else []
     lines = [names[i : i + 3] for i in range(0, min(len(names), MOST_MEMBERS), 3)]

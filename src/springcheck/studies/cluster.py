@@ -221,21 +221,18 @@ def _answers(
                     raise
                 except BaseException:
                     # the worker that held it is gone: CommClosedError, CancelledError, KilledWorker ...
-                    _alive(client)
-                    give(i)
+                    pass
+                else:
+                    done.add(i)
+                    yield i, answer
                     continue
-                done.add(i)
-                yield i, answer
-            elif future.status in ("cancelled", "lost"):
-                # lost: the worker has died after it had finished
-                _alive(client)
-                give(i)
-            else:
-                _alive(client)
+            _alive(client)
+            # lost: the worker has died after it had finished
+            if future.status not in ("finished", "cancelled", "lost"):
                 cause = future.exception(timeout=patience)
                 if not isinstance(cause, distributed.KilledWorker | CommClosedError):
                     raise cause
-                give(i)
+            give(i)
     except (KeyboardInterrupt, GeneratorExit, SpringcheckError):
         raise
     except BaseException as error:

@@ -40,7 +40,8 @@ T = TypeVar("T")
 open_new, need_space, size = store.open_new, store.need_space, store.size
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
 digest, attributes = store.digest, store.attributes
-"""Trajectories of a store, written as they go and read in pieces."""
+tables, verdicts, comparison = store.tables_of, store.verdicts, store.comparison
+"""Trajectories of a store, written as they go and read in pieces, and what was found of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,11 +252,6 @@ def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path
     return reader
 
 
-def tables(path: Path) -> Mapping[str, Table]:
-    """The tables of a store by name; each is read when it is asked for."""
-    return store.tables_of(path)
-
-
 @cache
 def record() -> Mapping[str, str]:
     """Who measures here: the machine, the versions, and digests of its arithmetic."""
@@ -325,8 +321,3 @@ def read(path: str | Path) -> dict[str, Trajectory]:
     if not found:
         raise StoreError(f"{path}: holds no trajectories")
     return found
-
-
-def judged(path: Path) -> dict[str, Any]:
-    """Verdicts and comparison of a store."""
-    return {"verdicts": store.verdicts(path), "comparison": store.comparison(path)}

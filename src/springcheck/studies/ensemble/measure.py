@@ -24,7 +24,7 @@ from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.choose import choose
 from springcheck.studies.ensemble.result import CELLS, Columns, Ensemble, Tally
-from springcheck.studies.ensemble.vary import Plan, Varied, plan, together
+from springcheck.studies.ensemble.vary import GRID, Plan, Varied, plan, together
 from springcheck.studies.extremes.running import raw
 from springcheck.studies.keeper import How, Piece
 from springcheck.studies.study import Progress
@@ -113,7 +113,7 @@ def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
     changes = varied.substitutions(values)
     varied.check(values, changes)
     count = len(next(iter(values.values())))
-    grid = np.column_stack([x for place, x in changes.items() if len(place) == 1] or [np.zeros(count)])
+    grid = np.column_stack([x for place, x in changes.items() if place[0] in GRID] or [np.zeros(count)])
     _, group = np.unique(grid, axis=0, return_inverse=True)
     found: dict[str, Any] = {
         "outcome": np.zeros(count, np.int8),

@@ -30,8 +30,11 @@ MOST_CELLS = 10**8
 
 FORM = "FIELD=LOW:HIGH:COUNT[:log], FIELD=A,B,C, or with --samples FIELD=LOW:HIGH[:log]"
 
+GRID = ("step", "steps", "every", "tolerance")
+"""Numbers that all cells of a run have in common."""
+
 Place = tuple[Any, ...]
-"""Where in a scene a number stands: ("m", particle), ("terms", term, field, row), or the name of a field."""
+"""Where in a scene a number stands: the name of a field, or ("terms", term, field), and the row."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,16 +159,15 @@ class Varied:
         SpringcheckError where a value makes no scene, or two fields change the same number.
         """
         found: dict[Place, Floats] = {}
+        numbers = _arrays(self.scene)
         for field, column in values.items():
-            rows: dict[Place, list[float]] = {}
             different, where = np.unique(column, return_inverse=True)
             effects = [self._effect(field, float(value)) for value in different]
             for place in {place for effect in effects for place in effect}:
-                rows[place] = [effect.get(place, _number(self.scene, place)) for effect in effects]
-            for place, numbers in rows.items():
                 if place in found:
                     raise SpringcheckError(f"--vary {field}: {place[0]} is changed by another --vary, too")
-                found[place] = np.array(numbers)[where]
+                known = float(numbers[place[:-1]][place[-1]])
+                found[place] = np.array([effect.get(place, known) for effect in effects])[where]
         return found
 
     def _at(self, field: str) -> tuple[Any, Any]:
@@ -232,25 +234,20 @@ def _differences(one: Scene, other: Scene, field: str) -> Iterator[tuple[Place, 
         for a, b in zip(mine.particles, its.particles, strict=True)
     ):
         raise SpringcheckError(f"--vary {field}: it changes what acts on what, which no ensemble can")
-    for name in ("m", "q", "p"):
-        for i in np.flatnonzero(getattr(one, name) != getattr(other, name)):
-            yield (name, int(i)), float(getattr(other, name)[i])
-    for t, (mine, its) in enumerate(zip(one.terms, other.terms, strict=True)):
-        for entry in fields(mine):  # type: ignore[arg-type]
-            a, b = getattr(mine, entry.name), getattr(its, entry.name)
-            if isinstance(a, np.ndarray):
-                for row in np.flatnonzero(a != b):
-                    yield ("terms", t, entry.name, int(row)), float(b[row])
-    for name in ("step", "steps", "every", "tolerance"):
-        if getattr(one, name) != getattr(other, name):
-            yield (name,), getattr(other, name)
+    before = _arrays(one)
+    for key, after in _arrays(other).items():
+        for row in np.flatnonzero(before[key] != after):
+            yield (*key, int(row)), float(after[row])
 
 
-def _number(scene: Scene, place: Place) -> float:
-    if place[0] == "terms":
-        return float(getattr(scene.terms[place[1]], place[2])[place[3]])
-    found = getattr(scene, place[0])
-    return float(found[place[1]]) if len(place) > 1 else found
+def _arrays(scene: Scene) -> dict[Place, np.ndarray]:
+    """All numbers of a scene, by where they stand."""
+    names = ("m", "q", "p", *GRID)
+    found: dict[Place, np.ndarray] = {(name,): np.atleast_1d(getattr(scene, name)) for name in names}
+    for t, term in enumerate(scene.terms):
+        values = {one.name: getattr(term, one.name) for one in fields(term)}  # type: ignore[arg-type]
+        found |= {("terms", t, name): x for name, x in values.items() if isinstance(x, np.ndarray)}
+    return found
 
 
 def together(scene: Scene, changes: Mapping[Place, Floats], chosen: np.ndarray) -> Scene:
@@ -260,19 +257,18 @@ def together(scene: Scene, changes: Mapping[Place, Floats], chosen: np.ndarray) 
     """
     copies = len(chosen)
     many = scene.system.tiled(copies)
-    arrays = {name: np.array(getattr(many, name)).reshape(copies, -1) for name in ("m", "q", "p")}
-    columns: dict[tuple[int, str], np.ndarray] = {}
-    grid: dict[str, Any] = {}
-    for place, values in changes.items():
-        if place[0] == "terms":
-            _, t, name, row = place
-            whole = columns.setdefault((t, name), np.array(getattr(many.terms[t], name)).reshape(copies, -1))
-            whole[:, row] = values[chosen]
-        elif len(place) == 2:
-            arrays[place[0]][:, place[1]] = values[chosen]
+    numbers, arrays = _arrays(many), dict[Place, np.ndarray]()
+    more: dict[str, Any] = {}
+    for (*key, row), values in changes.items():
+        if key[0] in GRID:
+            more[key[0]] = type(getattr(scene, key[0]))(values[chosen[0]])
         else:
-            grid[place[0]] = type(getattr(scene, place[0]))(values[chosen[0]])
+            place = tuple(key)
+            arrays.setdefault(place, numbers[place].reshape(copies, -1).copy())[:, row] = values[chosen]
     terms: list[Any] = list(many.terms)
-    for (t, name), whole in columns.items():
-        terms[t] = replace(terms[t], **{name: whole.ravel()})
-    return scene.derived(terms=tuple(terms), **{name: x.ravel() for name, x in arrays.items()}, **grid)
+    for (name, *where), whole in arrays.items():
+        if where:
+            terms[where[0]] = replace(terms[where[0]], **{where[1]: whole.ravel()})
+        else:
+            more[name] = whole.ravel()
+    return many.derived(terms=tuple(terms), **more)

@@ -39,7 +39,7 @@ _CHANGES = (
 def cells() -> list[Cell]:
     """One cell for each; refused when the answer is an error that a user can read."""
     found = [
-        _cell("scene file", {}, f"{new} instead of {old}", _answer(_SPRING.replace(old, new)))
+        _cell("scene file", f"{new} instead of {old}", _answer(_SPRING.replace(old, new)))
         for old, new in _CHANGES
     ]
     spring = scenes.parse(_SPRING, name="spring")
@@ -52,7 +52,7 @@ def cells() -> list[Cell]:
                     answer = None
                 except SpringcheckError as error:
                     answer = str(error)
-                found.append(_cell(str(label), {}, what, answer))
+                found.append(_cell(str(label), what, answer))
     return found
 
 
@@ -64,11 +64,11 @@ def _answer(text: str) -> str | None:
     return None
 
 
-def _cell(method: str, parameters: dict[str, float], what: str, answer: str | None) -> Cell:
+def _cell(method: str, what: str, answer: str | None) -> Cell:
     return Cell(
         method=method,
         block="refusal",
-        parameters=parameters,
+        parameters={},
         outcome="refused" if answer else "silently wrong",
         reason=answer or f"{what} was taken without a word",
         value=float("nan"),

@@ -34,7 +34,7 @@ from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
-from springcheck.studies.precision.points import POINTS, Point, points_of
+from springcheck.studies.precision.points import POINTS, Place, Point, points_of
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.precision.sweeps import (
     PLANNED,
@@ -65,7 +65,6 @@ def study(
     *,
     budget: float = BUDGET,
     kept: Keeper | None = None,
-    progress: Progress | None = None,
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
@@ -78,7 +77,7 @@ def study(
     """
     known = truth(scene)
     sweeps = [begin(scene, label, known) for label in labels]
-    kept = kept or Keeper(progress=progress)
+    kept = kept or Keeper()
     able = _open(sweeps)
     ahead: Ahead = {}
     before = [_take_up(sweep, kept, ahead) for sweep in able]
@@ -99,7 +98,7 @@ def study(
             form = points_of(scene)
             kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
     for sweep in _open(sweeps):
-        while (point := ahead.get(_place(sweep))) is not None and sweep.scene is not None:
+        while (point := ahead.get(blank(sweep, "").place)) is not None and sweep.scene is not None:
             # its errors are known; its time was not to be had
             take(sweep, point)
     for sweep in _open(sweeps):
@@ -117,13 +116,8 @@ def study(
     )
 
 
-Ahead = dict[tuple[str, int | None, float | None], Point]
-"""Points whose errors were measured before their turn to be timed, by method, steps and tolerance."""
-
-
-def _place(sweep: Sweep) -> tuple[str, int | None, float | None]:
-    point = blank(sweep, "")
-    return point.method, point.steps, point.tolerance
+Ahead = dict[Place, Point]
+"""Points whose errors were measured before their turn to be timed."""
 
 
 def _errors_first(
@@ -134,14 +128,14 @@ def _errors_first(
     Times are not theirs to measure.  They have ended when this returns: seconds are measured with nothing of
     ours beside them.
     """
-    left = [x for x in sweeps if x.scene is not None and ahead.get(_place(x)) is None]
+    left = [x for x in sweeps if x.scene is not None and ahead.get(blank(x, "").place) is None]
     share = budget / 2 * kept.team.workers / max(1, len(left))
     spent = 0.0
     parts = [partial(errors_ahead, scene, sweep.label, sweep.points, share) for sweep in left]
     with closing(kept.carried_out(parts)) as measured:
         for j, points, by in measured:
             sweep = left[j]
-            ahead.update({(x.method, x.steps, x.tolerance): x for x in points})
+            ahead.update({x.place: x for x in points})
             spent += sum(point.spent_seconds for point in points) / kept.team.workers
             both, took = [*sweep.points, *points], before + spent
             kept.keep(points_of(scene), str(sweep.label), both, by, study_seconds=took)
@@ -178,7 +172,7 @@ def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
         return 0.0
     for point in points:
         if point.complete and not point.run_seconds_repeats:
-            ahead[point.method, point.steps, point.tolerance] = point
+            ahead[point.place] = point
         # what the end of that call cut off is this one's to measure
         elif point.outcome != CUT_OFF:
             take(sweep, point)
@@ -231,7 +225,7 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead
     for sweep in sweeps:
         tell(f"{sweep.label}, errors")
         began = perf_counter()
-        points.append(ahead.get(_place(sweep)) or _errors(sweep, known))
+        points.append(ahead.get(blank(sweep, "").place) or _errors(sweep, known))
         spent.append(perf_counter() - began)
     tell(f"timing {count(len(sweeps), 'method')} in turn")
     clocks = [

@@ -12,6 +12,8 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.tables import Rows
 
+Place = tuple[str, int | None, float | None]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
@@ -35,6 +37,11 @@ class Point:
     force_calls: int | None = None
     spent_seconds: float = 0.0
     """Seconds that all of its runs took, with their starts and comparisons."""
+
+    @property
+    def place(self) -> Place:
+        """Which point of all it is."""
+        return self.method, self.steps, self.tolerance
 
     @property
     def complete(self) -> bool:

@@ -86,9 +86,9 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
 def stored(path: Path) -> Stored:
     """What a store keeps of a run beside its trajectories."""
     # an unfinished run has trajectories beside the file that it will write
-    return Stored(
-        path=path, **(keeper.judged(path) if path.is_file() else {"verdicts": (), "comparison": None})
-    )
+    if not path.is_file():
+        return Stored(path=path, verdicts=(), comparison=None)
+    return Stored(path=path, verdicts=keeper.verdicts(path), comparison=keeper.comparison(path))
 
 
 def run(
