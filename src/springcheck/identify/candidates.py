@@ -54,8 +54,13 @@ def _shared(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     """The numbers that all candidates share, to 1e-9, or None."""
     if len({len(row) for row in rows}) > 1:
         return None
-    same = np.allclose(np.array(rows), np.array(rows[0]), rtol=1e-9, atol=0, equal_nan=True)
-    return rows[0] if same else None
+    first = rows[0]
+    same = all(
+        x == y or abs(x - y) <= 1e-9 * abs(y) or (math.isnan(x) and math.isnan(y))
+        for row in rows[1:]
+        for x, y in zip(row, first, strict=True)
+    )
+    return first if same else None
 
 
 def stated_stiffness(

@@ -17,7 +17,7 @@ import numpy as np
 
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
-from springcheck.identify.maps import unit
+from springcheck.identify.maps import table, unit
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.schemes import rotation
 
@@ -138,16 +138,31 @@ def _losses(family: Family) -> tuple[Floats, Floats]:
     return loss[first : last + 1][::-1], g[first : last + 1][::-1]
 
 
-def folded(family: Family, log_det: Floats, trace: Floats) -> tuple[Integers, Floats, Floats]:
-    """Steps of a splitting with friction that have these determinants and traces (c,): the number of each,
-    its a and its g.  The determinant is a function of g alone, and the trace a polynomial of a."""
-    loss, of = _losses(family)
-    within = np.flatnonzero((log_det > loss[0]) & (log_det < loss[-1]))
-    g = np.interp(log_det[within], loss, of)
-    degree = min(sum(kind == "drift" for kind, _ in family.stages), len(family.stages) // 2)
+@cache
+def _degree(family: Family) -> int:
+    """Degree of the trace of a splitting's step in a."""
+    kinds = [kind for kind, _ in family.stages]
+    return min(kinds.count("drift"), len(kinds) - kinds.count("drift") - kinds.count("friction"))
+
+
+def folded(
+    families: tuple[Family, ...], log_det: Floats, trace: Floats
+) -> tuple[Integers, Integers, Floats, Floats]:
+    """Steps of splittings with friction that have these determinants and traces (c,): the numbers of each
+    one's family and determinant, its a and its g.  The determinant is a function of g alone, and the trace a
+    polynomial of a, for all these families of one degree."""
+    parts = []
+    for k, family in enumerate(families):
+        loss, of = _losses(family)
+        within = np.flatnonzero((log_det > loss[0]) & (log_det < loss[-1]))
+        parts.append((np.full(len(within), k), within, np.interp(log_det[within], loss, of)))
+    which, at, g = (np.concatenate(x) for x in zip(*parts, strict=True))
+    degree = max(_degree(family) for family in families)
     nodes = np.arange(degree + 1.0)
-    steps = unit(family, np.tile(nodes, len(g)), np.repeat(g, degree + 1))
-    values = (steps[:, 0, 0] + steps[:, 1, 1]).reshape(len(g), degree + 1) - trace[within, None]
+    steps = table(families).unit(
+        np.repeat(which, degree + 1), np.tile(nodes, len(g)), np.repeat(g, degree + 1)
+    )
+    values = (steps[:, 0, 0] + steps[:, 1, 1]).reshape(len(g), degree + 1) - trace[at, None]
     powers = np.asarray(values @ np.linalg.inv(np.vander(nodes)).T, np.float64)
     companion = np.zeros((len(g), degree, degree))
     companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1
@@ -155,7 +170,7 @@ def folded(family: Family, log_det: Floats, trace: Floats) -> tuple[Integers, Fl
     a = np.linalg.eigvals(companion)
     # at the largest phase two of them meet, and rounding makes them complex
     row, column = np.nonzero(np.abs(a.imag) <= MEETING * np.abs(a.real))
-    return within[row], np.asarray(a.real[row, column]), g[row]
+    return which[row], at[row], np.asarray(a.real[row, column]), g[row]
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, partial
 from typing import Any, TypeAlias
@@ -26,6 +26,9 @@ KINDS: dict[str, tuple[float, float, float]] = {
 """(e, i, x) of a kick over the share c: v' = ((1 - e c g) v - c a q)/(1 + i c g), then times exp(-x c g)."""
 
 Selected: TypeAlias = Integers | int
+
+MANY = 1000
+"""Plans of a table that are kept."""
 
 WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
 
@@ -61,6 +64,16 @@ def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
     return out
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is to be done for some of a table's families: the number of `one`, where it is one alone; kinds of
+    map other than stages, and whose they are, None where they are all; numbers of slots that are not 0."""
+
+    one: int | None
+    kinds: tuple[tuple[str, NDArray[np.bool_] | None], ...]
+    slots: dict[np.dtype[Any], list[tuple[Reals | None, ...]]]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
     """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
@@ -77,38 +90,60 @@ class Table:
     path: Floats
     held: NDArray[np.bool_]
     damped: bool
+    plans: dict[bytes, Plan] = field(default_factory=dict)
+    """What is to be done for some of the families, by which they are."""
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        present = np.zeros(len(self.families), dtype=bool)
-        present[which] = True
-        # one number of one family, and a row of those of several
-        n: Selected = which if np.count_nonzero(present) > 1 else int(which[0]) if len(which) else which
-        for kind, members in self.kinds:
-            those = members[present]
-            if np.all(those):
+        plan = self._plan(which)
+        n: Selected = which if plan.one is None else plan.one
+        for kind, members in plan.kinds:
+            if members is None:
                 out[:] = self._special(kind, n, a, g)
-            elif np.any(those):
+            else:
                 at = np.flatnonzero(members[which])
                 out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        for slot, flags in zip(self.slots, np.any(self.flags[:, :, present], axis=2), strict=True):
-            e, i, x, b, d = slot[a.dtype]
-            explicit, implicit, decays, kicks, drifts = flags
-            if damped and explicit:
+        for e, i, x, b, d in plan.slots[a.dtype]:
+            if damped and e is not None:
                 v *= 1 - e[n] * g
-            if kicks:
+            if b is not None:
                 v -= b[n] * a * q
-            if damped and implicit:
+            if damped and i is not None:
                 v /= 1 + i[n] * g
-            if damped and decays:
+            if damped and x is not None:
                 v *= np.exp(-x[n] * g)
-            if drifts:
+            if d is not None:
                 q += d[n] * v
         return out.transpose(2, 0, 1)
+
+    def _plan(self, which: Integers) -> Plan:
+        """What is to be done for the families of these candidates."""
+        present = np.zeros(len(self.families), dtype=bool)
+        present[which] = True
+        key = present.tobytes()
+        if key not in self.plans:
+            if len(self.plans) > MANY:
+                self.plans.clear()
+            kinds = [(kind, None if np.all(those[present]) else those) for kind, those in self.kinds
+                     if np.any(those[present])]  # fmt: skip
+            used = np.any(self.flags[:, :, present], axis=2)
+            self.plans[key] = Plan(
+                one=int(which[0]) if np.count_nonzero(present) == 1 else None,
+                kinds=tuple(kinds),
+                slots={
+                    x: [
+                        tuple(y if z else None for y, z in zip(slot[x], row, strict=True))
+                        for slot, row in zip(self.slots, used, strict=True)
+                        if np.any(row)
+                    ]
+                    for x in WIDTHS
+                },
+            )
+        return self.plans[key]
 
     def _special(self, kind: str, n: Selected, a: Reals, g: Reals) -> Reals:
         if kind == "held":
@@ -245,19 +280,23 @@ def power(matrices: Reals, strides: Floats) -> Reals:
     root = np.sqrt(np.abs(found.determinant))
     turning = found.angle > 0
     if np.all(turning):
-        angle, sign = found.angle, np.ones_like(root)
-        even_s, even_1 = np.cos(angle * s), np.cos(angle)
-        odd = np.sin(angle * s) / np.sin(angle)
-    else:
-        angle = np.where(turning, found.angle, 0)
-        growth = np.where(turning, 0, found.growth)
-        even_s, even_1 = (np.where(turning, np.cos(angle * x), np.cosh(growth * x)) for x in (s, 1))
-        odd_1 = np.where(turning, np.sin(angle), np.sinh(growth))
-        odd_s = np.where(turning, np.sin(angle * s), np.sinh(growth * s))
-        flat = odd_1 == 0
-        odd = np.where(flat, s, odd_s / np.where(flat, 1, odd_1))
-        # real eigenvalues of the sign of the trace: factor the sign out, take it to the power s
-        sign = np.where(turning, 1, found.sign).astype(matrices.dtype)
+        # M/sqrt(d) = cos + sin N, and its powers likewise
+        odd = np.sin(found.angle * s) / np.sin(found.angle)
+        size = root**s
+        out = matrices * (odd * size / root)[:, None, None]
+        rest = size * (np.cos(found.angle * s) - odd * np.cos(found.angle))
+        out[:, 0, 0] += rest
+        out[:, 1, 1] += rest
+        return np.asarray(out)
+    angle = np.where(turning, found.angle, 0)
+    growth = np.where(turning, 0, found.growth)
+    even_s, even_1 = (np.where(turning, np.cos(angle * x), np.cosh(growth * x)) for x in (s, 1))
+    odd_1 = np.where(turning, np.sin(angle), np.sinh(growth))
+    odd_s = np.where(turning, np.sin(angle * s), np.sinh(growth * s))
+    flat = odd_1 == 0
+    odd = np.where(flat, s, odd_s / np.where(flat, 1, odd_1))
+    # real eigenvalues of the sign of the trace: factor the sign out, take it to the power s
+    sign = np.where(turning, 1, found.sign).astype(matrices.dtype)
     normal = matrices * (sign / root)[:, None, None]
     out = odd[:, None, None] * normal
     rest = even_s - odd * even_1

@@ -322,7 +322,7 @@ def _starts(
             parts.append((np.full(len(s), k), s, turns, a, 1 + (1 - root**2) / a))
         elif is_folded(family):
             log_det = found.log_det / s
-            index, a, g = folded(family, log_det, 2 * np.exp(log_det / 2) * np.cos(phase))
+            _, index, a, g = folded((family,), log_det, 2 * np.exp(log_det / 2) * np.cos(phase))
             good = (a > 0) & (g > 0)
             index, a, g = index[good], a[good], g[good]
             parts.append((np.full(len(a), k), s[index], turns[index], a, g))

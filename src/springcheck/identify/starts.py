@@ -101,11 +101,9 @@ def starts(
         if family.held
     ]
     wanted = GUESSED + (LOST[0] if far else SIDE[0] * error)
-    parts += [
-        _folded_starts(every, k, root, wanted, free_scale=terms.mass_unknown)
-        for k, family in enumerate(every.families)
-        if is_folded(family)
-    ]
+    splittings = np.flatnonzero([is_folded(family) for family in every.families])
+    if len(splittings):
+        parts.append(_folded_starts(every, splittings, root, wanted, free_scale=terms.mass_unknown))
     of_curves, bases = keys(every.families)
     if of_curves:
         curve = curves(of_curves)
@@ -164,20 +162,20 @@ def _held_starts(k: int, root: Roots, room: float) -> Starts:
     return np.full(len(index), k), index, a, g, np.abs(g)
 
 
-def _folded_starts(every: Table, k: int, root: Roots, room: float, *, free_scale: bool) -> Starts:
-    """Guesses for a splitting whose phase turns back: what has the determinant and the trace of a root."""
+def _folded_starts(
+    every: Table, splittings: Integers, root: Roots, room: float, *, free_scale: bool
+) -> Starts:
+    """Guesses for splittings whose phase turns back: what has the determinant and the trace of a root."""
     upper = root.normal[1]
     likely = np.flatnonzero(free_scale | (np.abs(upper) <= (1 + room) * (DRIFT + np.abs(root.log_det))))
-    entries = root.entries[likely]
-    index, a, g = folded(every.families[k], root.log_det[likely], entries[:, 0, 0] + entries[:, 1, 1])
-    off = np.abs(every.unit(np.full(len(a), k), a, g)[:, 0] - entries[index, 0])
-    good = (
-        (a > 0)
-        & (off[:, 0] <= room)
-        & (free_scale | (off[:, 1] <= room * (1 + np.abs(upper[likely][index]))))
-    )
+    entries, families = root.entries[likely], tuple(every.families[k] for k in splittings)
+    of, index, a, g = folded(families, root.log_det[likely], entries[:, 0, 0] + entries[:, 1, 1])
+    which = splittings[of]
+    off = np.abs(every.unit(which, a, g)[:, 0] - entries[index, 0])
+    good = (a > 0) & (off[:, 0] <= room)
+    good &= free_scale | (off[:, 1] <= room * (1 + np.abs(upper[likely][index])))
     index, a, g = likely[index[good]], a[good], g[good]
-    return np.full(len(a), k), index, a, g, np.full(len(a), BESIDE)
+    return which[good], index, a, g, np.full(len(a), BESIDE)
 
 
 GRID = np.concatenate([-np.geomspace(16, 1e-8, 400), np.geomspace(1e-8, 60, 600)])
@@ -238,7 +236,7 @@ def _folded_real(family: Family, found: Map) -> tuple[Floats, Floats, Floats]:
     values = np.sort(np.real(np.linalg.eigvals(found.entries.astype(np.float64))))
     s = np.arange(1.0, 5.0)[:: 1 if values[0] > 0 else 2]
     each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
-    index, a, g = folded(family, np.log(np.prod(each, axis=1)), np.sum(each, axis=1))
+    _, index, a, g = folded((family,), np.log(np.prod(each, axis=1)), np.sum(each, axis=1))
     return s[index], a, g
 
 

@@ -90,7 +90,9 @@ def rotation(matrices: Extended) -> Rotation:
     angle = np.where(turning, np.arctan2(root, half_trace), 0)
     # a step that reverses orientation (determinant <= 0) has no such growth
     hyperbolic = (minus < 0) & (determinant > 0)
-    growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
+    growth = np.zeros_like(root)
+    if np.any(hyperbolic):
+        growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
     return Rotation(
         determinant=determinant,
         angle=angle,
