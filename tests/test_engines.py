@@ -58,7 +58,7 @@ def test_two_engines_of_one_scheme_move_alike(pair: tuple[str, str, float], name
 
 
 def _rest(scene: Scene) -> np.ndarray:
-    modes = exact.modes(scene)
+    modes = scene.system.modes
     q, _ = modes.out_of(modes.centre(), np.zeros_like(modes.w2))
     return np.asarray(q, np.float64)
 

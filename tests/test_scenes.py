@@ -260,7 +260,7 @@ def test_groups_of_different_laws_move_as_each_does_alone() -> None:
 
 def test_the_modes_of_a_uniform_chain_are_sines() -> None:
     scene = shortened("long-chain")
-    waves = exact.modes(scene)
+    waves = scene.system.modes
     assert waves.waves
     w2, vectors = normal._eigen(np.asarray(scene.system.hessian(scene.q) / scene.m[0], np.longdouble))
     assert np.max(np.abs(w2 - waves.w2)) < 16 * scene.n * exact.EPS * np.max(w2)
@@ -393,7 +393,7 @@ def test_a_circuit_is_an_oscillator_of_charge_and_flux() -> None:
     assert scene.kind == "circuit"
     assert scene.units == "si"
     assert scene.m.tolist() == [3.3e-3]
-    modes = exact.modes(scene)
+    modes = scene.system.modes
     assert float(modes.w2[0]) == pytest.approx(1 / (3.3e-3 * 47e-9), rel=1e-15)
     assert float(modes.rate[0]) == pytest.approx(22.0 / 3.3e-3, rel=1e-15)
     left = {one.method: one.reason for one in session.choose(scene, ())[1]}
@@ -407,7 +407,7 @@ def test_two_loops_share_a_capacitor() -> None:
     second = "[[inductor]]\ninductance = 3.3e-3\n\n[[capacitor]]\nloops = [1]\ncapacitance = 47e-9\n\n"
     shared = "[[capacitor]]\nloops = [0, 1]\ncapacitance = 10e-9\n\n"
     scene = scenes.parse(text.replace("[time]", second + shared + "[time]"), name="two")
-    w2 = np.sort(exact.modes(scene).w2)
+    w2 = np.sort(scene.system.modes.w2)
     expected = np.array([1 / 47e-9, 1 / 47e-9 + 2 / 10e-9]) / 3.3e-3
     assert np.max(np.abs(w2 / expected - 1)) < 1e-15
 
@@ -475,7 +475,7 @@ def test_a_chain_of_any_length_stands_between_walls() -> None:
     for masses in (1, 2, 5):
         wave = "[[chain.wave]]\nmode = 1\namplitude = 0.7\n\n[time]\nstep = 0.1\nsteps = 10\n"
         scene = scenes.parse(text[0].replace("1000", str(masses)) + wave, name="x")
-        w2 = np.sort(exact.modes(scene).w2)
+        w2 = np.sort(scene.system.modes.w2)
         wanted = 4 * 2.9 / 1.3 * np.sin(np.pi * np.arange(1, masses + 1) / (2 * (masses + 1))) ** 2
         assert np.max(np.abs(w2 - wanted)) < 1e-14
 

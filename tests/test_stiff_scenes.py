@@ -56,7 +56,7 @@ def as_stated(name: str, row: dict[str, Any]) -> Scene:
 @pytest.mark.parametrize(("name", "row"), ROWS)
 def test_the_true_motion_is_the_matrix_exponential(name: str, row: dict[str, Any]) -> None:
     scene = as_stated(name, row)
-    found = exact.modes(scene)
+    found = scene.system.modes
     q, p = exact.true_motion(scene, np.array([row["steps"]]), scene.step)
     wanted_q, wanted_p = extended(row["q"]), extended(row["p"])
     t = row["steps"] * scene.step
@@ -75,7 +75,7 @@ def test_the_true_motion_is_the_matrix_exponential(name: str, row: dict[str, Any
 
 @pytest.mark.parametrize("row", reference("two-scales")["frequencies"], ids=lambda row: row["ratio"])
 def test_both_frequencies_of_two_scales_are_right_to_their_own_size(row: dict[str, Any]) -> None:
-    found = np.sort(exact.modes(as_stated("two-scales", row)).w2)
+    found = np.sort(as_stated("two-scales", row).system.modes.w2)
     wanted = np.sort(extended(row["w2"]))
     assert np.max(np.abs(found / wanted - 1)) <= 16 * exact.EPS
 
@@ -100,7 +100,7 @@ def test_graded_modes_find_a_chain_over_twelve_decades_and_its_free_translation(
         name="graded", title="", source="", m=m, q=rng.normal(size=n), p=rng.normal(size=n),
         terms=(spring,), step=0.1, steps=10,
     )  # fmt: skip
-    found = exact.modes(scene)
+    found = scene.system.modes
     assert np.count_nonzero(found.w2 == 0) == 1
     assert found.vectors is not None
     assert np.max(np.abs(found.vectors.T @ found.vectors - np.eye(n))) < 64 * exact.EPS

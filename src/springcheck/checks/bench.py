@@ -11,7 +11,6 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.checks.case import Case
-from springcheck.physics import exact
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -62,12 +61,10 @@ class Bench:
         Copy 0 starts in equilibrium; copies 1..n have one position pushed, the rest one momentum.
         """
         scene, n = self.scene, self.scene.n
-        modes = exact.modes(scene)
-        rest, _ = modes.out_of(modes.centre(), np.zeros(n, dtype=np.longdouble))
         unit = float(scene.system.norm.unit) or 1.0
         pushes = np.concatenate([np.sqrt(2 / self.stiffness) * unit, np.sqrt(2 * scene.m) * unit])
         state = np.zeros((2 * n + 1, 2 * n))
-        state[:, :n] = rest.astype(np.float64)
+        state[:, :n] = scene.system.modes.rest.astype(np.float64)
         state[1:] += np.diag(pushes)
         start = scene.system.from_states(state[:, :n], state[:, n:])
         return Case(trajectory=self.run(start, self.label), scene=start), state[

@@ -49,8 +49,8 @@ def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
     """Energy of each mode (f, n) at states (f, n) [M L2/T2]."""
     modes = scene.system.modes
     with np.errstate(over="ignore", invalid="ignore"):
-        y, v = modes.into(q, p)
-        return np.asarray((v * v + modes.w2 * (y - modes.centre()) ** 2) / 2, np.float64)
+        y, v = modes.about_centres(q, p)
+        return np.asarray((v * v + modes.w2 * y**2) / 2, np.float64)
 
 
 def _modes(runs: Runs, exact: Exact) -> Figure:
@@ -101,7 +101,7 @@ def _mode(axes: Axes, runs: Runs, found: Mapping[str, Floats], true: Floats | No
 def _wave(runs: Runs, exact: Exact) -> Figure:
     """Displacement over particle and time: the exact wave, and what each scheme's differs from it."""
     scene, modes, longest = runs.scene, runs.scene.system.modes, runs.longest
-    rest = np.asarray(modes.out_of(modes.centre(), np.zeros_like(modes.w2))[0], np.float64)
+    rest = np.asarray(modes.rest, np.float64)
     dt, t_unit = runs.time_unit
     true = np.asarray(exact.at(longest)[0], np.float64) - rest
     images = [("exact solution", longest.t, true)]

@@ -26,16 +26,11 @@ from springcheck.physics.exact.normal import Modes
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
 
-__all__ = ["EPS", "Modes", "has_true_motion", "modes", "true_motion", "uncertainty"]
+__all__ = ["EPS", "Modes", "has_true_motion", "true_motion", "uncertainty"]
 
 
 MOST_NUMBERS = 1 << 20
 """Positions that are worked out at a time, in extended precision."""
-
-
-def modes(scene: Scene) -> Modes:
-    """Normal modes of a linear scene.  ValueError where there are none (see `System.has_modes`)."""
-    return scene.system.modes
 
 
 def has_true_motion(scene: Scene) -> bool:

@@ -6,6 +6,7 @@ away (Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so none of them stands for a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,6 @@ from springcheck.checks.steps import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
-from springcheck.physics.norm import Norm
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
@@ -26,6 +26,10 @@ hardly moves, the rounding of the others is a large angle."""
 FRAMES = 4096
 """Most frames at which a run is compared with the exact solution.  They stand closer than a 250th of a
 period as long as the run has fewer than 16, and every finer step meets the same instants."""
+
+
+Motion = Callable[[Integers], tuple[Extended, Extended]]
+"""Numbers of steps (f,) -> q and p (f, n)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +55,15 @@ class Truth:
     """The exact solution of a scene, and what is worth computing once for all runs of it."""
 
     scene: Scene
-    norm: Norm
-    modes: exact.Modes | None
-    """Modes of a scene that has them."""
     turning: exact.Modes
     """Modes of its springs alone, by which the phase is told."""
     w: float
     """Largest frequency along the motion [1/T], 0 where nothing turns."""
-    duration: float
+
+    @property
+    def duration(self) -> float:
+        """From the start to the end [T]."""
+        return self.scene.step * self.scene.steps
 
     @property
     def angle(self) -> float:
@@ -82,31 +87,19 @@ def truth(scene: Scene) -> Truth:
             f"scene {scene.name}: no closed form of its exact solution is known, so errors "
             "cannot be measured; a study of precision needs springs, or quartic potentials without couplings"
         )
-    norm = scene.system.norm
-    if not norm.unit > 0:
+    if not scene.system.norm.unit > 0:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
-    known = exact.modes(scene) if scene.system.has_modes else None
-    w = _frequency(scene, known)
+    w = _frequency(scene)
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
-    springs = (WallSpring, Spring)
-    turning = exact.modes(
-        replace(scene, terms=tuple(term for term in scene.terms if isinstance(term, springs)))
-    )
-    return Truth(
-        scene=scene,
-        norm=norm,
-        modes=known,
-        turning=turning,
-        w=w,
-        duration=scene.step * scene.steps,
-    )
+    springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring))
+    return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, w=w)
 
 
-def _frequency(scene: Scene, modes: exact.Modes | None) -> float:
+def _frequency(scene: Scene) -> float:
     """The largest w along the motion: from the modes, or from the stiffness on the true path."""
-    if modes is not None:
-        return float(np.sqrt(np.maximum(np.max(modes.w2), 0)))
+    if scene.system.has_modes:
+        return float(np.sqrt(np.maximum(np.max(scene.system.modes.w2), 0)))
     samples = 256
     q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
     root = np.sqrt(scene.m)
@@ -133,25 +126,25 @@ class Errors:
         size = np.hypot(u, v)[0]
         self._clear = (modes.w2 > 0) & (size >= CARRIES * np.max(size)) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
-        self._rounding = _Rounding.of(judged or known.scene, scheme, h)
+        self._own = _own_motion(judged or known.scene, scheme, h)
         self._rounded = 0.0
 
     def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
         """Take frames into account."""
-        known = self._truth
+        known, norm = self._truth, self._truth.scene.system.norm
         steps = np.arange(self._frame, self._frame + len(t)) * self._every
         self._frame += len(t)
         true_q, true_p = known.at(steps, self._h)
         with np.errstate(over="ignore", invalid="ignore"):
-            error = known.norm(q - true_q, p - true_p)
+            error = norm(q - true_q, p - true_p)
             # nothing below what is known of the exact solution is reported as an error
             error = np.maximum(error, exact.uncertainty(known.scene, float(steps[-1]) * self._h))
             wide_q, wide_p = q.astype(np.longdouble), p.astype(np.longdouble)
             energy_off = known.scene.system.energy(wide_q, wide_p) - known.scene.system.energy(true_q, true_p)
-            off = np.abs(energy_off) / known.norm.unit**2
-            if self._rounding is not None:
-                own_q, own_p = self._rounding.at(steps)
-                rounded = float(np.max(known.norm(q - own_q, p - own_p)))
+            off = np.abs(energy_off) / norm.unit**2
+            if self._own is not None:
+                own_q, own_p = self._own(steps)
+                rounded = float(np.max(norm(q - own_q, p - own_p)))
                 self._rounded = float(np.fmax(self._rounded, rounded))
         # not max(), which leaves out what is no number
         self._largest = float(np.maximum(self._largest, np.max(error)))
@@ -167,14 +160,14 @@ class Errors:
             end_error=self._end,
             phase_error=self._phase if len(self._last) else None,
             energy_error=self._energy,
-            rounding_error=None if self._rounding is None else self._rounded,
+            rounding_error=None if self._own is None else self._rounded,
         )
 
     def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
         """Mode coordinates in which the exact solution turns clockwise on circles, (f, n) each."""
         modes = self._truth.turning
-        y, v = modes.into(q, p)
-        return np.sqrt(np.abs(modes.w2)) * (y - modes.centre()), v
+        y, v = modes.about_centres(q, p)
+        return np.sqrt(np.abs(modes.w2)) * y, v
 
     def _turn(self, q: Floats, p: Floats, true_q: Extended, true_p: Extended) -> None:
         if not len(self._last):
@@ -191,33 +184,22 @@ class Errors:
             self._phase = float(worst)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Rounding:
-    """The scheme's own motion in exact arithmetic: what differs from it is rounding, at any step."""
+def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None:
+    """The scheme's own motion in exact arithmetic: what differs from it is rounding, at any step.
 
-    scene: Scene
-    modes: exact.Modes
-    matrices: Extended
-    symplectic: bool
-
-    @classmethod
-    def of(cls, scene: Scene, scheme: schemes.Scheme, h: float) -> _Rounding | None:
-        """None for an adaptive solver, and without a closed form that rounds less than the engine."""
-        if not WIDE or not scheme.one_step or scheme.mixes or not scene.system.has_modes:
-            return None
-        modes = exact.modes(scene)
-        if np.any((modes.w2 == 0) & (modes.pull != 0)):
-            return None
-        matrices = schemes.matrix(scheme, h=h, m=np.ones(1), k=modes.w2, c=modes.rate)
-        # below that, friction contracts area in one step more than extended precision has digits for
-        if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
-            return None
-        symplectic = scheme.symplectic and not scene.system.is_damped
-        return cls(scene=scene, modes=modes, matrices=matrices, symplectic=symplectic)
-
-    def at(self, steps: Integers) -> tuple[Extended, Extended]:
-        y, v = self.modes.into(self.scene.q, self.scene.p)
-        y, v = schemes.propagate(
-            self.matrices, y - self.modes.centre(), v, steps, area_preserving=self.symplectic
-        )
-        return self.modes.out_of(y + self.modes.centre(), v)
+    None for an adaptive solver, and without a closed form that rounds less than the engine.
+    """
+    if not WIDE or not scheme.one_step or scheme.mixes or not scene.system.has_modes:
+        return None
+    modes = scene.system.modes
+    if np.any((modes.w2 == 0) & (modes.pull != 0)):
+        return None
+    matrices = schemes.matrix(scheme, h=h, m=np.ones(1), k=modes.w2, c=modes.rate)
+    # below that, friction contracts area in one step more than extended precision has digits for
+    if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
+        return None
+    start = modes.about_centres(scene.q, scene.p)
+    symplectic = scheme.symplectic and not scene.system.is_damped
+    return lambda steps: modes.from_centres(
+        *schemes.propagate(matrices, *start, steps, area_preserving=symplectic)
+    )

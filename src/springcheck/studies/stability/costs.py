@@ -86,7 +86,7 @@ def step_for(found: Scene, label: Label) -> float:
     scheme = schemes.scheme(engines.method(label).scheme)
     held = found.step
     if np.isfinite(scheme.limit):
-        fastest = float(np.sqrt(np.max(exact.modes(found).w2)))
+        fastest = float(np.sqrt(np.max(found.system.modes.w2)))
         held = min(held, (scheme.limit / 2 or 0.1) / fastest)
         if not schemes.FRICTION & {kind for kind, _ in scheme.stages} and found.system.is_damped:
             # friction in the force of an explicit method: h c/m < 2
@@ -148,7 +148,7 @@ def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
 
 def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
     """Distance of a state from the true slow motion at the end, in units of the slow amplitude."""
-    modes = exact.modes(found)
+    modes = found.system.modes
     j = int(np.argmin(modes.w2))
     w = np.sqrt(modes.w2[j])
     true = modes.into(*exact.true_motion(found, np.array([steps]), found.step))

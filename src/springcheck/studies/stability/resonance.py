@@ -15,7 +15,6 @@ import numpy as np
 from springcheck import engines, schemes
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
-from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
@@ -47,7 +46,7 @@ class Resonance:
 
 def fast_frequency(scene: Scene) -> float:
     """Angular frequency of the scene's fastest mode with its fast springs alone [1/T]."""
-    return float(np.sqrt(np.max(exact.modes(replace(scene, terms=scene.system.fast)).w2)))
+    return float(np.sqrt(np.max(replace(scene, terms=scene.system.fast).system.modes.w2)))
 
 
 def serves(scene: Scene, label: Label) -> bool:
