@@ -97,13 +97,14 @@ def least_squares(columns: Extended, right: Extended) -> Extended:
 
 def _sizes(z: Extended) -> Extended:
     """Sizes (2,) of the two components over one turn, also where the motion grows or decays."""
-    size = np.sqrt(np.mean(z**2, axis=0))
+    square = z**2
+    size = np.sqrt(square.mean(axis=0))
     size = np.where(size == 0, 1, size)
     for _ in range(3):
-        norm = np.sum((z / size) ** 2, axis=1, keepdims=True)
-        share = np.mean(z**2 / np.where(norm == 0, 1, norm), axis=0)
+        norm = square @ size**-2
+        share = (square / np.where(norm == 0, 1, norm)[:, None]).mean(axis=0)
         size = np.where(share == 0, size, np.sqrt(share))
-    return np.asarray(size * np.sqrt(np.mean(np.sum((z / size) ** 2, axis=1)) / 2))
+    return np.asarray(size * np.sqrt((square @ size**-2).mean() / 2))
 
 
 def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map:
@@ -118,8 +119,8 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     is not judged by its largest states alone.
     """
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
-    size = _sizes(z - np.mean(z, axis=0))
-    size = np.minimum(size, _sizes(z)) if np.all(_sizes(z) < 2 * size) else size
+    size, whole = _sizes(z - np.mean(z, axis=0)), _sizes(z)
+    size = np.minimum(size, whole) if np.all(whole < 2 * size) else size
     z = z / size
     chosen = np.ones(len(z) - 1, dtype=bool) if kept is None else kept
     pairs = int(np.count_nonzero(chosen))
@@ -238,7 +239,8 @@ def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
     noise, length = (np.maximum(x[:-1], x[1:]) for x in (noise, length))
     # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
     moving = length > 0
-    lowest = float(np.quantile(noise[moving] / length[moving], 0.1)) if np.any(moving) else 0.0
+    shares = np.sort(noise[moving] / length[moving])
+    lowest = float(np.interp(0.1 * (len(shares) - 1), np.arange(len(shares)), shares)) if len(shares) else 0.0
     noise = np.maximum(noise, lowest / 3 * length)
     weight = 1 / np.maximum(noise, LEAST_NOISE * np.max(noise))
     about = states[:-1] - rest

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
@@ -293,30 +292,28 @@ def _best(
     physical = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=0)
     if every.damped and not target.terms.growing:
         physical &= (values[1] > 0) | every.held[x.which]
-    masses: Any = target.log_masses(x, values)
+    masses = target.log_masses(x, values)
     at = np.flatnonzero(physical)
     refused = chi2 > most(freedom)
     # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
     close = np.where(refused | (freedom > 2), chi2, np.abs(values[0])) if target.terms.mass_unknown else chi2
     order = at[np.lexsort((close[at], x.turns[at], refused[at], x.s[at], x.which[at], x.of[at]))]
-    seen: set[tuple[int, str, int]] = set()
-    for i in order.tolist():
-        name, stride = every.families[x.which[i]].name, int(x.s[i])
-        key = int(x.of[i]), name, stride
-        if key in seen:
-            continue
-        seen.add(key)
-        out[key[0]][name, stride] = Match(
-            family=name,
-            stride=stride,
-            turns=int(x.turns[i]),
-            a=float(values[0, i]),
-            a_error=float(errors[0, i]),
-            g=float(values[1, i]),
-            g_error=float(errors[1, i]),
-            log_mass=float(masses[i]),
-            mass_error=float(errors[2, i]),
-            chi2=float(chi2[i]),
-            freedom=freedom,
-            predicted=tuple(entries[:, i].astype(np.longdouble)),
-        )
+    keys = np.array([x.of, x.which, x.s])[:, order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = np.any(keys[:, 1:] != keys[:, :-1], axis=0)
+    chosen = order[first]
+    (of, which, s), numbers = (
+        keys[:, first].astype(int),
+        np.array([values[0], values[1], masses, chi2, *errors]),
+    )
+    rows = zip(
+        of.tolist(), which.tolist(), s.tolist(), x.turns[chosen].astype(int).tolist(),
+        numbers[:, chosen].T.astype(np.float64).tolist(), entries[:, chosen].T.astype(np.longdouble),
+        strict=True,
+    )  # fmt: skip
+    for i, k, stride, turns, (a, g, log_mass, size, a_error, g_error, mass_error), predicted in rows:
+        name = every.families[k].name
+        out[i][name, stride] = Match(
+            family=name, stride=stride, turns=turns, a=a, a_error=a_error, g=g, g_error=g_error,
+            log_mass=log_mass, mass_error=mass_error, chi2=size, freedom=freedom, predicted=tuple(predicted),
+        )  # fmt: skip

@@ -133,7 +133,7 @@ def orbit(z: Extended, quanta: Floats, pairs: Extended, *, constant: bool) -> Or
 
 def repeats(z: Extended) -> float:
     """How often each state comes back: roundings that repeat with the motion do not average away."""
-    return len(z) / len(np.unique(z.astype(np.float64), axis=0))
+    return len(z) / len(np.unique(z.astype(np.float64) @ [1, 1j]))
 
 
 def _fed_back(z: Extended, weights: Floats, pairs: Extended) -> float:

@@ -8,7 +8,7 @@ is those forces; noise of the same size, or an error that goes with anything els
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -159,6 +159,11 @@ def reproduced(
     return False
 
 
+@cache
+def _stages(family: Family) -> tuple[tuple[str, float], ...]:
+    return tuple((kind, float(number(part, np.longdouble))) for kind, part in family.stages)
+
+
 def _step(
     family: Family, q: Floats, v: Floats, pull: Callable[[Floats], Floats], g: Floats
 ) -> tuple[Floats, Floats]:
@@ -174,12 +179,14 @@ def _step(
             slopes.append((y, pull(x) - inside * y))
         for share, (dx, dy) in zip(scheme.b, slopes, strict=True):
             q, v = q + float(share) * dx, v + float(share) * dy
-    for kind, part in family.stages:
-        c = float(number(part, np.longdouble))
+    for kind, c in _stages(family):
         if kind == "drift":
             q = q + c * v
-        else:
-            before, after, decay = KINDS[kind]
-            force = 0 if kind == "friction" else pull(q)
-            v = ((1 - before * c * g) * v + c * force) / (1 + after * c * g) * np.exp(-decay * c * g)
+            continue
+        if kind == "kick":
+            v = v + c * pull(q)
+            continue
+        before, after, decay = KINDS[kind]
+        force = 0 if kind == "friction" else pull(q)
+        v = ((1 - before * c * g) * v + c * force) / (1 + after * c * g) * np.exp(-decay * c * g)
     return q, v

@@ -356,10 +356,12 @@ def separation(maps: list[Map], one: Joint, other: Joint) -> float:
     """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
     total = 0.0
     for found, a, b in zip(maps, one.parts, other.parts, strict=True):
+        if "inverse" not in found.found:
+            error = np.sqrt(np.diag(found.covariance))
+            even = found.covariance / error[:, None] / error[None, :]
+            found.found["inverse"] = np.linalg.pinv(even, hermitian=True) / error[:, None] / error[None, :]
         off = np.array(a.predicted) - np.array(b.predicted)
-        error = np.sqrt(np.diag(found.covariance))
-        even = found.covariance / error[:, None] / error[None, :]
-        total += float((off / error) @ np.linalg.pinv(even, hermitian=True) @ (off / error))
+        total += float(off @ found.found["inverse"] @ off)
     return math.sqrt(max(total, 0.0))
 
 
