@@ -28,7 +28,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SERVED]:
 @pytest.mark.parametrize("kind", hostile.KINDS)
 def test_a_hostile_store_does_no_harm(kind: str, served: SERVED, monkeypatch: pytest.MonkeyPatch) -> None:
     place, server = served
-    # each of two arrays above the memory allowed, the file above what is checked before it is shown
+    # a short form: a fifth of the text; each of two arrays above the memory allowed, and the file above what
+    # is checked before it is shown
+    monkeypatch.setattr(hostile, "REPEATED", hostile.REPEATED // 5)
     monkeypatch.setattr(hostile, "SPARSE", max(2 * campaign.MEMORY, checking.LONGEST_CHECK) + (1 << 20))
     number = list(hostile.KINDS).index(kind)
     # every second one with a seal; every eighth is drawn, which takes as long as all other commands together

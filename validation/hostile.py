@@ -201,9 +201,13 @@ def a_label_of_sixty_thousand_characters(file: Any, rng: random.Random, folder: 
         file.move(f"{tree}/{LABEL}", f"{tree}/{long}")
 
 
+REPEATED = 9_000_000
+"""Times that a word stands in a text."""
+
+
 @kind
 def a_text_of_many_megabytes(file: Any, rng: random.Random, folder: Path) -> None:
-    text = rng.choice(["x", "[[spring]]\n", "a = [", "# ½\n"]) * 9_000_000
+    text = rng.choice(["x", "[[spring]]\n", "a = [", "# ½\n"]) * REPEATED
     rng.choice([file, file[f"parameters/{LABEL}"]]).attrs.create("scene", text, dtype=h5py.string_dtype())
 
 

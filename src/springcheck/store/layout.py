@@ -184,9 +184,7 @@ def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]
         write_attributes(base, {"units_are": REDUCED})
     arrays = {name: _contiguous(file, column) for name, column in found.items()}
     time, step = arrays["time"], arrays["step"]
-    write_attributes(
-        time, {"unit": unit["time"], "units": unit["time"], "long_name": _named("t", unit["time"], scene)}
-    )
+    write_unit(time, unit["time"], _named("t", unit["time"], scene))
     for name, array in arrays.items():
         if name in {"time", "step"}:
             continue
@@ -196,8 +194,7 @@ def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]
         write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
         if two:
             write_attributes(element, {"default_slice": [".", "0"]})
-        shown = _named(f"{name} of {label}", unit[name], scene)
-        write_attributes(array, {"unit": unit[name], "units": unit[name], "long_name": shown})
+        write_unit(array, unit[name], _named(f"{name} of {label}", unit[name], scene))
         _link(element, time, step)
     if scene.kind == "particles" and ("q" in found or "p" in found):
         _particles(file, label, scene, found, time, step)
@@ -245,9 +242,9 @@ def _particles(
     write_unit(group.create_dataset("mass", data=scene.m.astype("<f8")), unit["mass"])
 
 
-def write_unit(dataset: Any, unit: str) -> None:
-    """The unit under the names of H5MD and of NeXus."""
-    write_attributes(dataset, {"unit": unit, "units": unit})
+def write_unit(dataset: Any, unit: str, name: str = "") -> None:
+    """The unit under the names of H5MD and of NeXus, and what viewers write at an axis."""
+    write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
 
 
 def write_box(group: Any) -> None:

@@ -246,12 +246,11 @@ def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
     return listed | named
 
 
-def _table(path: Path, name: str) -> Table:
-    with opened(path) as file:
+def _table(path: str | Path, name: str) -> Table | None:
+    """A table of one file; None where it has none of this name."""
+    with opened(Path(path)) as file:
         group = access.group_at(file, name)
-        if group is None:
-            raise StoreError(f"{path} holds no {name}")
-        return tables.read(group, name)
+        return None if group is None else tables.read(group, name)
 
 
 class _Tables(Mapping[str, Table]):
@@ -259,7 +258,10 @@ class _Tables(Mapping[str, Table]):
         self._sources = sources
 
     def __getitem__(self, name: str) -> Table:
-        return _table(self._sources[name], name)
+        found = _table(self._sources[name], name)
+        if found is None:
+            raise StoreError(f"{self._sources[name]} holds no {name}")
+        return found
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._sources)
@@ -288,16 +290,14 @@ def measured_by(path: str | Path) -> list[tuple[str, dict[str, str]]]:
 
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:
     """The verdicts of a store; none where it has none."""
-    with opened(Path(path)) as file:
-        group = access.group_at(file, "verdicts")
-        return () if group is None else tables.to_verdicts(tables.read(group, "verdicts"))
+    found = _table(path, "verdicts")
+    return () if found is None else tables.to_verdicts(found)
 
 
 def comparison(path: str | Path) -> Comparison | None:
     """The matrix of differences between the trajectories of a store."""
-    with opened(Path(path)) as file:
-        group = access.group_at(file, "comparison")
-        return None if group is None else tables.to_comparison(tables.read(group, "comparison"))
+    found = _table(path, "comparison")
+    return None if found is None else tables.to_comparison(found)
 
 
 def document(path: str | Path, name: str) -> str:

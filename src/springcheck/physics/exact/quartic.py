@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class _Duffing:
     """u'' = -k u - b u**3 of unit masses (k, b per mass), all (n,); E is the energy of the start.
 
-    root = sqrt(k**2 + 4 b E) = k + b A**2 at a turning point A; minus = root - k; plus = root + k.
+    root = sqrt(k**2 + 4 b E) = k + b A**2 at a turning point A; plus = root + k.
     The motion is that of an elliptic function of parameter m = 1 - m1, of amplitude A and argument w t.
     """
 
@@ -36,7 +36,6 @@ class _Duffing:
     energy: Extended
     """4 E."""
     root: Extended
-    minus: Extended
     plus: Extended
     amplitude: Extended
     w: Extended
@@ -92,7 +91,7 @@ def _duffing(scene: Scene) -> tuple[_Duffing, Extended] | None:
     small = b * energy / np.where(large > 0, large, 1)
     minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
     parts = {"k": k, "b": b, "u": u, "v": p / m, "pull": x, "energy": energy}
-    parts |= {"root": root, "minus": minus, "plus": plus}
+    parts |= {"root": root, "plus": plus}
     return _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
 
 
