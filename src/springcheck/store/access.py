@@ -39,7 +39,7 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def for_reading(path: Path) -> Iterator[Any]:
     """A file open for reading, whatever it does to libhdf5 (see `trust`).  StoreError where it cannot be."""
     with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
         yield file

@@ -98,7 +98,7 @@ def structure(path: Path, *, arrays: bool = True) -> list[Finding]:
     """
     found: list[Finding] = []
     try:
-        with access.opened(path) as file:
+        with access.for_reading(path) as file:
             for finding in _structure(file, arrays=arrays):
                 found.append(finding)
                 if len(found) == MOST_FINDINGS:

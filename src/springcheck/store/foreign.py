@@ -57,7 +57,7 @@ def read_foreign(path: str | Path, most: int | None = None, *, alone: bool = Fal
 
 def load(path: Path, most: int | None = None, *, alone: bool = False) -> dict[str, Foreign]:
     """The same in this process, whatever the file does to libhdf5."""
-    with access.opened(path) as file:
+    with access.for_reading(path) as file:
         names = access.children(file, "particles")
         if not names:
             raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
@@ -87,7 +87,7 @@ def is_h5md(path: str | Path) -> bool:
 @contextlib.contextmanager
 def _trusted(path: Path) -> Iterator[Any]:
     trust.trust(path, trust.FOREIGN)
-    with access.opened(path) as file:
+    with access.for_reading(path) as file:
         yield file
 
 
@@ -108,7 +108,7 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
     """The same one by one, in this process."""
-    with access.opened(path) as file:
+    with access.for_reading(path) as file:
         for place in _places(file, ""):
             if wanted(place):
                 with contextlib.suppress(StoreError):

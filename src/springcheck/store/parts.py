@@ -102,7 +102,7 @@ def _run_of(path: Path) -> str:
 def opened(path: Path) -> Iterator[Any]:
     """A file of ours, open for reading, its structure checked against its seal before libhdf5 sees it."""
     trust.trust(path, trust.OURS)
-    with access.opened(path) as file:
+    with access.for_reading(path) as file:
         marked = access.attribute(file, "format")
         if marked == layout.EXPORTED:
             raise StoreError(

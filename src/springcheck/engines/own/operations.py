@@ -12,6 +12,7 @@ operation.  A tableau with one implicit stage is a step of implicit Euler before
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from springcheck.engines.own.kernels import (
     MIDPOINT,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes import Scheme, number
@@ -34,8 +35,7 @@ ALL, POTENTIAL, SLOW, FAST = "all", "potential", "slow", "fast"
 _FORCE = {"kick": ALL, "pull": POTENTIAL, "slow": SLOW, "fast": FAST}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Operation:
+class Operation(NamedTuple):
     """One operation of a step: `x` and `y` are times, `force` names what kicks."""
 
     code: int
@@ -75,6 +75,13 @@ class Program:
         )
 
     @property
+    def arrays(self) -> tuple[Integers, Integers, Floats, Floats]:
+        """Code, slot, x and y of each operation."""
+        codes = np.array([o.code for o in self.operations], np.int64)
+        x, y = (np.array([getattr(o, name) for o in self.operations], np.float64) for name in "xy")
+        return codes, np.array(self.slots, np.int64), x, y
+
+    @property
     def evaluations(self) -> tuple[int, int]:
         """Evaluations of the force in the first step, and in each later one: none where the state stayed."""
         if self.b is not None:
@@ -111,7 +118,8 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
         raise MethodError(f"own: the scheme {scheme.name} has neither stages nor a tableau to carry out")
     damped = scene.system.is_damped
     if not damped:
-        found = tuple(_without_friction(o) for o in found if o.code != FRICTION)
+        whole = {ALL: POTENTIAL}
+        found = tuple(o._replace(force=whole.get(o.force, o.force)) for o in found if o.code != FRICTION)
     forces = tuple(dict.fromkeys(o.force for o in found if o.force))
     if len(forces) > 2:
         raise MethodError(
@@ -119,10 +127,6 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
         )
     depends = tuple(damped and name in (ALL, SLOW) for name in (*forces, "", "")[:2])
     return Program(operations=found, forces=forces or (ALL,), damped=depends)
-
-
-def _without_friction(o: Operation) -> Operation:
-    return Operation(code=o.code, x=o.x, y=o.y, force=POTENTIAL if o.force == ALL else o.force)
 
 
 def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
@@ -136,7 +140,7 @@ def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
         elif kind != "drift":
             raise MethodError(f"own: the scheme {scheme.name} has a stage that is not served: {kind}")
         elif found and found[-1].code == KICK:
-            found[-1] = Operation(code=KICK_DRIFT, x=found[-1].x, y=x, force=found[-1].force)
+            found[-1] = found[-1]._replace(code=KICK_DRIFT, y=x)
         else:
             found.append(Operation(code=DRIFT, y=x))
     return tuple(found)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -118,16 +118,9 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
             work=len(plan.b),
         )
     divisor = float(solver.factors(scene, plan.implicit_step)[0][0])
-    head = (*_codes(plan)[::2], np.array([o.y for o in plan.operations]), divisor, m, k)
-    return tiles.Job(kernel=kernels.one_splitting, head=head, state=(q, p), n=1, work=len(plan.operations))
-
-
-def _codes(plan: Program) -> tuple[Any, Any, Any]:
-    return (
-        np.array([o.code for o in plan.operations], np.int64),
-        np.array(plan.slots, np.int64),
-        np.array([o.x for o in plan.operations]),
-    )
+    code, _, x, y = plan.arrays
+    head = code, x, y, divisor, m, k
+    return tiles.Job(kernel=kernels.one_splitting, head=head, state=(q, p), n=1, work=len(code))
 
 
 def _many(plan: Program, scene: Scene) -> tiles.Job:
@@ -151,8 +144,7 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
             joined=joined,
             reach=reach,
         )
-    code, slot, x = _codes(plan)
-    y = np.array([o.y for o in plan.operations])
+    code, slot, x, y = plan.arrays
     solved = solver.NONE
     if plan.implicit_step:
         solved = solver.factors(scene, plan.implicit_step)
