@@ -73,19 +73,6 @@ def test_more_pieces_than_a_store_may_have_tables_are_one_table(
     assert not parts_folder(path).exists()
 
 
-def test_a_checkpoint_leaves_pieces_where_they_are_and_loses_none(tmp_path: Path) -> None:
-    path = tmp_path / "s.h5"
-    for count in (10, 40):
-        with store.open_new(path, "squares") as journal:
-            for piece in pieces(count):
-                if piece.name not in journal.tables():
-                    journal.add(FORM.table(piece.key, piece.measure()), by=[{"host": f"h{count}"}], rows=True)
-            journal.commit(final=count == 40)
-    assert rows(store.tables_of(path)["squares/own"]) == WANTED
-    by = dict(store.measured_by(path))
-    assert [by[piece.name]["host"] for piece in pieces(40)] == ["h10"] * 10 + ["h40"] * 30
-
-
 def test_pieces_of_other_columns_are_refused_and_kept(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     with store.open_new(path, "squares") as journal:

@@ -61,25 +61,6 @@ def test_another_command_is_refused_unless_forced_to_start_over(tmp_path: Path) 
         assert journal.finished() == ()
 
 
-def test_a_checkpoint_empties_the_journal_and_counts_as_finished(tmp_path: Path) -> None:
-    path, s = tmp_path / "s.h5", scene()
-    with store.open_new(path, "run") as journal:
-        journal.save(trajectory(s, LABELS[0]), s)
-        journal.add(store.Table(name="precision/x", columns={"h": [1.0]}))
-        journal.commit(s, final=False)
-        assert parts(path) == ["command", "lock"]
-        journal.save(trajectory(s, LABELS[1]), s)
-    assert not store.summary(path).complete
-    with store.open_new(path, "run") as journal:
-        assert journal.finished() == tuple(LABELS[:2])
-        assert list(journal.tables()) == ["precision/x"]
-        journal.commit(s)
-    assert store.summary(path).complete
-    assert list(store.read(path)) == LABELS[:2]
-    assert list(dict(store.tables_of(path))) == ["precision/x"]
-    assert store.check(path) == []
-
-
 def test_a_forced_run_that_was_killed_leaves_the_old_store_and_is_taken_up_without_force(
     tmp_path: Path,
 ) -> None:
@@ -105,6 +86,27 @@ def test_a_store_whose_writer_was_killed_as_it_tidied_up_is_complete(tmp_path: P
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["s.h5"]
 
 
+def test_a_store_whose_writer_was_killed_before_it_tidied_up_is_complete(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "s.h5"
+    journal = store.open_new(path, "study")
+    for i in range(3):
+        journal.add(store.Table(name=f"cells/{i}", columns={"x": [1.0 * i]}), by=[{"host": "h"}], rows=True)
+    with monkeypatch.context() as patch:
+        patch.setattr(adopt, "settled", _dies(adopt.settled, 1))
+        with pytest.raises(Killed):
+            journal.commit()
+    journal._lock.release()
+    assert len(list(parts_folder(path).glob("rows-*"))) == 3
+    assert store.summary(path).complete
+    with pytest.raises(StoreError, match="exists"):
+        store.open_new(path, "study")
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["s.h5"]
+    assert store.tables_of(path)["cells"].columns["x"].tolist() == [0.0, 1.0, 2.0]
+    assert store.check(path) == []
+
+
 def test_a_journal_without_work_leaves_nothing(tmp_path: Path) -> None:
     with store.open_new(tmp_path / "s.h5", "run") as journal:
         journal.finished()
@@ -114,9 +116,9 @@ def test_a_journal_without_work_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("large", "final"), [(0, True), (1 << 40, False)])
+@pytest.mark.parametrize("large", [0, 1 << 40])
 def test_a_writer_that_dies_anywhere_in_a_commit_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, large: int, final: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, large: int
 ) -> None:
     s = scene()
     monkeypatch.setattr(adopt, "LARGE", large)
@@ -146,15 +148,19 @@ def test_a_writer_that_dies_anywhere_in_a_commit_loses_nothing(
                 patch.setattr(owner, name, _dies(getattr(owner, name), call))
                 try:
                     with store.open_new(path, "run") as journal:
-                        journal.commit(s, final=final)
+                        journal.commit(s)
                     break
                 except Killed:
                     deaths += 1
-            if claim(parts_folder(path)) is not None or not path.exists():
+            if path.exists():
+                assert store.summary(path).complete
+                with pytest.raises(StoreError, match="exists"):
+                    store.open_new(path, "run")
+                assert claim(parts_folder(path)) is None
+            else:
                 with store.open_new(path, "run") as journal:
-                    if journal.finished():
-                        assert tuple(journal.finished()) == tuple(LABELS)
-                        journal.commit(s)
+                    assert tuple(journal.finished()) == tuple(LABELS)
+                    journal.commit(s)
             assert digests(path) == expected, (name, call)
             assert store.check(path) == []
     assert deaths >= 14

@@ -2,15 +2,15 @@
 
     python validation/kill.py [kills]
 
-A writer stores trajectories and tables, with a checkpoint now and then and a commit at the end, and
-reports each as soon as it is stored.  It is killed (SIGKILL) at a random moment of a part, a checkpoint or
-the final commit, 400 times over, long parts adopted in every other round; then before every third of
-the 900 system calls on files that a round makes (all of them with 1200 kills).  After each kill
-everything reported must be there with its digest, and every file must pass `check`.  Then the commands
-themselves, `run`, `precision`, `stability` and `extremes`, killed at random moments a quarter as often and
-started again until they end: every trajectory, table and point that one of them had finished must be in
-the store at the end, bit for bit, so none is lost and none measured twice.  Then: a full disk at forty
-sizes, a read-only folder, a reader that holds the file open through a commit, and two writers.
+A writer stores trajectories and tables, with a commit at the end, and reports each as soon as it is stored.
+It is killed (SIGKILL) at a random moment of a part or of the commit, 400 times over, long parts adopted in
+every other round; then before every third of the system calls on files that a round makes (all of them with
+1200 kills).  After each kill everything reported must be there with its digest, and every file must pass
+`check`.  Then the commands themselves, `run`, `precision`, `stability` and `extremes`, killed at random
+moments a quarter as often and started again until they end: every trajectory, table and point that one of
+them had finished must be in the store at the end, bit for bit, so none is lost and none measured twice.
+Then: a full disk at forty sizes, a read-only folder, a reader that holds the file open through a commit, and
+two writers.
 
 Kills show that no order of operations loses anything; that fsync reaches the disk is the system's word.
 
@@ -44,7 +44,7 @@ from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.points import POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
-PHASES = ("part", "checkpoint", "collection")
+PHASES = ("part", "collection")
 CALLS = {
     "open",
     "write",
@@ -97,9 +97,6 @@ def write(path: Path, say: Callable[[str], None], seed: int) -> None:
             if f"precision/{label}" not in journal.tables():
                 journal.add(table(label))
                 say(f"table precision/{label}")
-            if i == 3:
-                say("phase checkpoint")
-                journal.commit(s, final=False)
         say("phase collection")
         journal.commit(scene(9))
         say("done")
@@ -186,14 +183,14 @@ class Ledger:
 
 
 def random_kills(folder: Path, kills: int) -> int:
-    """SIGKILL at random moments, a third of them in each phase -> number of losses."""
+    """SIGKILL at random moments, half of them in each phase -> number of losses."""
     rng = random.Random(20)
     losses, reported, counts, seed = 0, 0, dict.fromkeys(PHASES, 0), 0
-    duration = {"part": 0.02, "checkpoint": 0.03, "collection": 0.04}
+    duration = {"part": 0.02, "collection": 0.04}
     path, ledger = folder / "random.h5", Ledger()
     while sum(counts.values()) < kills:
         adopt.LARGE = 0 if seed % 2 else 1 << 28
-        phase = PHASES[sum(counts.values()) % 3]
+        phase = PHASES[sum(counts.values()) % 2]
         pid, pipe = child(partial(write, path, seed=seed))
         lines = reports(pipe, f"phase {phase}")
         alive = bool(lines) and lines[-1] == f"phase {phase}"

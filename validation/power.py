@@ -2,7 +2,7 @@
 
     python validation/power.py [states]
 
-A writer (that of validation/kill.py) stores trajectories and tables, with a checkpoint and a commit, while
+A writer (that of validation/kill.py) stores trajectories and tables, with a commit at the end, while
 every fsync, rename, removal and new folder is noted with the bytes of the files.  A loss of power may come
 between any two of them.  What the disk holds then is what the system has promised, and no more:
 

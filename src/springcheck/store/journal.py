@@ -1,9 +1,9 @@
 """The journal of a store that is being written: nothing that was reported is ever lost.
 
 Finished trajectories and tables are files of their own in ``<file>.parts/``, put there by os.replace and
-fsync.  `Journal.commit` writes a whole new collection of what the last one held and of the parts, checks
-the digests, puts it in place by os.replace, and only then removes the parts.  No file that holds reported
-numbers is ever changed.  Whoever is killed anywhere in this finds everything on starting again.
+fsync.  `Journal.commit` writes a collection of all parts, checks the digests, puts it in place by os.replace,
+and only then removes the parts.  No file that holds reported numbers is ever changed.  Whoever is killed
+anywhere in this finds everything on starting again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
@@ -29,7 +28,7 @@ from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import Parts, claim, name_of, opened, parts_folder
+from springcheck.store.parts import Parts, claim, name_of, opened, parts_folder, run_of
 from springcheck.store.tables import Table
 
 COLLECTION = "collection.new"
@@ -115,6 +114,10 @@ def _is_ours(path: Path) -> bool:
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal that is resumed or started."""
     known = claim(parts)
+    if known is not None and path.is_file() and run_of(path) == known["run"]:
+        # killed as it tidied up: the store is complete
+        _remove(parts, lambda name: name != "lock")
+        known = None
     if known is not None and (not force or known["forced"]):
         if known["command"] == command:
             adopt.recover(parts, parts / COLLECTION, known["run"])
@@ -239,24 +242,17 @@ class Journal:
         comparison: Comparison | None = None,
         verdicts: Sequence[Verdict] = (),
         documents: Mapping[str, str] | None = None,
-        final: bool = True,
     ) -> None:
-        """Replace the collection by one that holds everything finished; `final` ends the journal.
-
-        Without `final` it is a checkpoint of a long study: fewer files in the journal, which goes on.  Pieces
-        of tables stay there until all of them are there.
-        """
+        """Put a collection that holds everything finished in the place of the store; the journal ends."""
         extra: list[Table] = []
         if comparison is not None:
             extra.append(tables.of_comparison(comparison))
         if verdicts:
             extra.append(tables.of_verdicts(verdicts))
-        root: dict[str, Scalar] = {"run": self.run, "complete": final}
+        root: dict[str, Scalar] = {"run": self.run, "complete": True}
         if scene is not None:
             root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)
-        if not final:
-            found = replace(found, rows=[])
         temporary = self.folder / COLLECTION
         # an adopted part is all that there is of it
         copied = adopt.choice(found.parts) is None
@@ -276,10 +272,9 @@ class Journal:
                 adopt.settled(self.folder)
                 for part in (*found.parts, *found.rows):
                     part.unlink(missing_ok=True)
-                if final:
-                    self._end()
-                    # the same command would not go on, but refuse to write it again
-                    interrupts.announce(plain(f"interrupted; {self.path} is complete"))
+                self._end()
+                # the same command would not go on, but refuse to write it again
+                interrupts.announce(plain(f"interrupted; {self.path} is complete"))
 
     def _end(self) -> None:
         """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
@@ -296,9 +291,7 @@ class Journal:
         """Give the lock back; what is finished stays for the next one."""
         if self.folder.is_dir():
             with interrupts.held(), contextlib.suppress(OSError):
-                empty = {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}
-                # after a checkpoint the collection holds what is finished, and the journal is how it is known
-                if empty and not Parts.of(self.path, self.run).collections:
+                if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
                     self._end()
         self._lock.release()
 

@@ -32,7 +32,7 @@ def collection(
     The largest part, if it is large, is renamed to `path` instead of copied (see `adopt`).
     """
     base = adopt.choice(found.parts)
-    sources = [*(part for part in found.parts if part != base), *found.collections]
+    sources = [part for part in found.parts if part != base]
     total = sum(source.stat().st_size for source in (*sources, *found.rows))
     text = sum(len(document.encode()) for document in documents.values())
     margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
@@ -53,7 +53,6 @@ def collection(
             with h5py.File(source, "r", locking="best-effort") as part:
                 _take(file, part)
                 provenance.note(name_of(source), pieces.by_of(part))
-        provenance.take(file)
         pieces.join(file, found.rows, provenance)
         for table in (*extra, *provenance.tables()):
             tables.write(file, table)
@@ -92,7 +91,7 @@ def _bytes(table: Table) -> int:
 
 
 def _take(file: Any, part: Any) -> None:
-    """Copy all trajectories and tables of a part that the file does not have yet.
+    """Copy the trajectory or the tables of a part.
 
     One H5Ocopy of the whole part keeps the hard links of time and step; moving links costs nothing.
     """
@@ -100,15 +99,12 @@ def _take(file: Any, part: Any) -> None:
     incoming = file[_INCOMING]
     for tree in _TREES:
         for label in incoming.get(tree, ()):
-            target = f"{tree}/{label}"
-            if target not in file:
-                file.require_group(tree)
-                file.move(f"{_INCOMING}/{target}", target)
+            file.require_group(tree)
+            file.move(f"{_INCOMING}/{tree}/{label}", f"{tree}/{label}")
     for name in list(tables.names(incoming)):
-        if name not in file:
-            if "/" in name:
-                file.require_group(name.rsplit("/", 1)[0])
-            file.move(f"{_INCOMING}/{name}", name)
+        if "/" in name:
+            file.require_group(name.rsplit("/", 1)[0])
+        file.move(f"{_INCOMING}/{name}", name)
     del file[_INCOMING]
 
 

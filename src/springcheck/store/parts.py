@@ -54,42 +54,41 @@ def claim(parts: Path) -> dict[str, str] | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The files that make up a store: the collection, if it belongs to the run, and the run's parts.
+    """The files that make up a store: the collection, or the parts of a run that are not yet in one.
 
     `rows` are the parts that hold rows of a table.
     """
 
-    collections: list[Path]
-    """The collection, or none."""
+    collection: Path | None
     parts: list[Path]
     rows: list[Path]
 
     @property
     def everything(self) -> list[Path]:
         """All files that there are."""
-        return [path for path in (*self.collections, *self.parts, *self.rows) if path.is_file()]
+        return [*self.parts, *self.rows] if self.collection is None else [self.collection]
 
     @classmethod
     def of(cls, path: Path, run: str | None) -> Parts:
-        """`run` is the writer's; None for a reader, who takes the collection as it is."""
-        folder = parts_folder(path)
-        known = run
+        """`run` is the writer's, whose parts they are; None for a reader, who takes the collection if there
+        is one."""
+        if run is None and path.is_file():
+            return cls(collection=path, parts=[], rows=[])
+        folder, known = parts_folder(path), run
         if known is None:
             with contextlib.suppress(StoreError):
                 known = (claim(folder) or {}).get("run")
-        own = path.is_file() and (known is None or _run_of(path) == known)
-        if run is None and path.is_file() and not own:
-            return cls(collections=[path], parts=[], rows=[])
         parts = sorted(folder.glob("*-*.h5")) if known is not None else []
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
         return cls(
-            collections=[path] if own else [],
+            collection=None,
             parts=[part for part in parts if not part.name.startswith(ROWS)],
             rows=[part for part in parts if part.name.startswith(ROWS)],
         )
 
 
-def _run_of(path: Path) -> str:
+def run_of(path: Path) -> str:
+    """The run that wrote a store; "" where it does not say."""
     found = seal.find(path)
     if found is not None:
         return found.run

@@ -53,14 +53,6 @@ class Provenance:
         self._records: dict[str, int] = {}
         self._pieces: dict[tuple[str, int], None] = {}
 
-    def take(self, file: Any) -> None:
-        """Take the two tables of an earlier collection out of the file."""
-        found = {name: tables.read(file[name], name) for name in (WORKERS, PIECES) if name in file}
-        for piece, record in measured(found):
-            self.note(piece, [record])
-        for name in found:
-            del file[name]
-
     def note(self, piece: str, by: Iterable[Record]) -> None:
         """A piece was measured by these."""
         for record in by:

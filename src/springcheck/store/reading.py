@@ -34,14 +34,13 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         with files.told(path, "read"), path.open("rb"):
             pass
     listed: list[tuple[int, str, Path]] = []
-    for whole in found.collections:
-        with opened(whole) as file:
+    if found.collection is not None:
+        with opened(found.collection) as file:
             labels = access.children(file, "parameters")
-            listed += [(_sequence(file, label), label, whole) for label in labels]
-    known = {label for _, label, _ in listed}
+            listed += [(_sequence(file, label), label, found.collection) for label in labels]
     for part in found.parts:
-        label = parts.name_of(part)
-        if part.name.startswith("run-") and label not in known:
+        if part.name.startswith("run-"):
+            label = parts.name_of(part)
             with opened(part) as file:
                 listed.append((_sequence(file, label), label, part))
     return {label: source for _, label, source in sorted(listed)}
@@ -219,7 +218,7 @@ def summary(path: str | Path) -> Summary:
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
-        complete=path.is_file() and root.get("complete") is True and not _is_claimed(path),
+        complete=path.is_file() and root.get("complete") is True and not _is_claimed(path, root.get("run")),
         root=root,
         runs=tuple(runs),
         tables=tuple(dict.fromkeys(names)),
@@ -227,10 +226,11 @@ def summary(path: str | Path) -> Summary:
     )
 
 
-def _is_claimed(path: Path) -> bool:
-    """Whether a journal of ours stands beside a store; what a kill at its very end has left is none."""
+def _is_claimed(path: Path, run: object) -> bool:
+    """Whether the journal of another run than its own stands beside a store: a kill may have left that."""
     try:
-        return claim(parts_folder(path)) is not None
+        found = claim(parts_folder(path))
+        return found is not None and found["run"] != run
     except StoreError:
         return False
 
@@ -238,12 +238,10 @@ def _is_claimed(path: Path) -> bool:
 def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
     """The tables of a collection, and the parts that hold one."""
     found = Parts.of(path, run)
-    listed: dict[str, Path] = {}
-    for whole in found.collections:
-        with opened(whole) as file:
-            listed = dict.fromkeys(tables.names(file), whole)
-    named = {parts.name_of(part): part for part in found.parts if part.name.startswith("table-")}
-    return listed | named
+    if found.collection is not None:
+        with opened(found.collection) as file:
+            return dict.fromkeys(tables.names(file), found.collection)
+    return {parts.name_of(part): part for part in found.parts if part.name.startswith("table-")}
 
 
 def _table(path: str | Path, name: str) -> Table | None:
