@@ -21,7 +21,7 @@ from springcheck.studies.stability import STUDY, costs, limits, propagators, reg
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.propagators import Springs
 
-LABELS = [str(label) for label in propagators.one_step_labels(engines.match(("*",)))]
+LABELS = [str(label) for label in engines.match(("*",)) if propagators.has_one_step(label)]
 SINGLE = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "stiff" / "multiple-time-steps.json"
 Need = Callable[[str], None]

@@ -89,7 +89,7 @@ def _seen(check: Any) -> Iterator[str]:
 
     if check.name not in measure.RECORDED:
         return
-    passed = [fault.name for fault in FAULTS if measure.Probe(fault).passed(check.name, fault.size)]
+    passed = [fault.name for fault in FAULTS if measure.probe(fault)(check.name, fault.size)]
     if passed:
         yield _line(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
 
@@ -102,15 +102,16 @@ def _fault(fault: Fault) -> Iterator[str]:
         f"A fault: {fault.scheme} on a {fault.scene}, broken on purpose"
         + ("" if fault.size is None else f"; its size in the table is {fault.size:.0e}")
     )
-    probe = measure.Probe(fault)
-    verdicts = {name: probe.passed(name, fault.size) for name in measure.RECORDED}
+    passed_by = measure.probe(fault)
+    verdicts = {name: passed_by(name, fault.size) for name in measure.RECORDED}
     yield _line(f"Must be rejected by: {', '.join(fault.caught_by)}")
     seen = [name for name, passed in verdicts.items() if passed is False]
     yield _line(f"Recorded states are rejected by: {', '.join(seen) or 'none'}")
     passing = [name for name, passed in verdicts.items() if passed]
     yield _line(f"and passed by: {', '.join(passing) or 'none'}")
     if fault.size is not None and seen:
-        limits = {name: limit for name in seen if (limit := probe.limit(name)) is not None}
+        sizes = {name: measure.smallest(passed_by, name, fault.size) for name in seen}
+        limits = {name: size for name, size in sizes.items() if size is not None}
         if limits:
             name = min(limits, key=lambda one: limits[one])
             yield f"Smallest size that is seen on this {fault.scene}: {limits[name]:.1e}, by {name}"

@@ -162,7 +162,10 @@ class Varied:
         numbers = _arrays(self.scene)
         for field, column in values.items():
             different, where = np.unique(column, return_inverse=True)
-            effects = [self._effect(field, float(value)) for value in different]
+            effects = [
+                dict(_differences(self.scene, self.whole({field: float(value)}), field))
+                for value in different
+            ]
             for place in {place for effect in effects for place in effect}:
                 if place in found:
                     raise SpringcheckError(f"--vary {field}: {place[0]} is changed by another --vary, too")
@@ -187,9 +190,6 @@ class Varied:
                 "fields are named as in its file, such as spring.0.stiffness or time.step"
             ) from None
         return found, key
-
-    def _effect(self, field: str, value: float) -> dict[Place, float]:
-        return dict(_differences(self.scene, self.whole({field: value}), field))
 
     def whole(self, values: Mapping[str, float]) -> Scene:
         """The scene with these values in its file.  SpringcheckError where they make no sense."""

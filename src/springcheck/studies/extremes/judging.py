@@ -72,11 +72,6 @@ def cell(
     )  # fmt: skip
 
 
-def range_of(how: Arithmetic) -> tuple[float, float]:
-    """Smallest normal and largest number that the arithmetic computes forces with."""
-    return RANGES["single" if how.force >= 2.0**-24 else "double"]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sizes:
     """Sizes of what a step forms along the way, over the pair of frames (f-1, n), extended precision."""
@@ -130,7 +125,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         inside = replace(inside, moved=np.abs(np.diff(q, axis=0)))
         growth = growth_of(case, scene)
     bound = float(case.roundings)
-    low, high = range_of(how)
+    low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
     cells = []
     for i, spec in enumerate(specs):
         here = from_finite[:, i]

@@ -59,55 +59,47 @@ HALVINGS = 4
 """Of a decade: limits are known to a factor 10**(1/16) = 1.15."""
 
 
-class Probe:
+Passed = Callable[[str, float | None], bool | None]
+"""Whether a fault of this size passes this check; None where that does not apply."""
+
+
+def probe(fault: Fault) -> Passed:
     """One fault on its scene, judged at any size; what is computed once is kept."""
+    where = scene(fault.scene)
 
-    def __init__(self, fault: Fault) -> None:
-        self._fault = fault
-        self._scene = scene(fault.scene)
-        self._recorded: dict[float | None, dict[str, bool | None]] = {}
-        self._benches: dict[float | None, checks.Bench] = {}
-        self._kept: dict[tuple[str, float | None], bool | None] = {}
+    @cache
+    def recorded(size: float | None) -> dict[str, bool | None]:
+        return {v.check: v.passed for v in checks.judge(where, fault.run(where, size=size))}
 
-    def passed(self, check: str, size: float | None) -> bool | None:
-        """Whether the fault of this size passes a check; None where that does not apply."""
-        if check in RECORDED:
-            if size not in self._recorded:
-                run = self._fault.run(self._scene, size=size)
-                self._recorded[size] = {v.check: v.passed for v in checks.judge(self._scene, run)}
-            return self._recorded[size][check]
-        if (check, size) not in self._kept:
-            self._kept[check, size] = self._experiment(check, size)
-        return self._kept[check, size]
+    @cache
+    def bench(size: float | None) -> checks.Bench:
+        return checks.Bench(scene=where, label=fault.name, run=partial(fault.run, size=size))
 
-    def _experiment(self, check: str, size: float | None) -> bool | None:
-        def run(s: Scene, label: str) -> Trajectory:
-            return self._fault.run(s, label, size=size)
+    @cache
+    def passed(check: str, size: float | None) -> bool | None:
+        return recorded(size)[check] if check in RECORDED else _EXPERIMENTS[check](bench(size)).passed
 
-        if size not in self._benches:
-            self._benches[size] = checks.Bench(scene=self._scene, label=self._fault.name, run=run)
-        return _EXPERIMENTS[check](self._benches[size]).passed
+    return passed
 
-    def limit(self, check: str) -> float | None:
-        """The smallest size that the check rejects, by bisection; None where it rejects none."""
-        size = self._fault.size
-        assert size is not None
-        seen = self.passed(check, size) is False
-        while SMALLEST < size < LARGEST:
-            following = size / 10 if seen else size * 10
-            if (self.passed(check, following) is False) != seen:
-                break
-            size = following
+
+def smallest(passed: Passed, check: str, size: float) -> float | None:
+    """The smallest size that the check rejects, by bisection from one on; None where it rejects none."""
+    seen = passed(check, size) is False
+    while SMALLEST < size < LARGEST:
+        following = size / 10 if seen else size * 10
+        if (passed(check, following) is False) != seen:
+            break
+        size = following
+    else:
+        return None
+    low, high = sorted((size, following))
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        if passed(check, middle) is False:
+            high = middle
         else:
-            return None
-        low, high = sorted((size, following))
-        for _ in range(HALVINGS):
-            middle = float(np.sqrt(low * high))
-            if self.passed(check, middle) is False:
-                high = middle
-            else:
-                low = middle
-        return high
+            low = middle
+    return high
 
 
 RECORDED = {check.name: check for check in checks.CHECKS}
@@ -116,15 +108,15 @@ _EXPERIMENTS: dict[str, Experiment] = {check.name: check for check in checks.THO
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:
     """What the checks say of a fault at its size in the table, and down to which size they see it."""
-    probe = Probe(fault)
+    passed = probe(fault)
     names = (*RECORDED, *_EXPERIMENTS)
-    rejected = tuple(name for name in names if probe.passed(name, fault.size) is False)
+    rejected = tuple(name for name in names if passed(name, fault.size) is False)
     found: dict[str, float] = {}
     if limits and fault.size is not None:
         for name in names:
-            if probe.passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
+            if passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
                 continue
-            limit = probe.limit(name)
+            limit = smallest(passed, name, fault.size)
             if limit is not None:
                 found[name] = limit
     return Result(

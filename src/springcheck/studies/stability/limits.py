@@ -73,7 +73,7 @@ def measure(label: Label) -> Limit:
     hidden = first_exit(label, propagators.theory)
     theory = scheme.limit
     off = 0.0 if np.isinf(theory) else abs(hidden - theory)
-    how = propagators.arithmetic(label)
+    how = engines.arithmetic(label)
     # theory at its own rounding shows what cannot be told; the roundings of k and of the step come on top
     bound = max(AGREED, 4 * off + 4 * propagators.noise(label) * (0 if np.isinf(theory) else theory))
     turn = _points(theory)

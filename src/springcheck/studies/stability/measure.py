@@ -39,17 +39,17 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
     """
     fastest(scene)
     chosen = engines.match(tuple(methods) or ("*",))
-    of_springs = propagators.one_step_labels(chosen)
 
     def why(label: Label) -> str | None:
         absent = engines.absence(label.engine)
-        if absent or label in of_springs:
+        if absent or propagators.has_one_step(label):
             return absent or propagators.absence(label)
         adaptive = not scheme(engines.method(label).scheme).one_step
         return "it has no fixed step and no limit" if adaptive else "it moves no springs"
 
     usable, left_out = sorted_out(chosen, why)
-    damped = regions.labels(tuple(usable)) if scene.system.is_damped else ()
+    braked = [label for label in usable if "damping" in engines.method(label).terms]
+    damped = braked if scene.system.is_damped else []
     resonant = [label for label in usable if resonance.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
     stiff = [label for label in chosen if family and costs.serves(label, family)]

@@ -16,7 +16,7 @@ import numpy as np
 from springcheck import engines, schemes, simulate
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 
@@ -41,7 +41,7 @@ class Springs:
     @property
     def single(self) -> bool:
         """Whether the engine keeps force constants in single precision."""
-        return arithmetic(self.label).parameters == "single"
+        return engines.arithmetic(self.label).parameters == "single"
 
     @property
     def k(self) -> Floats:
@@ -55,14 +55,9 @@ class Springs:
         return np.asarray(STEP * np.sqrt(self.k.astype(np.longdouble) / MASS))
 
 
-def arithmetic(label: Label) -> Arithmetic:
-    """How the label's platform rounds."""
-    return engines.arithmetic(label)
-
-
 def noise(label: Label) -> float:
     """Relative rounding of an entry of a propagator: all roundings of one step, of one sign."""
-    how = arithmetic(label)
+    how = engines.arithmetic(label)
     scheme = schemes.scheme(engines.method(label).scheme)
     return schemes.roundings(scheme) * (max(how.state, how.force) + how.quantum / FORCE)
 
@@ -175,14 +170,10 @@ def bounded(matrices: Floats | Extended, rounding: float) -> np.ndarray:
         return np.asarray(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0))
 
 
-def one_step_labels(labels: tuple[Label, ...]) -> tuple[Label, ...]:
-    """Those that have a one-step map and move particles on springs."""
-    return tuple(
-        label
-        for label in labels
-        if schemes.scheme(engines.method(label).scheme).one_step
-        and "wall-spring" in engines.method(label).terms
-    )
+def has_one_step(label: Label) -> bool:
+    """Whether a method has a one-step map and moves particles on springs."""
+    method = engines.method(label)
+    return schemes.scheme(method.scheme).one_step and "wall-spring" in method.terms
 
 
 def absence(label: Label) -> str | None:

@@ -86,10 +86,3 @@ def measure(label: Label, points: int = 200) -> Region:
         undecided=int(np.count_nonzero(undecided)),
         wrong=int(np.count_nonzero((stable != inside) & ~undecided)),
     )
-
-
-def labels(given: tuple[Label, ...]) -> tuple[Label, ...]:
-    """Those that have a one-step map and know friction."""
-    return tuple(
-        label for label in propagators.one_step_labels(given) if "damping" in engines.method(label).terms
-    )
