@@ -19,7 +19,7 @@ import numpy as np
 
 from springcheck import formats, interrupts, schemes
 from springcheck.doors.function import UNKNOWN
-from springcheck.engines import EVERY_FORCE, Arithmetic, Engine, Label, Method, Simulation
+from springcheck.engines import EVERY_FORCE, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -59,7 +59,6 @@ def engine(
         schemes=(UNKNOWN,),
         start=start,
         version=lambda: {name: shlex.join(words) for name, words in commands.items()},
-        arithmetic=lambda label: Arithmetic(),
         convention=lambda method: "as the command writes them",
         step_seconds=1e-3,
     )
