@@ -60,27 +60,25 @@ def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
     if _left(_alternating(e), e.misses) < 1 / FALLS:
         return []
-    joints = search([e.found], [e.terms], FEW, far=True)
-    joints += search([e.found], [e.terms], FEW, distinct(damped=True), far=True)
-    distances = {x: distance(e.found, x.parts[0]) for x in joints}
-    exact = [x for x in joints if x.scheme == "exact"]
-    if not exact:
-        return []
-    near = min(exact, key=lambda x: distances[x])
-    # without friction every scheme is far from a damped motion, and says nothing of its steps
-    alike = [(x, d) for x, d in distances.items() if x.scheme != "exact" and x.damped <= near.damped]
-    others = min((d for x, d in alike if x.stride == 1), default=math.inf)
     residual = float(np.max(e.found.residual))
-    # the error of a solver scatters: one that is the same in every frame may be that of fixed steps
-    if distances[near] > 30 * residual and min(d for _, d in alike) < 0.1 * distances[near]:
-        return []
-    if (
-        distances[near] > max(0.3 * others, 4 * residual)
-        or distances[near] > 0.05
-        or others < 4 * distances[near]
-    ):
-        return []
-    size = max(residual, distances[near])
+    # one step to a frame refutes most, and is found soon
+    for strides in (range(1, 2), FEW):
+        joints = search([e.found], [e.terms], strides, far=True)
+        joints += search([e.found], [e.terms], strides, distinct(damped=True), far=True)
+        distances = {x: distance(e.found, x.parts[0]) for x in joints}
+        near = min((x for x in joints if x.scheme == "exact"), key=lambda x: distances[x], default=None)
+        if near is None or distances[near] > 0.05:
+            return []
+        # without friction every scheme is far from a damped motion, and says nothing of its steps
+        alike = [(x, d) for x, d in distances.items() if x.scheme != "exact" and x.damped <= near.damped]
+        others = min((d for x, d in alike if x.stride == 1), default=math.inf)
+        if distances[near] > max(0.3 * others, 4 * residual) or others < 4 * distances[near]:
+            return []
+        # the error of a solver scatters: one that is the same in every frame may be that of fixed steps
+        least = min((d for _, d in alike), default=math.inf)
+        if distances[near] > 30 * residual and least < 0.1 * distances[near]:
+            return []
+        size = max(residual, distances[near])
     return [
         Explanation(
             cause=f"The states are the exact solution to within {size:.1e} of their size in each frame: "
