@@ -10,7 +10,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -245,8 +245,7 @@ def _arrays(scene: Scene) -> dict[Place, np.ndarray]:
     names = ("m", "q", "p", *GRID)
     found: dict[Place, np.ndarray] = {(name,): np.atleast_1d(getattr(scene, name)) for name in names}
     for t, term in enumerate(scene.terms):
-        values = {one.name: getattr(term, one.name) for one in fields(term)}  # type: ignore[arg-type]
-        found |= {("terms", t, name): x for name, x in values.items() if isinstance(x, np.ndarray)}
+        found |= {("terms", t, name): values for name, values in term.arrays.items()}
     return found
 
 
