@@ -142,6 +142,12 @@ _spec.loader.exec_module(census)
         (826175, "cause named"),
         # a constant is no alternation, and no quadratic force, because each of these has one beside it
         (824783, "cause named"),
+        # few frames: an equilibrium is as likely as friction, and makes entries more uncertain
+        (1000047, "named"),
+        (1000653, "named"),
+        (1002702, "not told apart"),
+        (1002677, "not told apart"),
+        (1000205, "not told apart"),
         # a motion that dies down to numbers whose squares are 0
         (602112, "error seen"),
         # what the roundings of one scheme explain they explain of another with the same map

@@ -487,3 +487,56 @@ def test_a_stiffness_that_wobbles_is_found_in_a_long_file_in_little_memory() -> 
     tracemalloc.stop()
     assert "stiffness changes in time" in found.statement
     assert most < 5000 * len(t), "bytes, of which a frame needs few"
+
+
+def written(x: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([float(f"{y:.{digits}g}") for y in x])
+
+
+@pytest.mark.parametrize(("substeps", "h", "frames", "digits"), [(3, 0.0678, 5, 3), (4, 0.05, 10, 3)])
+def test_few_frames_of_few_digits_do_not_tell_substeps_from_steps(substeps, h, frames, digits) -> None:
+    rng, judged = np.random.default_rng(1), 0
+    for _ in range(20):
+        q, v = rng.standard_normal(2)
+        rows = []
+        for _ in range(frames):
+            rows.append((q, v))
+            force = -q
+            for _ in range(substeps):
+                v += h / substeps * force
+                q += h / substeps * v
+        q_, v_ = np.array(rows).T
+        try:
+            found = identify(h * np.arange(frames), written(q_, 5), v=written(v_, digits), mass=1.0)
+        except IdentificationError:
+            continue
+        assert "held-force" in {x.scheme for x in found.candidates}, found.statement
+        judged += 1
+    assert judged > 10
+
+
+def test_few_frames_about_an_equilibrium_away_from_0_are_no_friction() -> None:
+    rng = np.random.default_rng(2)
+    step = np.linalg.inv([[1, -0.05], [0.05, 1]]) @ [[1, 0.05], [-0.05, 1]]
+    for _ in range(20):
+        z = [rng.standard_normal(2)]
+        for _ in range(4):
+            z.append(step @ z[-1])
+        q, v = np.array(z).T
+        found = identify(0.1 * np.arange(5), written(q - 3.9, 8), v=written(v, 7), mass=1.0, stiffness=1.0)
+        assert "implicit-midpoint" in {x.scheme for x in found.candidates}, found.statement
+        assert not any(any(x.friction) for x in found.candidates)
+
+
+def test_a_clock_that_adds_up_twelve_steps_to_a_frame_is_even() -> None:
+    h, t, q, v, rows = 0.9, 0.0, 1.0, 0.0, []
+    for i in range(1201):
+        if i % 12 == 0:
+            rows.append((t, q, v))
+        later = t + h
+        v -= (later - t) * 0.01 * q
+        q += (later - t) * v
+        t = later
+    t_, q_, v_ = np.array(rows).T
+    found = identify(t_, q_, v=v_, mass=1.0, stiffness=0.01)
+    assert (found.scheme, found.stride, found.fits) == ("semi-implicit-euler", 12, True)

@@ -58,6 +58,8 @@ from springcheck.schemes import SCHEMES, number
 
 BLOCK = 100
 FRAMES = 101
+WIDE = 1_000_000
+"""Numbers from here on draw the frames (5 to 101), the digits of text (3 to 9) and 1 to 12 steps as well."""
 ERRORS = (
     "wobbling stiffness",
     "cubic force",
@@ -83,7 +85,7 @@ sentences that name no cause (one linear map that is no scheme's, near the exact
 class Draw:
     """One random trajectory and what it was made of."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, wide: bool = False) -> None:
         kind = rng.choice(["plain", "plain", "damped", "damped", "held"])
         pool = {"plain": UNDAMPED, "damped": DAMPED, "held": UNDAMPED[:1]}[str(kind)]
         self.family: Family = pool[int(rng.integers(len(pool)))]
@@ -116,6 +118,12 @@ class Draw:
         if self.error and rng.random() < 1 / 3:
             self.second = str(rng.choice([x for x in ERRORS if x != self.error]))
         self.second_size = float(10 ** rng.uniform(-12, -3))
+        self.frames, self.digits = FRAMES, (6, 6)
+        if wide:
+            self.frames = int(rng.choice([5, 6, 8, 10, 15, 20, 50, FRAMES]))
+            digits = int(rng.integers(3, 10))
+            self.digits = digits, int(rng.choice([digits, max(3, digits - 2)]))
+            self.stride = 1 if flow else int(rng.integers(1, 13))
 
     def __str__(self) -> str:
         return (
@@ -123,11 +131,16 @@ class Draw:
             f"h w {self.x:.3g}, {self.form}, clock {self.clock}, single {self.single or '-'}, "
             f"at {self.at:.3g}, stated {self.stated}, {self.error} {self.size:.1e}, {self.second} "
             f"{self.second_size:.1e}"
+            + (
+                f", {self.frames} frames, {self.digits} digits"
+                if self.frames != FRAMES or self.form == "text"
+                else ""
+            )
         )
 
     def move(self) -> tuple[Floats, Floats, Floats]:
         """Times, positions and velocities of the frames."""
-        steps = (FRAMES - 1) * self.stride
+        steps = (self.frames - 1) * self.stride
         h, k, m = self.h, self.k, self.m
         if self.clock == "even":
             t: Floats = np.asarray(np.arange(steps + 1) * h, np.float64)
@@ -236,11 +249,11 @@ def _tableau(
     return q, v
 
 
-def written(x: Floats, form: str) -> Floats:
-    """Numbers as a file of this form returns them."""
+def written(x: Floats, form: str, digits: int = 6) -> Floats:
+    """Numbers as a file of this form, text with so many digits, returns them."""
     if form == "single":
         return x.astype(np.float32).astype(np.float64)
-    return np.array([float(f"{y:.6g}") for y in x]) if form == "text" else x
+    return np.array([float(f"{y:.{digits}g}") for y in x]) if form == "text" else x
 
 
 def judged(draw: Draw, found: Identification, hidden: bool) -> str:
@@ -311,7 +324,7 @@ def _names(families: tuple[Family, ...]) -> set[str]:
 
 def said_of(number_: int, alone: bool = False) -> tuple[Draw, str, str, float] | None:
     """What is said of one trajectory, its statement and the seconds of the call; None where it overflows."""
-    draw = Draw(np.random.default_rng([4, number_]))
+    draw = Draw(np.random.default_rng([4, number_]), wide=number_ >= WIDE)
     try:
         with np.errstate(all="ignore"):
             states = draw.move()
@@ -323,9 +336,10 @@ def said_of(number_: int, alone: bool = False) -> tuple[Draw, str, str, float] |
     stated = draw.k if draw.stated else None
     begun = time.process_time()
     try:
-        speed = None if alone else written(v, draw.form)
+        q, v = (written(x, draw.form, n) for x, n in zip((q, v), draw.digits, strict=True))
+        speed = None if alone else v
         still = 0.0 if alone and not draw.g and number_ % 3 == 0 else None
-        found = identify(t, written(q, draw.form), v=speed, mass=draw.m, stiffness=stated, friction=still)
+        found = identify(t, q, v=speed, mass=draw.m, stiffness=stated, friction=still)
         hidden = bool(draw.error) and _hides(states, draw.stride)
         said = _alone(draw, found) if alone else judged(draw, found, hidden)
         statement = found.statement

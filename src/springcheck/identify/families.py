@@ -270,13 +270,17 @@ FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS
 
 
 def substeps(share: float, error: float) -> tuple[range, bool]:
-    """Numbers of substeps that a force may be held over, none where no whole number fits or no end of them
-    does; and whether each substep kicks before it drifts.  `error` is the standard error of the share.
+    """Numbers of substeps that a force may be held over, none where no whole number fits; and whether each
+    substep kicks before it drifts.  `error` is the standard error of the share.
 
     The position gets (n + 1)/2n of h**2 F/m where substeps kick first, (n - 1)/2n where they drift first.
     """
     off, room = abs(2 * share - 1), 12 * error
-    if off <= room:
-        return range(0), True
-    least, most = math.ceil(1 / (off + room)), math.floor(min(1 / (off - room), HELD_SHARES))
-    return range(max(least, 2), most + 1), share > 0.5
+    least = math.ceil(1 / (off + room))
+    most = min(1 / (off - room), HELD_SHARES) if off > room else HELD_SHARES
+    return range(max(least, 2), math.floor(most) + 1), share > 0.5
+
+
+def endless(share: float, error: float) -> bool:
+    """Whether a force may be held over no end of substeps, which is the force of the last step alone."""
+    return abs(2 * share - 1) <= 12 * error

@@ -20,12 +20,16 @@ ROUNDING = 2.0**-53
 DEAD = 2.0**-40
 """Distance from an equilibrium, as a share of its own from 0, below which a motion has died down to it."""
 
+SHOWN, SUSPECTED = 50.0, 10.0
+"""Chi-squared that shows a constant part, and that one may make in a coarse file: it must stay far below what
+a right scheme may miss."""
+
 LEAST_NOISE = 1e-30
 """Share of the largest noise that a pair counts with at least: a motion that grows by 1e20 shows its
 equilibrium in its first frames alone."""
 
-FEWEST_PAIRS = 5
-"""More pairs than these are needed before a constant part is looked for."""
+FEWEST_PAIRS = 3
+"""More pairs than these are needed before a constant part is looked for: as many unknowns has a row then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -129,7 +133,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     # at rest beside 0 the numbers' rounding is all that is left, and the same in every step
     away = np.sqrt(np.sum((z[:-1].astype(np.float64) - first) ** 2, axis=1))
     dead = away < DEAD * float(np.sqrt(np.sum(first**2)))
-    if np.count_nonzero(chosen & ~dead) > 2 * FEWEST_PAIRS:
+    if np.count_nonzero(chosen & ~dead) > 3 * FEWEST_PAIRS:
         chosen = chosen & ~dead
         pairs = int(np.count_nonzero(chosen))
     weight = _pair_weights(z, quanta, first) * chosen
@@ -140,25 +144,28 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     x = least_squares(before, after)
     left = after - before @ x
     centre = np.zeros(2, dtype=np.longdouble)
-    floor = float(np.sum((4 * ROUNDING * np.abs(before)) ** 2))
+    floor = np.full(2, np.sum((4 * ROUNDING * before) ** 2), np.float64)
+    if not record.fine:
+        # few pairs may fit better than their numbers were written
+        earlier, later = (np.sum((weight[:, None] * y) ** 2, axis=0) / 12 for y in (quanta[:-1], quanta[1:]))
+        floor += later + (x.T.astype(np.float64) ** 2) @ earlier
     drifts = False
 
-    def better(old: Extended, new: Extended, unknowns: int) -> bool:
-        # one number more removes chi-squared of 1 by chance; 50 is seven standard errors
-        gain = np.sum(old**2, axis=0) - np.sum(new**2, axis=0)
+    def better(old: Extended, new: Extended, gain: float) -> bool:
+        """Whether one number more removes so much of chi-squared; by chance it removes 1."""
         noise = np.maximum(np.sum(new**2, axis=0) / max(pairs - 3, 1), floor / pairs)
-        return bool(np.any(gain > 50 * unknowns * noise))
+        return bool(np.any(np.sum(old**2, axis=0) - np.sum(new**2, axis=0) > gain * noise))
 
     if np.any(np.sum(left**2, axis=0) > floor) and pairs > FEWEST_PAIRS:
         y = least_squares(np.concatenate([before, w], axis=1), after)
         free = after - np.concatenate([before, w], axis=1) @ y
-        if better(left, free, 1):
+        if better(left, free, SHOWN if record.fine else SUSPECTED):
             noise = np.sqrt(np.maximum(np.sum(free**2, axis=0), floor))
             entries, at, resting = _about_rest(before, after, w, y, noise)
             # at rest the roundings are the same in every step, and add up to a constant of their own
             off = y[2] - (np.eye(2) - y[:2].T) @ at
             room = 64 * ROUNDING * float(np.max(np.abs(z)))
-            drifts = better(resting, free, 1) and float(np.max(np.abs(off))) > room
+            drifts = better(resting, free, SHOWN) and float(np.max(np.abs(off))) > room
             if drifts:
                 back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
                 at = back @ y[2]
@@ -168,7 +175,9 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
             x, left, centre = entries, resting, at
     z = z - centre
     rss = np.sum(left**2, axis=0)
-    spread = (w * z[:-1]).astype(np.float64)
+    # beside an equilibrium that is fitted as well, states count by how they differ
+    shift = np.sum(w**2 * z[:-1], axis=0) / np.sum(w**2) if np.any(centre != 0) else 0 * centre
+    spread = (w * (z[:-1] - shift)).astype(np.float64)
     gram = spread.T @ spread
     least = ROUNDING / 2 * float(np.sqrt(np.sum(before**2) / pairs))
     variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), least**2)
@@ -190,7 +199,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
     )
     if record.fine or not conditioned or drifts or kept is not None:
         return found
-    return _seen_through_storage(found, quanta, inverse, text=record.text)
+    return _seen_through_storage(found, quanta, inverse, z[:-1] - shift, text=record.text)
 
 
 def _following(
@@ -198,7 +207,7 @@ def _following(
 ) -> tuple[Extended | None, Extended]:
     """The record's slips, where steps follow them, and what these do to the weighted states (f - 1, 2)."""
     pairs = int(np.count_nonzero(w))
-    if record.slips is not None and pairs > 2 * FEWEST_PAIRS:
+    if record.slips is not None and pairs > 3 * FEWEST_PAIRS:
         plain = np.concatenate([before, w], axis=1)
         x = least_squares(plain, after)
         rest = np.linalg.pinv((np.eye(2) - x[:2].T).astype(np.float64)) @ x[2]
@@ -276,13 +285,15 @@ def _about_rest(
     return x, at, np.asarray(left)
 
 
-def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: bool) -> Map:
+def _seen_through_storage(
+    found: Map, quanta: Floats, inverse: Floats, before: Extended, *, text: bool
+) -> Map:
     """The map with what its states' storage, to within `quanta` (f, 2), says of it.
 
     Where all states are one orbit, rounded once, that orbit knows the map best.  Text does not show
     whether the arithmetic was coarser than it, so there it is enough that an orbit explains it.
     """
-    storage = _storage_covariance(found.z, found.entries, quanta, found.weight, inverse)
+    storage = _storage_covariance(before, found.entries, quanta, found.weight, inverse)
     pairs = replace(found, covariance=(found.covariance + storage) * repeats(found.z))
     whole = orbit(found.z, quanta, found.entries, constant=bool(np.any(found.centre != 0)))
     if whole is None:
@@ -301,20 +312,19 @@ def _seen_through_storage(found: Map, quanta: Floats, inverse: Floats, *, text: 
 
 
 def _storage_covariance(
-    z: Extended, entries: Extended, quanta: Floats, weight: Floats, inverse: Floats
+    before: Extended, entries: Extended, quanta: Floats, weight: Floats, inverse: Floats
 ) -> Floats:
     """Covariance (4, 4) of the entries from the rounding of each recorded number, uniform within a quantum.
 
     A rounded state stands in two pairs, once as the later and once as the earlier one; the two
     influences partly cancel, so they are summed before they are squared.
     """
-    states, b = z.astype(np.float64), entries.astype(np.float64)
-    later, earlier = np.zeros_like(states), np.zeros_like(states)
-    later[1:] = weight[:, None] ** 2 * states[:-1]
-    earlier[:-1] = weight[:, None] ** 2 * states[:-1]
+    b = entries.astype(np.float64)
+    later, earlier = np.zeros((2, len(quanta), 2))
+    later[1:] = earlier[:-1] = weight[:, None] ** 2 * before.astype(np.float64)
     # influence[m, j, i, a]: of the error of component j of state m on entry (i, a)
     influence = np.eye(2)[None, :, :, None] * later[:, None, None, :]
     influence = influence - b.T[None, :, :, None] * earlier[:, None, None, :]
-    influence = (influence @ inverse).reshape(len(states), 2, 4)
+    influence = (influence @ inverse).reshape(len(quanta), 2, 4)
     weighted = (influence * (quanta / np.sqrt(12.0))[:, :, None]).reshape(-1, 4)
     return np.asarray(weighted.T @ weighted)

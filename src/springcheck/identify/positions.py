@@ -9,7 +9,7 @@ import numpy as np
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, held_over, said_of
 from springcheck.identify.evidence import title
-from springcheck.identify.families import FAMILIES, G_ROUNDING, HELD, Family
+from springcheck.identify.families import FAMILIES, HELD, Family
 from springcheck.identify.fit import ROUNDING
 from springcheck.identify.match import Match
 from springcheck.identify.record import SIZES, Record
@@ -121,8 +121,7 @@ def _first(found: list[Recurrence], families: tuple[Family, ...], strides: range
 
 def _may_hold(joint: Joint) -> bool:
     """Whether the force may be held over some whole number of substeps, or no end of them."""
-    endless = all(abs(2 * part.g - 1) <= 12 * (part.g_error + G_ROUNDING) for part in joint.parts)
-    return endless or bool(joint.substeps[0])
+    return joint.endless or bool(joint.substeps[0])
 
 
 def _stated(

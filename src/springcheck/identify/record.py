@@ -21,6 +21,9 @@ LEAST = 2.0**-102
 SIZES = 1e-75, 1e75
 """Sizes of numbers whose fourth powers are numbers of double precision still."""
 
+ADDED_UP = 64
+"""Roundings of a clock that adds up its steps from frame to frame, half of one for each."""
+
 SAMPLE = 500
 """Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
 
@@ -139,6 +142,7 @@ def _interval(t: Floats) -> tuple[np.longdouble, float, float, Extended | None]:
     grids.append(float(np.max(storage(t).quantum(t))))
     # two rounded times make a difference, and a clock that adds its step up rounds once more each time
     quantum = next((x for x in grids if off[worst] <= 4 * x), None)
+    quantum = even if quantum is None and off[worst] <= ADDED_UP * even else quantum
     if quantum is None:
         raise IdentificationError(
             f"the states are not at a constant interval: frames {worst} and {worst + 1} are "

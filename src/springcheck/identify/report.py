@@ -169,6 +169,9 @@ def _explained(
 ) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
+    if all(x.family == HELD.name and x.endless for x in left):
+        # or of the last step's, which is a fault
+        left = []
     alone = len({(x.scheme, x.stride) for x in accepted}) == 1
     defects: list[list[arithmetic.Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):

@@ -8,7 +8,16 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.families import DAMPED, FAMILIES, G_ROUNDING, HELD, UNDAMPED, Family, substeps
+from springcheck.identify.families import (
+    DAMPED,
+    FAMILIES,
+    G_ROUNDING,
+    HELD,
+    UNDAMPED,
+    Family,
+    endless,
+    substeps,
+)
 from springcheck.identify.fit import ROUNDING, Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.match import Match, match
@@ -78,6 +87,11 @@ class Joint:
         if len({first for _, first in found}) > 1:
             return range(0), True
         return range(max(n.start for n, _ in found), min(n.stop for n, _ in found)), found[0][1]
+
+    @property
+    def endless(self) -> bool:
+        """Whether the force may be held over no end of substeps."""
+        return all(endless(part.g, part.g_error + G_ROUNDING) for part in self.parts)
 
     def __str__(self) -> str:
         steps = "" if self.stride == 1 else f", {self.stride} steps a frame"
@@ -222,10 +236,13 @@ def find(
             for strides in (*first, *room.strides):
                 fitting = [x for x in search(maps, terms, strides, room.families) if x.accepted]
                 if fitting:
-                    further = strides is FEW and (MANY in room.strides or not room.bias)
                     accepted += fitting
-                    if further:
+                    if strides is FEW and (MANY in room.strides or not room.bias):
                         accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
+                    if not (record.fine or room.damped):
+                        # a force held over substeps is nearly as many steps, and friction what steps lose
+                        others = distinct(damped=True) if strides is MANY else ()
+                        accepted += [x for x in search(maps, terms, FEW, (*others, HELD)) if x.accepted]
                     break
         if accepted:
             return _likely(accepted), terms

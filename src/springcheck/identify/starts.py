@@ -228,7 +228,10 @@ def real_starts(every: Table, found: Map, of: int, terms: Terms, strides: range)
                     np.full(n, k), np.full(n, of), s_[good], np.zeros(n), a_[good], g[good], np.ones(n, bool)
                 )
             )
-    return joined(parts)
+    none = np.zeros(0)
+    return joined(
+        parts or [Guesses(none.astype(int), none.astype(int), none, none, none, none, none.astype(bool))]
+    )
 
 
 def _folded_real(family: Family, found: Map) -> tuple[Floats, Floats, Floats]:
