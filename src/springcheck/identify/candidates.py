@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -132,6 +133,7 @@ def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple
     ]
 
 
+@cache
 def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
     """Other names of a scheme's map, and what has it on a spring of another stiffness."""
     if scheme not in SCHEMES:

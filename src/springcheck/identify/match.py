@@ -142,6 +142,16 @@ class Targets:
         return np.asarray(np.einsum("cji,jmc->imc", self.axes[of], rows))
 
 
+def _targets(maps: Sequence[Map], terms: Sequence[Terms]) -> Targets:
+    if len(maps) > 1:
+        return Targets(maps, terms)
+    asked = "targets", terms[0]
+    if asked not in maps[0].found:
+        maps[0].found[asked] = Targets(maps, terms)
+    out: Targets = maps[0].found[asked]
+    return out
+
+
 def match(
     families: tuple[Family, ...],
     maps: Sequence[Map],
@@ -157,7 +167,7 @@ def match(
     """
     every = table(families)
     with np.errstate(all="ignore"):
-        target = Targets(maps, terms)
+        target = _targets(maps, terms)
         errors = np.sqrt(target.variance[:, -1])
         errors += (
             terms[0].rounding * (float(np.max(every.path)) + WHOLE) * (strides.stop - 1) * target.largest

@@ -358,8 +358,8 @@ def disagreements(
         error += 0.0 if record.fine else SINGLE_ROOM
         # a step or a mass in single precision moves the stiffness that is worked out with the stated one
         error += 0.0 if record.momenta else 3 * abs(part.log_mass)
-        pull = abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))
-        error += 2 * quantum * (1 + 1 / pull) if quantum else 0.0
+        if quantum:
+            error += 2 * quantum * (1 + 1 / (abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))))
         off = k / float(stated[j]) - 1 if stated[j] else math.inf
         if not abs(off) <= error:
             out.append(
