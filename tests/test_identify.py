@@ -396,12 +396,21 @@ def test_an_equilibrium_away_from_zero_is_found() -> None:
     assert found.stiffness == pytest.approx(made.k, rel=1e-10)
 
 
-def test_time_may_run_backwards() -> None:
+def test_times_that_fall_are_steps_back_in_time_or_frames_in_reverse_order() -> None:
     made = case("semi-implicit-euler", np.random.default_rng(19), lowest=0.2)
     found = identify(-made.t[::-1], made.q[::-1], made.p[::-1], mass=made.m)
-    back = identify(made.t[::-1], made.q[::-1], made.p[::-1], mass=made.m)
     assert found.scheme != "semi-implicit-euler"
+    states = made.t[::-1], made.q[::-1], made.p[::-1]
+    either = identify(*states, mass=made.m)
+    assert (either.verdict, either.scheme, either.fits) == ("not told apart", None, True)
+    assert {x.scheme for x in either.candidates} == {
+        "semi-implicit-euler",
+        "semi-implicit-euler-drift-kick",
+    }
+    back = identify(*states, mass=made.m, step=-either.candidates[-1].step)
     assert (back.scheme, back.step < 0) == ("semi-implicit-euler-drift-kick", True)
+    turned = identify(*states, mass=made.m, step=either.candidates[-1].step)
+    assert (turned.scheme, turned.step > 0) == ("semi-implicit-euler", True)
 
 
 @pytest.mark.parametrize("name", ["velocity-verlet", "semi-implicit-euler"])

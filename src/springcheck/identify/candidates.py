@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.notes import LEAPFROG
 from springcheck.identify.record import Record
-from springcheck.identify.result import Candidate, Explanation
+from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import (
     SINGLE_ROOM,
     Joint,
@@ -27,6 +28,7 @@ from springcheck.identify.search import (
 from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
+from springcheck.text.wording import either
 
 T = TypeVar("T")
 
@@ -153,6 +155,30 @@ def held_over(joint: Joint) -> str:
     numbers_ = list(map(str, joint.substeps[0])) or ["many"]
     how_many = " to ".join(dict.fromkeys([numbers_[0], numbers_[-1]]))
     return f"Semi-implicit Euler whose force is held over {how_many} substeps"
+
+
+def either_way(ways: list[Identification]) -> Identification:
+    """What the frames of falling times are: in their order, by steps back in time, and in that of time."""
+    fitting = [
+        x for x in ways if x.fits and not any(rate < 0 for one in x.candidates for rate in one.friction)
+    ]
+    names = {x.scheme for x in fitting}
+    if len(fitting) < 2 or (len(names) == 1 and None not in names):
+        # friction that feeds energy in is none
+        return fitting[0] if fitting else ways[-1] if ways[0].fits else ways[0]
+    back, turned = (
+        either(list(dict.fromkeys(title(x.scheme) for x in one.candidates))[:4]) for one in fitting
+    )
+    candidates = tuple(x for one in fitting for x in one.candidates)
+    return replace(
+        fitting[0],
+        **said_of(candidates, None, False, len(fitting[0].omega)),
+        statement=f"Times fall: steps of {back} back in time, or frames of {turned} in reverse order",
+        step=math.nan,
+        stride=common([x.stride for x in candidates]),
+        velocity_offset=math.nan,
+        notes=(*fitting[0].notes, "what would tell the two apart: the step, with its sign"),
+    )
 
 
 def common(values: Sequence[T]) -> T | None:

@@ -14,6 +14,7 @@ from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
     candidates_of,
     common,
+    either_way,
     held_over,
     nearest_stiffness,
     said_of,
@@ -86,6 +87,29 @@ def identify_arrays(
     if p is None and v is None:
         alone = read(t, q, None, np.zeros(np.shape(q)), mass)
         return _of_positions(alone, stiffness, step, friction)
+    stated: dict[str, Any] = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
+    times = np.asarray(t, dtype=np.float64)
+    if not (times.ndim == 1 and len(times) > 1 and times[-1] < times[0]):
+        return _of_states(t, q, p, v, **stated)
+    # steps back in time, or frames that stand in reverse order
+    given, turned = (x is None or np.sign(x) == side for x, side in ((step, -1), (step, 1)))
+    reverse: list[Any] = [None if x is None else np.asarray(x)[::-1] for x in (t, q, p, v)]
+    ways = [_of_states(t, q, p, v, **stated)] if given or not turned else []
+    return either_way([*ways, *([_of_states(*reverse, **stated)] if turned else [])])
+
+
+def _of_states(
+    t: ArrayLike,
+    q: ArrayLike,
+    p: ArrayLike | None,
+    v: ArrayLike | None,
+    *,
+    mass: ArrayLike | None,
+    stiffness: ArrayLike | None,
+    friction: float | None,
+    step: float | None,
+) -> Identification:
+    """The scheme of states with velocities, or momenta, or both."""
     record = read(t, q, p, v, mass)
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
