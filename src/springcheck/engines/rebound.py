@@ -58,9 +58,8 @@ class _Simulation:
             sim.add(m=1.0, y=1.0)
         for m, q, v in zip(scene.m.tolist(), scene.q.tolist(), (scene.p / scene.m).tolist(), strict=True):
             sim.add(m=0.0 if centre else m, x=q, vx=v)
-        particles = _columns(sim, int(centre), scene.n)
-        self._q, self._v, self._y = particles["x"], particles["vx"], particles["y"]
-        acceleration, force = particles["ax"], scene.system.force
+        self._q, self._y, self._v, acceleration = _columns(sim, int(centre), scene.n)
+        force = scene.system.force
 
         def forces(_: Any) -> None:
             self.force_calls += 1
@@ -83,19 +82,15 @@ class _Simulation:
             self.off_axis = max(self.off_axis, float(np.max(np.abs(self._y))))
 
 
-def _columns(sim: Any, first: int, n: int) -> dict[str, Floats]:
-    """Views (n,) of the components of REBOUND's particles, from this one on."""
+def _columns(sim: Any, first: int, n: int) -> list[Floats]:
+    """Views (n,) of x, y, and velocity and acceleration along x of REBOUND's particles from this one on."""
     import rebound
 
     size = ctypes.sizeof(rebound.Particle)
     address = ctypes.addressof(sim.particles[first])
     memory: Any = (ctypes.c_char * (size * n)).from_address(address)
-    return {
-        name: np.ndarray(
-            (n,), np.float64, buffer=memory, offset=getattr(rebound.Particle, name).offset, strides=(size,)
-        )
-        for name in ("x", "y", "vx", "ax")
-    }
+    offsets = [getattr(rebound.Particle, name).offset for name in ("x", "y", "vx", "ax")]
+    return [np.ndarray((n,), np.float64, memory, offset, (size,)) for offset in offsets]
 
 
 ENGINE = Engine(
