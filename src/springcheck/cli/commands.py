@@ -33,18 +33,21 @@ class Command:
 
 
 def _inspect(options: Namespace) -> int:
+    from springcheck import store
     from springcheck.cli import inspect
 
-    rows = 20 if options.rows is None else options.rows
-    if rows < 1:
-        raise SpringcheckError(f"--rows {rows}: a number of frames from 1 on is needed")
+    if options.rows is not None and options.rows < 1:
+        raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
     doubts = output.doubts(options.file)
-    found = inspect.look(Path(options.file), trajectory=options.trajectory, rows=rows)
-    output.warn(options.file, doubts)
+    summary = store.summary(Path(options.file))
     if options.json:
-        output.document({"not_trusted": doubts, **inspect.document(found)})
+        document = inspect.document(summary, options)
+        output.warn(options.file, doubts)
+        output.document({"not_trusted": doubts, **document})
     else:
-        output.show(inspect.lines(found, options))
+        lines = inspect.lines(summary, options)
+        output.warn(options.file, doubts)
+        output.show(lines)
     return int(bool(doubts))
 
 

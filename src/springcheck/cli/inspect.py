@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from springcheck import store
@@ -16,24 +14,6 @@ from springcheck.text.lines import Lines, Table, plain, table
 from springcheck.text.wording import ordinal
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
-    """What `springcheck inspect` shows."""
-
-    summary: store.Summary
-    studies: tuple[tuple[Study, Result], ...]
-    frames: Trajectory | None
-    """Some frames of the trajectory asked for, all over its length."""
-    stride: int = 1
-
-
-def look(path: Path, *, trajectory: str | None = None, rows: int = 20) -> Found:
-    """Read what is in a store.  StoreError where it cannot be read or holds no such trajectory."""
-    summary = store.summary(path)
-    frames, stride = store.strided(path, trajectory, rows) if trajectory else (None, 1)
-    return Found(summary=summary, studies=tuple(held(summary)), frames=frames, stride=stride)
-
-
 def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
     """The studies of a store, each with its result.  StoreError where one of them cannot be read."""
     for study in STUDIES:
@@ -41,9 +21,8 @@ def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
             yield study, study.stored(summary.path)
 
 
-def lines(found: Found, options: Namespace) -> Lines:
-    """The store as text."""
-    summary = found.summary
+def lines(summary: store.Summary, options: Namespace) -> Lines:
+    """The store as text.  StoreError where it cannot be read or holds no such trajectory."""
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     if not summary.complete:
         out.append(plain("unfinished: the command that writes it has not ended", "bold red"))
@@ -62,12 +41,18 @@ def lines(found: Found, options: Namespace) -> Lines:
             _runs(summary),
         ]
     out += [plain(f"table {name}") for name in summary.tables]
-    for study, result in found.studies:
+    for study, result in held(summary):
         said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
-    if found.frames is not None:
-        out += [plain(), *_frames(found.frames, found.stride)]
-    return out
+    run, stride = _asked_for(summary, options)
+    return out if run is None else [*out, plain(), *_frames(run, stride)]
+
+
+def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:
+    """Some frames of the trajectory asked for, all over its length, and every how many of them."""
+    if options.trajectory is None:
+        return None, 1
+    return store.strided(summary.path, options.trajectory, 20 if options.rows is None else options.rows)
 
 
 def _runs(summary: store.Summary) -> Table:
@@ -99,19 +84,17 @@ def _frames(run: Trajectory, stride: int) -> Lines:
     return [plain(title, "italic"), table(("t", *names), rows)]
 
 
-def document(found: Found) -> dict[str, Any]:
+def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
     """The store as plain data for JSON."""
-    summary, frames = found.summary, found.frames
     documents: dict[str, Any] = {}
     kept: dict[str, Any] = {"verdicts": ()}
-    for study, result in found.studies:
+    for study, result in held(summary):
         if study.trajectories:
             kept |= result.document()
         else:
             documents[study.name] = result.document()
-    shown = frames and {
-        "label": frames.label, "stride": found.stride, "t": frames.t, "q": frames.q, "p": frames.p,
-    }  # fmt: skip
+    run, stride = _asked_for(summary, options)
+    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p}
     return keeper.document(
         store=summary.path,
         bytes=summary.size,

@@ -95,30 +95,25 @@ def plain(bank: Bank) -> dict[str, Any]:
     """For JSON: numbers that are none are words, rows of tiles are runs of one kind, [count, kind]."""
     names = [x.name for chart in bank.charts for x in chart.curves]
     titles = [chart.title for chart in bank.charts if chart.tiles]
-    on = [*names, *titles] if bank.on is None else bank.on
-    charts = [_chart(chart) for chart in bank.charts]
-    return {"title": bank.title, "charts": charts, "on": list(dict.fromkeys(on))}
+    found = asdict(bank) | {"on": list(dict.fromkeys([*names, *titles] if bank.on is None else bank.on))}
+    for chart in found["charts"]:
+        for axis in (chart["x"], chart["y"]):
+            said = list(axis.pop("names"))
+            axis |= {"named": bool(said), "values": said or numbers(axis["values"])}
+        for curve in chart["curves"]:
+            curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
+        if tiles := chart["tiles"]:
+            texts = list(dict.fromkeys(note for row in tiles["notes"] for note in row if note))
+            at = {"": -1} | {text: i for i, text in enumerate(texts)}
+            tiles |= {
+                "rows": [[[len(list(run)), kind] for kind, run in groupby(row)] for row in tiles["rows"]],
+                "texts": texts,
+                "notes": [[at[note] for note in row] for row in tiles["notes"]],
+            }
+    return found
 
 
 def numbers(values: Sequence[float] | Floats) -> list[float | str]:
     """Doubles as JSON reads them back bit for bit, and words for those that JSON has not."""
     words = {math.inf: "Infinity", -math.inf: "-Infinity"}
     return [x if math.isfinite(x) else words.get(x, "NaN") for x in np.asarray(values, np.float64).tolist()]
-
-
-def _chart(chart: Chart) -> dict[str, Any]:
-    found = asdict(chart)
-    for name in ("x", "y"):
-        names = list(found[name].pop("names"))
-        found[name] |= {"named": bool(names), "values": names or numbers(found[name]["values"])}
-    for curve in found["curves"]:
-        curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
-    if chart.tiles:
-        texts = list(dict.fromkeys(note for row in chart.tiles.notes for note in row if note))
-        at = {"": -1} | {text: i for i, text in enumerate(texts)}
-        found["tiles"] |= {
-            "rows": [[[len(list(run)), kind] for kind, run in groupby(row)] for row in chart.tiles.rows],
-            "texts": texts,
-            "notes": [[at[note] for note in row] for row in chart.tiles.notes],
-        }
-    return found

@@ -66,7 +66,7 @@ def order(points: Sequence[Point]) -> Fit | None:
     ][-FITTED:]
     if len(chosen) < FEWEST:
         return None
-    found = line(np.log([abs(x.size) for x in chosen]), np.log([x.error for x in chosen]))
+    found = line(np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen]))
     return Fit(
         order=found.slope,
         standard_error=found.standard_error,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -49,11 +48,6 @@ class Point:
         return self.outcome == "complete"
 
     @property
-    def size(self) -> float:
-        """Length of the step, 0 for an adaptive solver."""
-        return self.step or 0.0
-
-    @property
     def error(self) -> float:
         """The largest error, NaN where there is none."""
         return self.accuracy.max_error if self.accuracy else float("nan")
@@ -98,10 +92,6 @@ class Point:
         }
 
 
-def _run_seconds(points: Sequence[Point]) -> dict[str, Any]:
-    return {"run_seconds": np.array([point.seconds for point in points])}
-
-
 POINTS: Rows[Point] = Rows(
     kind=Point,
     beginning="precision/",
@@ -114,7 +104,7 @@ POINTS: Rows[Point] = Rows(
     axes=("run_seconds",),
     log=("run_seconds", "max_error"),
     about="error against run time; errors relative to the initial energy norm; -1 and NaN: not known",
-    extra=_run_seconds,
+    extra=lambda points: {"run_seconds": np.array([point.seconds for point in points])},
 )
 """A table for each method, its points from coarse to fine; the attribute `study_seconds`: what the study
 had taken by then."""
