@@ -157,8 +157,9 @@ def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[
     frequency = best(apart * at, waves[:, at], double[at % (size // 2)])
     for room in (apart, apart / 20):
         w = frequency + room * np.linspace(-1, 1, 41)
+        # two rows of squares: of one and a matrix BLAS makes a product in threads, which cost more than it
         parts = [
-            (summed @ x, square @ x**2)
+            (summed @ x, (np.stack([square, square]) @ x**2)[0])
             for x in (np.exp(1j * np.outer(n, y)) for y in np.array_split(w, 1 + frames // LONG))
         ]
         waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
