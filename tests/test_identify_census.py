@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from springcheck.identify import identify
+
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "validation"))
 _spec = importlib.util.spec_from_file_location("identify_census", ROOT / "validation" / "identify_census.py")
@@ -186,3 +188,12 @@ def test_the_census_tells_a_wrong_name_from_a_right_one() -> None:
 @pytest.mark.parametrize("number", [3065, 3071, 3379, 3481])
 def test_positions_at_rounded_times_are_named(number: int) -> None:
     assert census.said_of(number, alone=True)[1] == "named"
+
+
+def test_a_missing_frame_of_a_coarse_file_is_no_rounding_of_many_steps() -> None:
+    draw = census.Draw(np.random.default_rng([7, 166]))
+    draw.single, draw.clock = "", "even"
+    t, q, v = draw.move()
+    assert draw.form == "text"
+    q, v = (census.written(np.delete(x, 22), "text") for x in (q, v))
+    assert not identify(t[:-1], q, v=v, mass=draw.m, stiffness=draw.k).fits

@@ -200,7 +200,9 @@ def _defects(
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-        rebuilt = (size + difference) * path[:, None, None]
+        # velocities are differences of positions in some schemes alone, and many roundings are random
+        differs = np.array([match.scheme in coarse.STOERMER for match in matches])[:, None, None]
+        rebuilt = (size + np.where(differs, difference, 0.0)) * np.minimum(path, usual)[:, None, None]
         # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
         half = (1 + 10 / np.sqrt(len(z))) * half
         stored = _largest(missing, half + 2.0**-52 * rebuilt) <= 1
