@@ -15,7 +15,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import exact as solutions
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict, of_scene
 
 if TYPE_CHECKING:
     from springcheck.identify.result import Identification
@@ -137,16 +137,7 @@ def exact(scene: Scene | str | Path) -> Trajectory:
         raise SpringcheckError(f"scene {found.name}: no closed form of its exact solution is known")
     steps = np.arange(found.frames, dtype=np.int64) * found.every
     q, p = (np.asarray(x, np.float64) for x in solutions.true_motion(found, steps, found.step))
-    return Trajectory(
-        label="exact",
-        scheme="exact",
-        t=np.asarray(steps * found.step, np.float64),
-        q=q,
-        p=p,
-        step=found.step,
-        every=found.every,
-        outcome=Outcome(status="complete", step=found.steps),
-    )
+    return of_scene(found, q, p, label="exact", scheme="exact")
 
 
 def read(path: str | Path) -> dict[str, Trajectory]:

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import Arithmetic, Floats
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +113,13 @@ def _library(name: str) -> Any:
         raise SpringcheckError(
             f"{name} is not installed; install it with: python -m pip install {name}"
         ) from None
+
+
+def of_scene(scene: Scene, q: Floats, p: Floats, **more: Any) -> Trajectory:
+    """States (f, n) at the frames of a scene from its start on, complete unless `more` says otherwise."""
+    known: dict[str, Any] = {"outcome": Outcome(status="complete", step=scene.steps), **more}
+    t = np.arange(len(q), dtype=np.float64) * scene.every * scene.step
+    return Trajectory(t=t, q=q, p=p, step=scene.step, every=scene.every, **known)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,10 +17,9 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
 from springcheck.engines.contract import Label
-from springcheck.physics import trajectory
 from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.extremes.grid import Spec
 
 Outcome: TypeAlias = Literal[
@@ -220,15 +219,7 @@ def growth_of(case: checks.Case, scene: Scene) -> Floats:
 def as_trajectory(label: Label, scene: Scene, q: Floats, p: Floats, how: Arithmetic) -> Trajectory:
     """Frames as a trajectory that `checks.Case` takes, whatever its numbers are."""
     method = engines.method(label)
-    return Trajectory(
-        label=str(label),
-        scheme=method.scheme,
-        t=np.arange(len(q), dtype=np.float64) * scene.every * scene.step,
-        q=q,
-        p=p,
-        step=scene.step,
-        every=scene.every,
-        outcome=trajectory.Outcome(status="complete", step=scene.steps),
-        arithmetic=how,
+    return of_scene(
+        scene, q, p, label=str(label), scheme=method.scheme, arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
-    )
+    )  # fmt: skip

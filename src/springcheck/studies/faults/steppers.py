@@ -13,7 +13,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Outcome, Trajectory
+from springcheck.physics.trajectory import Outcome, Trajectory, of_scene
 from springcheck.schemes.stepping import Slope
 
 State: TypeAlias = tuple[Floats, Floats]
@@ -89,15 +89,13 @@ def trajectory(
     finite = np.isfinite(q).all(axis=1) & np.isfinite(p).all(axis=1)
     f = len(q) if finite.all() else int(np.argmin(finite))
     q, p = q[:f], p[:f]
-    return Trajectory(
+    return of_scene(
+        scene,
+        q,
+        p,
         label=label,
         scheme=scheme.name,
-        t=np.arange(f, dtype=np.float64) * scene.every * scene.step,
-        q=q,
-        p=p,
         energy=energies(scene, q, p) if "energy" in scene.quantities else None,
-        step=scene.step,
-        every=scene.every,
         outcome=Outcome(status="complete" if f == scene.frames else "diverged", step=(f - 1) * scene.every),
         force_calls=scene.steps if calls is None else calls,
         tolerance=tolerance,
