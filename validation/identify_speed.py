@@ -2,19 +2,25 @@
 
     python validation/identify_speed.py [CALLS [SRC]]
 
-Processor time of a call on trajectories of 101 frames that `identify_census` draws, by class: plain (without
-friction) and damped in double precision, single precision, text, a systematic error that no scheme explains;
-and 16 oscillators at once.  With SRC, the folder `src` of another checkout, the same trajectories go to its
-package in turn with this one, twice each, and the ratio of the two is printed; the shortest time of each
-trajectory counts, after one call that is not timed.
+Processor time of a call on trajectories of 101 frames that `identify_census` draws, by class: plain
+(without friction) and damped in double precision, held forces, single precision, text, a systematic error
+that no scheme explains; of trajectories as they are drawn, whatever their class; and 16 oscillators at
+once. With SRC, the folder `src` of another checkout, the same trajectories go to its package in turn with
+this one, twice each, and the ratio of the two is printed; the shortest time of each trajectory counts,
+after one call that is not timed.
 
-Printed for 15 calls on two idle cores (median and most):
-    plain 4.7 and 18.9 ms.  damped 9.6 and 31.6.  held 6.5 and 9.8.  single 12.0 and 106.9
-    text 17.7 and 87.5.  systematic error 22.8 and 105.3.  16 oscillators 34.7
+Printed for 15 calls with a load of 5 to 7 on two cores (median and most; before: commit 81a7ca4):
+    plain 5.0 and 19.4 ms, before 6.6 and 26.1.  damped 8.6 and 15.5, before 12.6 and 43.0
+    held 6.3 and 8.1, before 8.8 and 13.7.  single 9.6 and 102.5, before 16.4 and 147.6
+    text 12.5 and 81.7, before 24.9 and 115.4.  systematic error 21.9 and 114.3, before 30.6 and 132.1
+    16 oscillators 44.7, before 47.4.  as drawn 8.4 and 226.0, before 13.4 and 359.0
+    mean as drawn 13.4 ms: 5.36e+05 calls an hour on two cores
+On idle cores commit 81a7ca4 took 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators).
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -31,6 +37,11 @@ from springcheck.identify import identify
 from springcheck.physics.arrays import Floats
 
 ROUNDS = 2
+
+MIXED = 10
+"""Trajectories as they are drawn, for each call of a class."""
+
+AS_DRAWN = "as drawn"
 
 
 def _class(draw: Draw) -> str:
@@ -55,39 +66,41 @@ def _many() -> tuple[Floats, Floats, Floats]:
     return np.asarray(0.1 * np.arange(401), np.float64), qs, vs
 
 
+def _seconds(draw: Draw) -> float | None:
+    """Processor time of one call on a trajectory, None where it overflows."""
+    try:
+        with np.errstate(all="ignore"):
+            t, q, v = draw.move()
+    except OverflowError:
+        return None
+    if not np.max(np.abs(q)) < 1e30:
+        return None
+    q, v = written(q, draw.form), written(v, draw.form)
+    begun = time.process_time()
+    with contextlib.suppress(IdentificationError):
+        identify(t, q, v=v, mass=draw.m, stiffness=draw.k if draw.stated else None)
+    return time.process_time() - begun
+
+
 def measure(calls: int) -> dict[str, list[float]]:
     """Seconds of each call, by class."""
-    seconds: dict[str, list[float]] = {
-        name: [] for name in ("plain", "damped", "held", "single", "text", "systematic error")
-    }
+    names = ("plain", "damped", "held", "single", "text", "systematic error")
+    seconds: dict[str, list[float]] = {name: [] for name in names}
+    for _ in range(2):
+        _seconds(Draw(np.random.default_rng([8, 0])))
     number = 0
     while any(len(x) < calls for x in seconds.values()):
         draw = Draw(np.random.default_rng([8, number]))
         number += 1
         mine = seconds[_class(draw)]
-        if len(mine) >= calls:
-            continue
-        try:
-            with np.errstate(all="ignore"):
-                t, q, v = draw.move()
-        except OverflowError:
-            continue
-        if not np.max(np.abs(q)) < 1e30:
-            continue
-        q, v = written(q, draw.form), written(v, draw.form)
-        if not any(seconds.values()):
-            identify(t, q, v=v, mass=draw.m)
-        begun = time.process_time()
-        try:
-            identify(t, q, v=v, mass=draw.m, stiffness=draw.k if draw.stated else None)
-        except IdentificationError:
-            continue
-        finally:
-            mine.append(time.process_time() - begun)
+        if len(mine) < calls and (spent := _seconds(draw)) is not None:
+            mine.append(spent)
+    drawn = (_seconds(Draw(np.random.default_rng([9, number]))) for number in range(MIXED * calls))
     t, q, v = _many()
     begun = time.process_time()
     identify(t, q, v=v, mass=np.ones(16))
-    return seconds | {"16 oscillators": [time.process_time() - begun]}
+    many = [time.process_time() - begun]
+    return seconds | {"16 oscillators": many, AS_DRAWN: [x for x in drawn if x is not None]}
 
 
 def main() -> None:
@@ -114,6 +127,8 @@ def main() -> None:
             text += f"; before {1e3 * float(np.median(old)):7.1f} and {1e3 * float(np.max(old)):7.1f}: "
             text += f"{float(np.sum(old) / np.sum(new)):.1f} times shorter"
         print(text)
+    mean = float(np.mean(best["new"][AS_DRAWN]))
+    print(f"mean as drawn {1e3 * mean:.1f} ms: {2 * 3600 / mean:.3g} calls an hour on two cores")
 
 
 if __name__ == "__main__":
