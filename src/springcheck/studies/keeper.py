@@ -82,9 +82,10 @@ class Keeper:
         journal: store.Journal | None = None,
         progress: Progress | None = None,
         team: Team = ALONE,
+        path: Path | None = None,
     ) -> None:
         self._journal, self.team = journal, team
-        self.path: Path | None = None
+        self.path = path
         """Of the store, as it was given."""
         self._finished = journal.tables() if journal else {}
         self.progress = progress
@@ -204,9 +205,7 @@ def kept(
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
     with open_new(path, command, force=force) as journal:
-        found = Keeper(journal, progress, team)
-        found.path = Path(path)
-        yield found
+        yield Keeper(journal, progress, team, Path(path))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -70,10 +70,6 @@ class Truth:
         """w T: the largest angle through which the motion turns."""
         return abs(self.duration) * self.w
 
-    def at(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
-        """True q and p (f, n) after so many steps of h."""
-        return exact.true_motion(self.scene, steps, h)
-
 
 @np.errstate(over="ignore", invalid="ignore")
 def truth(scene: Scene) -> Truth:
@@ -134,7 +130,7 @@ class Errors:
         known, norm = self._truth, self._truth.scene.system.norm
         steps = np.arange(self._frame, self._frame + len(t)) * self._every
         self._frame += len(t)
-        true_q, true_p = known.at(steps, self._h)
+        true_q, true_p = exact.true_motion(known.scene, steps, self._h)
         with np.errstate(over="ignore", invalid="ignore"):
             error = norm(q - true_q, p - true_p)
             # nothing below what is known of the exact solution is reported as an error
