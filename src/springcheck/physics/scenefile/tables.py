@@ -1,9 +1,9 @@
-"""What may stand in a scene file: the fields of each table, with their units."""
+"""What may stand in a scene file: one struct for each table, fields with their units."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, cast, get_args
 
 import msgspec
 
@@ -20,19 +20,110 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=Tru
     """A table of a scene file: what is not a field of it is refused."""
 
 
-def _table(name: str, fields: dict[str, Any], rename: dict[str, str] | None = None) -> Any:
-    """A table of these fields: the type of each, with its default where it may be left out."""
-    given = [(field, *(of if isinstance(of, tuple) else (of,))) for field, of in fields.items()]
-    return msgspec.defstruct(f"{name}Table", given, bases=(Table,), frozen=True, kw_only=True, rename=rename)
+class ParticleTable(Table, frozen=True):
+    """mass [M], position [L] and momentum [M L/T] at the start."""
+
+    mass: Positive
+    position: float = 0.0
+    momentum: float = 0.0
 
 
-def _several(table: Any) -> Any:
-    """The field of a scene that holds any number of such tables."""
-    return tuple[table, ...], ()
+class RotorTable(Table, frozen=True):
+    """A body that turns: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
+
+    inertia: Positive
+    angle: float = 0.0
+    momentum: float = 0.0
+
+
+class InductorTable(Table, frozen=True):
+    """The inductor of a loop: inductance [H], charge that has gone round [C] and flux [Wb] at the start."""
+
+    inductance: Positive
+    charge: float = 0.0
+    flux: float = 0.0
+
+
+class CapacitorTable(Table, frozen=True):
+    """A capacitor in one loop, or between two loops that go through it in opposite directions [F]."""
+
+    loops: Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=2)]
+    capacitance: Positive
+
+
+class ResistorTable(Table, frozen=True):
+    """A resistor of one loop [Ohm]."""
+
+    loop: int
+    resistance: NonNegative
+
+
+class SpringTable(Table, frozen=True):
+    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L].
+
+    `fast` springs are taken in the short step of a method of multiple time steps.
+    """
+
+    ends: tuple[End, End]
+    stiffness: float
+    rest: float = 0.0
+    wall: float = 0.0
+    fast: bool = False
+
+
+class DampingTable(Table, frozen=True):
+    """Friction of one particle: force -coefficient p/mass, coefficient [M/T]."""
+
+    particle: int
+    coefficient: NonNegative
+
+
+class WaveTable(Table, frozen=True):
+    """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
+
+    mode: Count
+    amplitude: float
+
+
+class ChainTable(Table, frozen=True):
+    """Equal masses [M] between two walls, neighbours joined by equal springs [M/T2].
+
+    Positions count from the rest of each mass; the start is a sum of standing waves, or the position and
+    the momentum of each mass.
+    """
+
+    masses: Count
+    mass: Positive
+    stiffness: Positive
+    wave: tuple[WaveTable, ...] = ()
+    position: tuple[float, ...] = ()
+    momentum: tuple[float, ...] = ()
+
+
+class TimeTable(Table, frozen=True):
+    """Step [T], number of steps, and the relative tolerance per step of adaptive solvers."""
+
+    step: float
+    steps: Count
+    every: Count | None = None
+    tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
+
+
+class MethodsTable(Table, frozen=True):
+    """Labels or globs of the methods to run; all that can serve the scene when left out."""
+
+    include: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] = ("*",)
+
+
+class RecordTable(Table, frozen=True):
+    """Every how many steps a frame is kept, and what of it."""
+
+    every: Count | None = None
+    quantities: tuple[Quantity, ...] = ("q", "p", "energy")
 
 
 class Body(NamedTuple):
-    """What moves: the kind of its scenes, the word for several, and what it calls m, q and p."""
+    """What moves: the kind of its scenes, the word for several, and what its table calls m, q and p."""
 
     kind: Kind
     several: str
@@ -40,97 +131,54 @@ class Body(NamedTuple):
 
 
 BODIES = {
-    # [M], [L], [M L/T]
-    "particle": Body("particles", "particles", ("mass", "position", "momentum")),
-    # a body that turns: [M L2], [rad], [M L2/T]
-    "rotor": Body("rotor", "rotors", ("inertia", "angle", "momentum")),
-    # the inductor of a loop: [H], charge that has gone round [C], [Wb]
-    "inductor": Body("circuit", "inductors", ("inductance", "charge", "flux")),
+    "particle": Body("particles", "particles", ParticleTable.__struct_fields__),
+    "rotor": Body("rotor", "rotors", RotorTable.__struct_fields__),
+    "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
 }
 """What moves, by the name of its table."""
 
-_FIELDS: dict[str, dict[str, Any]] = {
-    **{
-        name: {body.columns[0]: Positive, body.columns[1]: (float, 0.0), body.columns[2]: (float, 0.0)}
-        for name, body in BODIES.items()
-        if body.columns
-    },
-    # in one loop, or between two loops that go through it in opposite directions [F]
-    "capacitor": {
-        "loops": Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=2)],
-        "capacitance": Positive,
-    },
-    # of one loop [Ohm]
-    "resistor": {"loop": int, "resistance": NonNegative},
-    # equal masses [M] between two walls, neighbours joined by equal springs [M/T2]; positions count from the
-    # rest of each; the start is a sum of standing waves, mode 1 the slowest, or that of each mass
-    "chain": {
-        "masses": Count,
-        "mass": Positive,
-        "stiffness": Positive,
-        "wave": _several(_table("wave", {"mode": Count, "amplitude": float})),
-        "position": (tuple[float, ...], ()),
-        "momentum": (tuple[float, ...], ()),
-    },
-    # [M/T2], rest length [L], place of a wall [L]; `fast` ones are taken in the short step of a method of
-    # multiple time steps
-    "spring": {
-        "ends": tuple[End, End],
-        "stiffness": float,
-        "rest": (float, 0.0),
-        "wall": (float, 0.0),
-        "fast": (bool, False),
-    },
-    # force -coefficient p/mass [M/T]
-    "damping": {"particle": int, "coefficient": NonNegative},
-    # [T], and the relative tolerance per step of adaptive solvers
-    "time": {
-        "step": float,
-        "steps": Count,
-        "every": (Count | None, None),
-        "tolerance": (Annotated[float, msgspec.Meta(gt=0, lt=1)], 1e-12),
-    },
-    # labels or globs of the methods to run; all that can serve the scene when left out
-    "methods": {"include": (Annotated[tuple[str, ...], msgspec.Meta(min_length=1)], ("*",))},
-    # every how many steps a frame is kept, and what of it
-    "record": {"every": (Count | None, None), "quantities": (tuple[Quantity, ...], ("q", "p", "energy"))},
-}
-_TABLES = {name: _table(name, fields) for name, fields in _FIELDS.items()}
 
-_SCENE: dict[str, Any] = {
-    "title": str,
-    "time": _TABLES["time"],
-    "source": (str, ""),
-    "units": (Units | None, None),
-    "kind": (Kind | None, None),
-    **{
-        name: (table | None, None) if name == "chain" else _several(table)
-        for name, table in _TABLES.items()
-        if name not in ("time", "methods", "record")
-    },
-    "methods": (_TABLES["methods"], _TABLES["methods"]()),
-    "record": (_TABLES["record"], _TABLES["record"]()),
-}
-"""A scene file without the tables of the terms that need no more than their columns."""
+class SceneBase(Table, frozen=True):
+    """A scene file without the tables of the terms that need no more than their columns."""
+
+    title: str
+    time: TimeTable
+    source: str = ""
+    units: Units | None = None
+    kind: Kind | None = None
+    particle: tuple[ParticleTable, ...] = ()
+    rotor: tuple[RotorTable, ...] = ()
+    inductor: tuple[InductorTable, ...] = ()
+    capacitor: tuple[CapacitorTable, ...] = ()
+    resistor: tuple[ResistorTable, ...] = ()
+    chain: ChainTable | None = None
+    spring: tuple[SpringTable, ...] = ()
+    damping: tuple[DampingTable, ...] = ()
+    methods: MethodsTable = MethodsTable()
+    record: RecordTable = RecordTable()
 
 
 _SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": NonNegative}
 
 
-def _of_term(term: Any) -> Any:
+def _of_term(term: Any) -> type[Table]:
     """The table of a term: the particle or the two ends on which it acts, and its columns."""
-    fields: dict[str, Any] = {"particle": int} if len(term.ends) == 1 else {"ends": tuple[int, int]}
+    fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
+    names = {}
     for column in term.columns:
         kind: Any = _SIGNS[column.sign]
         name = identifier(column.name)
+        names[name] = column.name
         if column.inverse:
             # given itself, or its inverse under the name of the field
-            fields |= {name: (kind | None, None), column.field: (kind | None, None)}
-        else:
-            fields[name] = kind if column.default is None else (kind, column.default)
-    names = {identifier(column.name): column.name for column in term.columns}
-    return _table(term.__name__, fields, names)
+            fields += [(name, kind | None, None), (column.field, kind | None, None)]
+            continue
+        fields.append((name, kind) if column.default is None else (name, kind, column.default))
+    table = msgspec.defstruct(
+        f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True, rename=names
+    )
+    return cast(type[Table], table)
 
 
 def identifier(name: str) -> str:
@@ -142,13 +190,13 @@ OTHERWISE = ("wall-spring", "spring", "damping")
 """Terms that have tables of their own."""
 
 
-def of_terms() -> dict[str, tuple[Any, Any]]:
+def of_terms() -> dict[str, tuple[Any, type[Table]]]:
     """The terms that are read by their columns alone, with their tables."""
     return _of_terms(tuple(terms.known().values()))
 
 
 @lru_cache(maxsize=8)
-def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, Any]]:
+def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, type[Table]]]:
     return {term.key: (term, _of_term(term)) for term in known if term.key not in OTHERWISE}
 
 
@@ -159,8 +207,14 @@ def scene_table() -> Any:
 
 @lru_cache(maxsize=8)
 def _scene_table(known: tuple[type[terms.Term], ...]) -> Any:
-    several = {identifier(key): _several(table) for key, (_, table) in _of_terms(known).items()}
-    return _table("Scene", _SCENE | several, {identifier(key): key for key in _of_terms(known)})
+    return msgspec.defstruct(
+        "SceneTable",
+        [(identifier(key), tuple[table, ...], ()) for key, (_, table) in _of_terms(known).items()],  # type: ignore[valid-type]
+        bases=(SceneBase,),
+        frozen=True,
+        kw_only=True,
+        rename={identifier(key): key for key in _of_terms(known)},
+    )
 
 
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -173,5 +227,10 @@ CHOICES: dict[str, tuple[str, ...]] = {
 
 def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
-    found = _TABLES | {key: table for key, (_, table) in of_terms().items()} | {"": scene_table()}
-    return found.get(name)
+    given = (
+        ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
+        DampingTable, TimeTable, MethodsTable, RecordTable,
+    )  # fmt: skip
+    found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
+    found |= {key: table for key, (_, table) in of_terms().items()}
+    return scene_table() if name == "" else found.get(name)
