@@ -197,3 +197,22 @@ def test_a_missing_frame_of_a_coarse_file_is_no_rounding_of_many_steps() -> None
     assert draw.form == "text"
     q, v = (census.written(np.delete(x, 22), "text") for x in (q, v))
     assert not identify(t[:-1], q, v=v, mass=draw.m, stiffness=draw.k).fits
+
+
+def test_a_thermostat_in_single_precision_is_no_rounding_of_velocities_rebuilt_over_fine_steps() -> None:
+    x, u, w2, h, rows = (
+        -5.371141823906391,
+        -0.001129309300689361,
+        9.205808740534945e-06,
+        8.760972271142174,
+        [],
+    )
+    warm = u * u + w2 * x * x
+    for _ in range(101):
+        rows.append((x, u))
+        u -= h / 2 * w2 * x
+        x += h * u
+        u -= h / 2 * w2 * x
+        u *= np.sqrt(1 + 1.8836766e-4 * (0.5 * warm / u**2 - 1))
+    q, v = (census.written(y, "single") for y in np.array(rows).T)
+    assert not identify(h * np.arange(101), q, v=v, mass=1.0, stiffness=w2).fits

@@ -200,13 +200,23 @@ def _defects(
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-        # velocities are differences of positions in some schemes alone, and many roundings are random
-        differs = np.array([match.scheme in coarse.STOERMER for match in matches])[:, None, None]
-        rebuilt = (size + np.where(differs, difference, 0.0)) * np.minimum(path, usual)[:, None, None]
+        if np.any(found.centre != 0):
+            # the equilibrium is as uncertain as the map, and each scheme has its own
+            away = np.eye(2)[:, 0] - np.array([m.predicted for m in matches], np.float64)[:, None, [0, 2]]
+            weight = away / np.maximum(half, 1e-30 * np.max(half)) ** 2
+            shift = np.sum(weight * signed, axis=(1, 2)) / np.sum(weight * away, axis=(1, 2))
+            signed = signed - shift[:, None, None] * away
+            missing = np.abs(signed)
+        # roundings of many steps are random
+        most = np.minimum(path, usual)[:, None, None]
         # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
         half = (1 + 10 / np.sqrt(len(z))) * half
-        stored = _largest(missing, half + 2.0**-52 * rebuilt) <= 1
-        coarse_file = _largest(missing, half + 2.0**-24 * rebuilt) <= 1
+        stored = _largest(missing, half + 2.0**-52 * size * most) <= 1
+        coarse_file = _largest(missing, half + 2.0**-24 * size * most) <= 1
+        # velocities are differences of positions in some schemes alone, and their roundings are irregular
+        differs = _largest(missing, half + 2.0**-24 * (size + difference) * most) <= 1
+        for i in np.flatnonzero(differs & ~coarse_file).tolist():
+            coarse_file[i] = matches[i].scheme in coarse.STOERMER and coarse.irregular(signed[i])
     share = _largest(missing, np.repeat(lengths[None, :-1, None], 2, axis=2))
     out = []
     for i, match in enumerate(matches):
