@@ -78,6 +78,10 @@ def test_what_is_shown_is_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     start = springcheck.judge(spring, run)[0]
     assert repr(start) == "Verdict(own:euler start: passed, 0 of 0)"
     report = springcheck.run(spring, "own:euler", path="shown.h5")
+    found = springcheck.identify(run, mass=1.0)
+    assert repr(found) == "Identification(named: Explicit Euler: double arithmetic explains every step)"
+    assert str(found).startswith("the states: explicit-euler\n")
+    assert "  stiffness:              1\n" in str(found)
     assert repr(report).startswith("Report('spring', 1 method: ")
     assert len(repr(report)) < 100
     for one in (run, shown):

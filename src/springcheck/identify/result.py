@@ -96,6 +96,15 @@ class Identification:
     explanations: tuple[Explanation, ...] = ()
     """Where no scheme fits, or not what was stated: what may be wrong, the best first."""
 
+    def __repr__(self) -> str:
+        return f"Identification({self.verdict}: {self.statement})"
+
+    def __str__(self) -> str:
+        """What the command prints."""
+        from springcheck.identify.text import identification
+
+        return "\n".join(map(str, identification("the states", self)))
+
     @property
     def choice(self) -> list[str]:
         """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
