@@ -60,6 +60,21 @@ def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extende
     return np.asarray(out)
 
 
+def _retimed(record: Record, found: Map, matches: list[Match], signed: Floats) -> Floats:
+    """What is missing (c, f - 1, 2) but for what the rounding of the times does to the interval.
+
+    Velocities count in positions an interval: where that is long by a share of itself, M12 is small by the
+    share, and M21 large.  Times that began at 0 are rounded no more than a step.
+    """
+    if record.jitter <= 2.0**-50:
+        return signed
+    b = np.array([match.predicted for match in matches], np.float64).reshape(-1, 2, 2)
+    z = found.z[:-1].astype(np.float64)
+    change = np.stack([b[:, 0, 1, None] * z[:, 1], -b[:, 1, 0, None] * z[:, 0]], axis=2)
+    share = np.sum(signed * change, axis=(1, 2)) / np.sum(change**2, axis=(1, 2))
+    return np.asarray(signed - np.clip(share, -record.jitter, record.jitter)[:, None, None] * change)
+
+
 def _numbers(matches: list[Match], kind: type[Any]) -> tuple[Table, Integers, Any]:
     """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
@@ -148,7 +163,7 @@ def _defects(
 ) -> list[Defect]:
     schemes = [FAMILIES[match.family] for match in matches]
     z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
-    signed = _misses(matches, found, found.slips).astype(np.float64)
+    signed = _retimed(record, found, matches, _misses(matches, found, found.slips).astype(np.float64))
     missing = np.abs(signed)
     b = np.abs(np.array([match.predicted for match in matches]).reshape(-1, 2, 2)).astype(np.float64)
     step, first = _sums(matches, found)
@@ -183,7 +198,7 @@ def _defects(
     follows = np.full(len(matches), found.slips is not None)
     if record.slips is not None and found.slips is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
-        other = _misses(matches, found, record.slips).astype(np.float64)
+        other = _retimed(record, found, matches, _misses(matches, found, record.slips).astype(np.float64))
         late = _largest(np.abs(other), 2.0**-52 * size)
         follows = late < 0.7 * ulp
         signed = np.where((late < ulp)[:, None, None], other, signed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -104,10 +105,11 @@ class Targets:
         diagonal = np.stack(
             [np.repeat(x.bias * found.residual, 2) for found, x in zip(maps, terms, strict=True)]
         )
-        diagonal = diagonal**2 + (terms[0].jitter * sizes * [0, 1, 1, 0]) ** 2
-        shear = terms[0].scale * self.observed.astype(np.float64) * [0, 1, -1, 0]
+        # velocities count in positions an interval, of which the times show no more than their digits
+        share = math.hypot(terms[0].scale, terms[0].jitter)
+        shear = share * self.observed.astype(np.float64) * [0, 1, -1, 0]
         covariance = covariance + shear[:, :, None] * shear[:, None, :]
-        values, self.axes = np.linalg.eigh(covariance + diagonal[:, :, None] * np.eye(4))
+        values, self.axes = np.linalg.eigh(covariance + diagonal[:, :, None] ** 2 * np.eye(4))
         self.variance = np.maximum(values, 1e-15 * values[:, -1:])
 
     def coherent(self, every: Table, x: Guesses, a: Reals, g: Reals) -> Floats:
