@@ -75,6 +75,17 @@ def _retimed(record: Record, found: Map, matches: list[Match], signed: Floats) -
     return np.asarray(signed - np.clip(share, -record.jitter, record.jitter)[:, None, None] * change)
 
 
+def _recentred(found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
+    """What is missing (c, f - 1, 2) beside the equilibrium that suits each match best, whose misses count by
+    their `unit`: it is as uncertain as the map that it was found with, and each scheme has its own."""
+    if not np.any(found.centre != 0):
+        return signed
+    away = np.eye(2)[:, 0] - np.array([m.predicted for m in matches], np.float64)[:, None, [0, 2]]
+    weight = away / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
+    shift = np.sum(weight * signed, axis=(1, 2)) / np.sum(weight * away, axis=(1, 2))
+    return np.asarray(signed - shift[:, None, None] * away)
+
+
 def _numbers(matches: list[Match], kind: type[Any]) -> tuple[Table, Integers, Any]:
     """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
@@ -163,8 +174,6 @@ def _defects(
 ) -> list[Defect]:
     schemes = [FAMILIES[match.family] for match in matches]
     z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
-    signed = _retimed(record, found, matches, _misses(matches, found, found.slips).astype(np.float64))
-    missing = np.abs(signed)
     b = np.abs(np.array([match.predicted for match in matches]).reshape(-1, 2, 2)).astype(np.float64)
     step, first = _sums(matches, found)
     stride = np.array([float(match.stride) for match in matches])
@@ -194,11 +203,18 @@ def _defects(
     # substeps of one force round alike
     parts = np.array([_substeps(match) for match in matches])
     path = stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes]
+
+    def missed(slips: Extended | None) -> Floats:
+        signed = _misses(matches, found, slips).astype(np.float64)
+        return _recentred(found, matches, _retimed(record, found, matches, signed), size)
+
+    signed = missed(found.slips)
+    missing = np.abs(signed)
     ulp = _largest(missing, 2.0**-52 * size)
     follows = np.full(len(matches), found.slips is not None)
     if record.slips is not None and found.slips is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
-        other = _retimed(record, found, matches, _misses(matches, found, record.slips).astype(np.float64))
+        other = missed(record.slips)
         late = _largest(np.abs(other), 2.0**-52 * size)
         follows = late < 0.7 * ulp
         signed = np.where((late < ulp)[:, None, None], other, signed)
@@ -215,13 +231,8 @@ def _defects(
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-        if np.any(found.centre != 0):
-            # the equilibrium is as uncertain as the map, and each scheme has its own
-            away = np.eye(2)[:, 0] - np.array([m.predicted for m in matches], np.float64)[:, None, [0, 2]]
-            weight = away / np.maximum(half, 1e-30 * np.max(half)) ** 2
-            shift = np.sum(weight * signed, axis=(1, 2)) / np.sum(weight * away, axis=(1, 2))
-            signed = signed - shift[:, None, None] * away
-            missing = np.abs(signed)
+        signed = _recentred(found, matches, signed, half)
+        missing = np.abs(signed)
         # roundings of many steps are random
         most = np.minimum(path, usual)[:, None, None]
         # the map is itself known from rounded states, to a few parts in sqrt(pairs) of their rounding
