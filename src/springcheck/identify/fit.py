@@ -111,12 +111,13 @@ def _sizes(z: Extended) -> Extended:
     return np.asarray(size * np.sqrt((square @ size**-2).mean() / 2))
 
 
-def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map:
+def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, constant: bool = False) -> Map:
     """The map of oscillator j, from the pairs that are `kept` (f - 1,), or from all.
 
-    A constant part is taken in where it shows: an equilibrium away from 0, whose velocity is 0, or else a
-    constant that is added to the position in every step (`drifts`).  Where the steps are the differences of
-    rounded times, the map's change with the step is fitted along with it (`slips`).
+    A constant part is taken in where it shows, or in any case (`constant`): an equilibrium away from 0,
+    whose velocity is 0, or else a constant that is added to the position in every step (`drifts`).  Where
+    the steps are the differences of rounded times, the map's change with the step is fitted along with it
+    (`slips`).
 
     Rounding is relative to a state's distance from the equilibrium and to that of the equilibrium from 0,
     or to what the file resolves: pairs count by the inverse of it, so that a motion over many powers of ten
@@ -156,10 +157,10 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None) -> Map
         noise = np.maximum(np.sum(new**2, axis=0) / max(pairs - 3, 1), floor / pairs)
         return bool(np.any(np.sum(old**2, axis=0) - np.sum(new**2, axis=0) > gain * noise))
 
-    if np.any(np.sum(left**2, axis=0) > floor) and pairs > FEWEST_PAIRS:
+    if (constant or np.any(np.sum(left**2, axis=0) > floor)) and pairs > FEWEST_PAIRS:
         y = least_squares(np.concatenate([before, w], axis=1), after)
         free = after - np.concatenate([before, w], axis=1) @ y
-        if better(left, free, SHOWN if record.fine else SUSPECTED):
+        if constant or better(left, free, SHOWN if record.fine else SUSPECTED):
             noise = np.sqrt(np.maximum(np.sum(free**2, axis=0), floor))
             entries, at, resting = _about_rest(before, after, w, y, noise)
             # at rest the roundings are the same in every step, and add up to a constant of their own

@@ -24,7 +24,7 @@ from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD
-from springcheck.identify.fit import Map
+from springcheck.identify.fit import Map, fit
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.positions import identify_positions
@@ -129,6 +129,15 @@ def _of_states(
     joints, terms = find(record, maps, base, stride)
     fits_entries = bool(joints)
     explained = _explained(record, moving, maps, joints, terms)
+    if not explained and not record.fine:
+        # an equilibrium beside 0 that a short or coarse file does not show may still be there
+        apart = [
+            x if np.any(x.centre) else fit(record, j, constant=True)
+            for j, x in zip(moving, maps, strict=True)
+        ]
+        joints, terms = find(record, apart, base, stride)
+        explained = _explained(record, moving, apart, joints, terms)
+        maps = apart if explained else maps
     if not explained:
         joints, remark = _single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)

@@ -43,6 +43,9 @@ COARSE = 2.0**-46
 EXCLUDED = 25.0
 """By which chi-squared exceeds that of the best where a scheme is excluded: five standard errors."""
 
+POOR = 8.0
+"""Chi-squared of three degrees of freedom that chance exceeds once in 20."""
+
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
 
@@ -70,6 +73,12 @@ class Joint:
     @property
     def damped(self) -> bool:
         return FAMILIES[self.family].damped and not FAMILIES[self.family].held
+
+    @property
+    def keeps_area(self) -> bool:
+        """Whether all maps predicted have a determinant of 1."""
+        entries = np.array([part.predicted for part in self.parts])
+        return bool(np.all(np.abs(entries[:, 0] * entries[:, 3] - entries[:, 1] * entries[:, 2] - 1) < 1e-12))
 
     @property
     def plainness(self) -> tuple[int, int, int]:
@@ -241,7 +250,8 @@ def find(
                         accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
                     if not (record.fine or room.damped):
                         # a force held over substeps is nearly as many steps, and friction what steps lose
-                        others = distinct(damped=True) if strides is MANY else ()
+                        losing = strides is MANY or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
+                        others = distinct(damped=True) if losing else ()
                         accepted += [x for x in search(maps, terms, FEW, (*others, HELD)) if x.accepted]
                     break
         if accepted:
