@@ -45,7 +45,8 @@ _spec.loader.exec_module(census)
         (134, "named"),
         # a step in single precision in a file of single precision leaves other schemes no room
         (2059, "not told apart"),
-        (2130, "named"),
+        # what RK4 loses may be friction, to single precision
+        (2130, "not told apart"),
         # drifts and noise that are there in the first frames of a growing motion
         (308, "error seen"),
         (660, "error seen"),
@@ -220,8 +221,8 @@ def test_a_thermostat_in_single_precision_is_no_rounding_of_velocities_rebuilt_o
 
 @pytest.mark.parametrize("number", [1, 6, 22, 27, 36, 86, 101])
 def test_times_that_begin_late_leave_the_interval_uncertain(number: int) -> None:
-    # the times' digits show the interval to 1e-12, and velocities count in positions an interval: a symplectic
-    # Euler was "Velocity Verlet without its first half kick", friction and held forces no known scheme
+    # the times' digits show the interval to 1e-12, and velocities count in positions an interval: a
+    # symplectic Euler was "Velocity Verlet without its first half kick", held forces were no known scheme
     draw = census.Draw(np.random.default_rng([77, number]))
     draw.clock = "even"
     t, q, v = draw.move()

@@ -24,6 +24,9 @@ SHOWN, SUSPECTED = 50.0, 10.0
 """Chi-squared that shows a constant part, and that one may make in a coarse file: it must stay far below what
 a right scheme may miss."""
 
+SHORT = 8
+"""Distance of an arc from the equilibrium, in its own size, from which its size is that distance."""
+
 LEAST_NOISE = 1e-30
 """Share of the largest noise that a pair counts with at least: a motion that grows by 1e20 shows its
 equilibrium in its first frames alone."""
@@ -126,11 +129,14 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
     size, whole = _sizes(z - np.mean(z, axis=0)), _sizes(z)
     size = np.minimum(size, whole) if np.all(whole < 2 * size) else size
-    z = z / size
     chosen = np.ones(len(z) - 1, dtype=bool) if kept is None else kept
     pairs = int(np.count_nonzero(chosen))
+    first = _preliminary(z / size, chosen)
+    # a short arc about 0 is as large as its distance from there
+    short = record.fine and not np.any(first) and bool(np.any(whole > SHORT * size))
+    size = whole if short else size
+    z = z / size
     quanta = record.quanta(j) / size.astype(np.float64)
-    first = _preliminary(z, chosen)
     # at rest beside 0 the numbers' rounding is all that is left, and the same in every step
     away = np.sqrt(np.sum((z[:-1].astype(np.float64) - first) ** 2, axis=1))
     dead = away < DEAD * float(np.sqrt(np.sum(first**2)))

@@ -10,7 +10,7 @@ from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.record import Record
-from springcheck.identify.search import Joint, coincident, numbers, search, separation
+from springcheck.identify.search import Joint, coincident, numbers, search
 from springcheck.identify.solve import solved
 from springcheck.identify.starts import Terms
 from springcheck.text.wording import count, either
@@ -29,6 +29,19 @@ LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
     "semi-implicit-euler-drift-kick": "leapfrog with velocities half a step late",
 }
+
+
+def separation(maps: list[Map], one: Joint, other: Joint) -> float:
+    """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
+    total = 0.0
+    for found, a, b in zip(maps, one.parts, other.parts, strict=True):
+        if "inverse" not in found.found:
+            error = np.sqrt(np.diag(found.covariance))
+            even = found.covariance / error[:, None] / error[None, :]
+            found.found["inverse"] = np.linalg.pinv(even, hermitian=True) / error[:, None] / error[None, :]
+        off = np.array(a.predicted) - np.array(b.predicted)
+        total += float(off @ found.found["inverse"] @ off)
+    return math.sqrt(max(total, 0.0))
 
 
 def hidden_friction(record: Record, found: Map) -> float:

@@ -46,6 +46,9 @@ EXCLUDED = 25.0
 POOR = 8.0
 """Chi-squared of three degrees of freedom that chance exceeds once in 20."""
 
+ONE_MORE = 4.0
+"""By which one unknown more lowers chi-squared by chance once in 20."""
+
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
 
@@ -249,10 +252,7 @@ def find(
                     if strides is FEW and (MANY in room.strides or not room.bias):
                         accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
                     if not (record.fine or room.damped):
-                        # a force held over substeps is nearly as many steps, and friction what steps lose
-                        losing = strides is MANY or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
-                        others = distinct(damped=True) if losing else ()
-                        accepted += [x for x in search(maps, terms, FEW, (*others, HELD)) if x.accepted]
+                        accepted += _rivals(maps, terms, fitting, many=strides is MANY)
                     break
         if accepted:
             return _likely(accepted), terms
@@ -306,6 +306,16 @@ def _further(
     if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
         out += [x for x in search(maps, terms, FEW, distinct(damped=True)) if x.accepted]
     return out
+
+
+def _rivals(maps: list[Map], terms: list[Terms], fitting: list[Joint], *, many: bool) -> list[Joint]:
+    """What coarse files do not exclude either: a force held over substeps is nearly as many steps, and
+    friction may be what steps lose.  What has a fitting scheme's map at one friction must fit better."""
+    losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
+    others = distinct(damped=True) if losing else ()
+    same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
+    found = [x for x in search(maps, terms, FEW, (*others, HELD)) if x.accepted]
+    return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
 
 
 def _likely(accepted: list[Joint]) -> list[Joint]:
@@ -377,19 +387,6 @@ def disagreements(
                 f"(relative difference {off:+.2e}, known to {error:.0e})"
             )
     return out
-
-
-def separation(maps: list[Map], one: Joint, other: Joint) -> float:
-    """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
-    total = 0.0
-    for found, a, b in zip(maps, one.parts, other.parts, strict=True):
-        if "inverse" not in found.found:
-            error = np.sqrt(np.diag(found.covariance))
-            even = found.covariance / error[:, None] / error[None, :]
-            found.found["inverse"] = np.linalg.pinv(even, hermitian=True) / error[:, None] / error[None, :]
-        off = np.array(a.predicted) - np.array(b.predicted)
-        total += float(off @ found.found["inverse"] @ off)
-    return math.sqrt(max(total, 0.0))
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:
