@@ -283,7 +283,7 @@ def judged(draw: Draw, found: Identification, hidden: bool) -> str:
     if found.verdict == "none":
         return "none"
     if found.verdict == "not told apart":
-        return "not told apart" if listed else "LISTED WITHOUT IT"
+        return "undecided" if found.undecided else "not told apart" if listed else "LISTED WITHOUT IT"
     if found.scheme not in same:
         return "WRONG NAME"
     if not listed:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
+from springcheck.errors import IdentificationError
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
 from springcheck.identify.maps import table, unit
 from springcheck.identify.record import Record
+from springcheck.identify.result import Identification
 from springcheck.identify.search import Joint, coincident, numbers, search
 from springcheck.identify.solve import solved
 from springcheck.identify.starts import Terms
@@ -21,6 +24,10 @@ may take five away."""
 
 MOST_DIGITS = 9
 """More digits than single precision has short of double: what needs more, digits do not tell."""
+
+FEWEST_OF_TEXT = 12
+"""Frames of text below which a scheme is not told from others for certain: a map, its equilibrium and a start
+have seven unknowns, and roundings of some digits are large beside a short motion."""
 
 SAME = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
@@ -42,6 +49,26 @@ def separation(maps: list[Map], one: Joint, other: Joint) -> float:
         off = np.array(a.predicted) - np.array(b.predicted)
         total += float(off @ found.found["inverse"] @ off)
     return math.sqrt(max(total, 0.0))
+
+
+def of_few(record: Record, found: Identification) -> Identification:
+    """What was found, where text of few frames does not exclude other schemes.
+
+    Raises IdentificationError where no scheme fits so few.
+    """
+    frames = len(record.q)
+    if not record.text or frames >= FEWEST_OF_TEXT:
+        return found
+    more = f"give {FEWEST_OF_TEXT} frames or more, or more digits"
+    if not found.candidates:
+        raise IdentificationError(
+            f"no known scheme fits, but {frames} frames of text are too few to exclude them: {more}"
+        )
+    return replace(
+        found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, explanations=(),
+        statement=f"{frames} frames of text do not exclude other schemes; what fits: {found.statement}",
+        notes=(*found.notes, f"what would tell: {more}"),
+    )  # fmt: skip
 
 
 def hidden_friction(record: Record, found: Map) -> float:

@@ -26,7 +26,7 @@ from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.judged import judged
-from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
+from springcheck.identify.notes import LEAPFROG, hidden_friction, of_few, same_maps, untold
 from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, of_size, read, stated_stride
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
@@ -98,19 +98,16 @@ def identify_arrays(
     return either_way([*ways, *([_of_states(*reverse, **stated)] if turned else [])])
 
 
-def _of_states(
-    t: ArrayLike,
-    q: ArrayLike,
-    p: ArrayLike | None,
-    v: ArrayLike | None,
-    *,
-    mass: ArrayLike | None,
-    stiffness: ArrayLike | None,
-    friction: float | None,
-    step: float | None,
-) -> Identification:
-    """The scheme of states with velocities, or momenta, or both."""
+def _of_states(*states: Any, mass: ArrayLike | None, **stated: Any) -> Identification:
+    """The scheme of times, positions, momenta and velocities, of which one may be None."""
+    t, q, p, v = states
     record = read(t, q, p, v, mass)
+    return of_few(record, _of_record(record, **stated))
+
+
+def _of_record(
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
+) -> Identification:
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
     given = record

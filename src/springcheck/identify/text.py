@@ -37,7 +37,7 @@ def identification(label: str, found: Identification) -> Lines:
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
     misfit = ", but what is stated does not fit" if found.candidates and not found.fits else ""
-    if found.undecided:
+    if found.undecided and found.scheme:
         misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
     if found.explanations:
