@@ -36,7 +36,8 @@ def identification(label: str, found: Identification) -> Lines:
         ("symplectic defect", f"{found.symplectic_defect:.1e}"),
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
-    misfit = ", but what is stated does not fit" if found.candidates and not found.fits else ""
+    unfit = found.candidates and not (found.fits or found.undecided)
+    misfit = ", but what is stated does not fit" if unfit else ""
     if found.undecided and found.scheme:
         misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
