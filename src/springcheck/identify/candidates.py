@@ -106,6 +106,25 @@ def stated_stiffness(
     )
 
 
+def of_stated_stiffness(
+    record: Record, moving: list[int], precisions: dict[Joint, str], stated: Floats
+) -> list[Joint]:
+    """Those of several schemes, with the arithmetic that explains each, that have the stated stiffness: as it
+    is, or with a constant in single precision, or the nearest; and those that have the same one as these."""
+    joints = list(precisions)
+    agreeing = [x for x in joints if not disagreements(record, moving, x, stated)] or [
+        x for x in joints if stated_stiffness(record, moving, x, stated, precisions[x])[0]
+    ]
+    if not agreeing:
+        return nearest_stiffness(record, moving, joints, stated)
+    _, found, _ = numbers(record, moving, agreeing[0])
+    if found is None:
+        return agreeing
+    same = stated.copy()
+    same[moving] = found
+    return agreeing + [x for x in joints if x not in agreeing and not disagreements(record, moving, x, same)]
+
+
 def nearest_stiffness(record: Record, moving: list[int], joints: list[Joint], stated: Floats) -> list[Joint]:
     """Those of several schemes whose stiffness comes nearest to the stated one, which none has: all that a
     constant in single precision or their own errors leave room for."""

@@ -16,7 +16,7 @@ from springcheck.identify.candidates import (
     common,
     either_way,
     held_over,
-    nearest_stiffness,
+    of_stated_stiffness,
     said_of,
     stated_stiffness,
 )
@@ -35,7 +35,6 @@ from springcheck.identify.search import (
     SINGLE,
     Joint,
     difference,
-    disagreements,
     distinct,
     find,
     frictionless,
@@ -143,9 +142,8 @@ def _of_record(
         return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
     joints = list(explained)
     if stated is not None:
-        joints = [x for x in joints if not disagreements(record, moving, x, stated)] or [
-            x for x in joints if stated_stiffness(record, moving, x, stated, explained[x][0].precision)[0]
-        ] or nearest_stiffness(record, moving, joints, stated)  # fmt: skip
+        precisions = {x: ds[0].precision for x, ds in explained.items()}
+        joints = of_stated_stiffness(record, moving, precisions, stated)
     if stride is not None and stride > 0:
         # a step that divides the interval leaves the flow, which has none, and schemes of that stride
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
