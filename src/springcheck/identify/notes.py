@@ -25,9 +25,10 @@ may take five away."""
 MOST_DIGITS = 9
 """More digits than single precision has short of double: what needs more, digits do not tell."""
 
-FEWEST_OF_TEXT = 12
-"""Frames of text below which a scheme is not told from others for certain: a map, its equilibrium and a start
-have seven unknowns, and roundings of some digits are large beside a short motion."""
+FEWEST_OF_TEXT, DIGITS_OF_TEXT = 12, 72
+"""Frames of text, and digits of all frames together, below which a scheme is not told from others for
+certain: 24 frames of 3 digits.  A map, its equilibrium and a start have seven unknowns, and roundings of few
+digits are large beside a short motion."""
 
 SAME = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
@@ -56,10 +57,15 @@ def of_few(record: Record, found: Identification) -> Identification:
 
     Raises IdentificationError where no scheme fits so few.
     """
-    frames = len(record.q)
-    if not record.text or frames >= FEWEST_OF_TEXT:
+    if not record.text:
         return found
-    more = f"give {FEWEST_OF_TEXT} frames or more, or more digits"
+    frames = len(record.q)
+    rounded = (record.q, record.q_quantum), (record.v, record.v_quantum)
+    sizes = [float(np.max(np.abs(x)) / np.max(quantum)) for x, quantum in rounded if np.any(x)]
+    fewest = max(FEWEST_OF_TEXT, math.ceil(DIGITS_OF_TEXT / (math.floor(math.log10(min(sizes))) + 1)))
+    if frames >= fewest:
+        return found
+    more = f"give {fewest} frames or more, or more digits"
     if not found.candidates:
         raise IdentificationError(
             f"no known scheme fits, but {frames} frames of text are too few to exclude them: {more}"
