@@ -12,17 +12,17 @@ Command: python validation/house.py [repeats]        (40 s for 5)
 
 Printed on two idle cores:
 
-    lines 38418 in 254 modules, median 129.5
-    largest physics/system.py 383, studies/run/measure.py 380, identify/report.py 371,
-      identify/search.py 368, studies/faults/seeded.py 368
+    lines 38404 in 254 modules, median 119.5
+    largest identify/search.py 396, identify/report.py 395, identify/explain.py 389, physics/system.py 385,
+      studies/run/measure.py 381
     rooms 19, arrows 78, longest chain 9:
       __main__ > cli > studies > doors > identify > formats > store > physics > errors
-    imports of numpy and h5py       177 ms
-    the smallest run                317 ms
-    imports of the libraries        780 ms
-    run spring                     1089 ms
-    its engines alone               136 ms
-    smallest run / imports 1.79; run spring / (imports + engines) 1.19
+    imports of numpy and h5py       185 ms
+    the smallest run                325 ms
+    imports of the libraries        798 ms
+    run spring                     1104 ms
+    its engines alone               149 ms
+    smallest run / imports 1.76; run spring / (imports + engines) 1.17
 
 The speed of the own engine beside C is measured by kernel_speed.py.
 """

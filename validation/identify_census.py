@@ -35,7 +35,7 @@ WRONG CAUSE; 4 LISTED WITHOUT IT, all text of 15 and 20 frames of 3 digits in on
 (1210084, 1238164); no false fit. Half within 8 ms, 90 % 24, 99 % 115. The two names and the four lists are
 mended since. The version before, to which few frames of text were as good as many, gave of 1100000 to 1149999
 (49,811) 150 none, 14 LISTED WITHOUT IT, 6 WRONG CAUSE and 3 WRONG NAME.
-For 0 to 299 alone: 212 among several; 46 named; 32 error seen; 7 error, and a fit.
+For 0 to 299 alone: 209 among several; 49 named; 32 error seen; 7 error, and a fit.
 """
 
 from __future__ import annotations

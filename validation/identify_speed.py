@@ -9,13 +9,11 @@ once. With SRC, the folder `src` of another checkout, the same trajectories go t
 this one, twice each, and the ratio of the two is printed; the shortest time of each trajectory counts,
 after one call that is not timed.
 
-Printed for 15 calls with a load of 5 to 7 on two cores (median and most; before: commit 81a7ca4):
-    plain 5.0 and 19.4 ms, before 6.6 and 26.1.  damped 8.6 and 15.5, before 12.6 and 43.0
-    held 6.3 and 8.1, before 8.8 and 13.7.  single 9.6 and 102.5, before 16.4 and 147.6
-    text 12.5 and 81.7, before 24.9 and 115.4.  systematic error 21.9 and 114.3, before 30.6 and 132.1
-    16 oscillators 44.7, before 47.4.  as drawn 8.4 and 226.0, before 13.4 and 359.0
-    mean as drawn 13.4 ms: 5.36e+05 calls an hour on two cores
-On idle cores commit 81a7ca4 took 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators).
+Printed for 15 calls on two idle cores (median and most):
+    plain 3.7 and 15.1 ms.  damped 6.0 and 12.8.  held 4.4 and 5.6.  single 6.6 and 78.2
+    text 9.0 and 63.2.  systematic error 15.7 and 91.5.  16 oscillators 34.5.  as drawn 6.1 and 167.1
+    mean as drawn 10.4 ms: 6.89e+05 calls an hour on two cores
+Commit 81a7ca4 took 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators); 17.1 in the mean.
 """
 
 from __future__ import annotations
