@@ -13,7 +13,7 @@ Printed for 15 calls on two idle cores (median and most):
     plain 3.7 and 15.1 ms.  damped 6.0 and 12.8.  held 4.4 and 5.6.  single 6.6 and 78.2
     text 9.0 and 63.2.  systematic error 15.7 and 91.5.  16 oscillators 34.5.  as drawn 6.1 and 167.1
     mean as drawn 10.4 ms: 6.89e+05 calls an hour on two cores
-Commit 81a7ca4 took 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators); 17.1 in the mean.
+Commit 81a7ca4: 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators); 17.1 in the mean.
 """
 
 from __future__ import annotations
