@@ -152,6 +152,9 @@ _spec.loader.exec_module(census)
         (1002702, "not told apart"),
         (1002677, "not told apart"),
         (1000205, "undecided"),
+        # a motion that dies within a few frames of text
+        (978850, "undecided"),
+        (1302398, "undecided"),
         # 15 frames of 3 digits
         (1238164, "undecided"),
         # explicit Euler with friction g + a has the map of drift-kick Euler with g, on the same spring
@@ -246,6 +249,6 @@ def test_few_frames_of_text_exclude_no_scheme() -> None:
     q, v = (census.written(x, "text", digits) for x, digits in zip((q, v), draw.digits, strict=True))
     found = identify(t, q, v=v, mass=draw.m, stiffness=draw.k)
     assert (found.scheme, found.fits, found.undecided) == (None, False, True)
-    assert f"{len(t)} frames of text do not exclude other schemes" in found.statement
-    with pytest.raises(IdentificationError, match="give 24 frames or more"):
+    assert "frames of text that show the motion exclude no scheme" in found.statement
+    with pytest.raises(IdentificationError, match=r"give [0-9]+ frames or more that show it"):
         identify(t, q, v=1.5 * v, mass=draw.m)

@@ -25,10 +25,10 @@ may take five away."""
 MOST_DIGITS = 9
 """More digits than single precision has short of double: what needs more, digits do not tell."""
 
-FEWEST_OF_TEXT, DIGITS_OF_TEXT = 12, 72
-"""Frames of text, and digits of all frames together, below which a scheme is not told from others for
-certain: 24 frames of 3 digits.  A map, its equilibrium and a start have seven unknowns, and roundings of few
-digits are large beside a short motion."""
+FEWEST_OF_TEXT, DIGITS_OF_TEXT = 12, 40.0
+"""Frames of text that show the motion, and digits of it in all of them, below which a scheme is not told from
+others for certain: some 24 frames of 3 digits.  A map, its equilibrium and a start have seven unknowns, and
+roundings of few digits are large beside a short motion."""
 
 SAME = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
@@ -59,21 +59,24 @@ def of_few(record: Record, found: Identification) -> Identification:
     """
     if not record.text:
         return found
-    frames = len(record.q)
-    rounded = (record.q, record.q_quantum), (record.v, record.v_quantum)
-    sizes = [float(np.max(np.abs(x)) / np.max(quantum)) for x, quantum in rounded if np.any(x)]
-    fewest = max(FEWEST_OF_TEXT, math.ceil(DIGITS_OF_TEXT / (math.floor(math.log10(min(sizes))) + 1)))
-    if frames >= fewest:
+    # a motion that has died down to its equilibrium shows nothing any more
+    rounded = ((record.q, record.q_quantum), (record.v, record.v_quantum))
+    shown = [np.abs(x - np.median(x, axis=0)) / np.where(unit > 0, unit, 1) for x, unit in rounded]
+    seen = [np.max(np.maximum(x, 1.0), axis=1).astype(np.float64) for x in shown]
+    frames = min(int(np.count_nonzero(x > 1)) for x in seen)
+    digits = min(float(np.sum(np.log10(x))) for x in seen)
+    if frames >= FEWEST_OF_TEXT and digits >= DIGITS_OF_TEXT:
         return found
-    more = f"give {fewest} frames or more, or more digits"
+    fewest = max(FEWEST_OF_TEXT, math.ceil(DIGITS_OF_TEXT * frames / max(digits, 1.0)))
+    more = f"give {fewest} frames or more that show it, or more digits"
     if not found.candidates:
         raise IdentificationError(
-            f"no known scheme fits, but {frames} frames of text are too few to exclude them: {more}"
+            f"no known scheme fits, but {frames} frames of text that show the motion exclude none: {more}"
         )
+    said = f"{frames} frames of text that show the motion exclude no scheme; what fits: {found.statement}"
     return replace(
         found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, explanations=(),
-        statement=f"{frames} frames of text do not exclude other schemes; what fits: {found.statement}",
-        notes=(*found.notes, f"what would tell: {more}"),
+        statement=said, notes=(*found.notes, f"what would tell: {more}"),
     )  # fmt: skip
 
 
