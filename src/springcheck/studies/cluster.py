@@ -39,6 +39,9 @@ The scheduler itself waits for 300 s and longer."""
 
 GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
 
+LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
+"""Loggers of the library, of which some have levels of their own; those of others are left as they are."""
+
 OUT = 256
 """Pieces that are given out at a time, at least."""
 
@@ -75,8 +78,9 @@ class Cluster:
         how: dict[str, Any] = {"address": self.place}
         with ExitStack() as stack:
             # what is logged of connections that are lost is not for users: what is to be said is raised
-            stack.callback(logging.disable, logging.root.manager.disable)
-            logging.disable(logging.CRITICAL)
+            for logger in map(logging.getLogger, LOGGERS):
+                stack.callback(logger.setLevel, logger.level)
+                logger.setLevel(logging.CRITICAL)
             cluster = None
             if "://" not in self.place:
                 if not Path(self.place).is_file():
