@@ -49,9 +49,14 @@ def misses(match: Match, found: Map) -> Extended:
     return np.asarray(_misses([match], found, found.slips)[0])
 
 
+def _predicted(matches: list[Match]) -> Extended:
+    """The maps (c, 2, 2) between frames that matches predict."""
+    return np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
+
+
 def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
     """The same for each match, (c, f - 1, 2), where steps follow the clock's `slips`."""
-    b = np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
+    b = _predicted(matches)
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
     if slips is not None:
         d = np.longdouble(1e-7)
@@ -68,7 +73,7 @@ def _retimed(record: Record, found: Map, matches: list[Match], signed: Floats) -
     """
     if record.jitter <= 2.0**-50:
         return signed
-    b = np.array([match.predicted for match in matches], np.float64).reshape(-1, 2, 2)
+    b = _predicted(matches).astype(np.float64)
     z = found.z[:-1].astype(np.float64)
     change = np.stack([b[:, 0, 1, None] * z[:, 1], -b[:, 1, 0, None] * z[:, 0]], axis=2)
     share = np.sum(signed * change, axis=(1, 2)) / np.sum(change**2, axis=(1, 2))
@@ -80,7 +85,7 @@ def _recentred(found: Map, matches: list[Match], signed: Floats, unit: Floats) -
     their `unit`: it is as uncertain as the map that it was found with, and each scheme has its own."""
     if not np.any(found.centre != 0):
         return signed
-    away = np.eye(2)[:, 0] - np.array([m.predicted for m in matches], np.float64)[:, None, [0, 2]]
+    away = np.eye(2)[:, 0] - _predicted(matches).astype(np.float64)[:, None, :, 0]
     weight = away / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
     shift = np.sum(weight * signed, axis=(1, 2)) / np.sum(weight * away, axis=(1, 2))
     return np.asarray(signed - shift[:, None, None] * away)
@@ -174,7 +179,7 @@ def _defects(
 ) -> list[Defect]:
     schemes = [FAMILIES[match.family] for match in matches]
     z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
-    b = np.abs(np.array([match.predicted for match in matches]).reshape(-1, 2, 2)).astype(np.float64)
+    b = np.abs(_predicted(matches)).astype(np.float64)
     step, first = _sums(matches, found)
     stride = np.array([float(match.stride) for match in matches])
     # a force is that of the whole position, whose rounding it carries into the velocity
