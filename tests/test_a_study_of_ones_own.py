@@ -61,7 +61,8 @@ def pictures(found):
     return {"squares": figure}
 """
 STUDY = """
-from springcheck.studies.study import Study, store_arguments
+from springcheck.studies.arguments import store_arguments
+from springcheck.studies.study import Study
 STUDY = Study(
     name="squares",
     about="squares of whole numbers",

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import errno
+import itertools
 import os
+import shutil
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import h5py
 import pytest
 
 import springcheck
+from springcheck import store
 from springcheck.cli import main
 from springcheck.physics.scenefile import folder
+from springcheck.studies.precision import timing
 
 pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
 
@@ -240,3 +250,92 @@ def test_forces_beyond_all_numbers_are_refused(study: str, capsys: pytest.Captur
     lines = ["rest = 1e6" if line.startswith("rest") else line for line in text.splitlines()]
     Path("far.toml").write_text("\n".join(lines))
     refused(capsys, [study, "far.toml", "--method", "own:euler"], "beyond the range of numbers")
+
+
+def limited(*words: str, memory: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The program with less address space [B], or in another environment."""
+    begin = f"import resource as r; r.setrlimit(r.RLIMIT_AS, ({memory},) * 2); " if memory else ""
+    code = f"{begin}from springcheck.__main__ import main; raise SystemExit(main())"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env={**os.environ, **environment}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [300, 400])
+def test_too_little_address_space_is_said_in_words(size: int) -> None:
+    done = limited("run", "spring", "--method", "own:euler", memory=size << 20)
+    said = f"springcheck: {size} MiB of address space (ulimit -v): at least 512 MiB are needed\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+
+
+def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() -> None:
+    odd = {"USER": os.fsdecode(b"J\xf6rg"), "MPLBACKEND": "nonsense"}
+    assert limited("run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5", **odd).stderr == ""
+    done = limited("plot", "s.h5", "--quiet", **odd)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert limited("check", "s.h5").returncode == 0
+
+
+def test_who_wants_no_colours_gets_none_whatever_else_is_said() -> None:
+    words = ("run", "spring", "--method", "own:euler", "--force", "-o", "s.h5")
+    assert "\x1b[" in limited(*words, FORCE_COLOR="1").stdout
+    assert "\x1b[" not in limited(*words, FORCE_COLOR="1", NO_COLOR="1").stdout
+
+
+@pytest.mark.parametrize("name", ["run-own%3Aeuler.h5", "table-x.h5", "lock", "command", "undo", ""])
+def test_a_pipe_in_a_journal_keeps_no_command_waiting(name: str) -> None:
+    with store.open_new("s.h5", "another command") as journal:
+        journal.add(store.Table(name="x", columns={"a": [1.0]}))
+    place = Path("s.h5.parts", name)
+    if not name:
+        shutil.rmtree(place)
+    place.unlink(missing_ok=True)
+    os.mkfifo(place)
+    run = ["run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5"]
+    for words in (["inspect", "s.h5"], ["check", "s.h5"], run):
+        with alarmed(10):
+            assert main(words) in (0, 1, 2)
+
+
+@contextmanager
+def alarmed(seconds: int) -> Iterator[None]:
+    """Fail where it takes longer."""
+
+    def late(*_: object) -> None:
+        raise AssertionError(f"waits for more than {seconds} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+
+
+def test_a_clock_that_runs_backwards_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times = itertools.count(0, -1)
+    monkeypatch.setattr(timing, "perf_counter", lambda: float(next(times)))
+    assert main(["precision", "spring", "--method", "own:euler", "--budget", "1", "-o", "p.h5"]) == 2
+    assert "the clock of this machine runs backwards" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_whose_locks_libhdf5_does_not_know_is_read(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5"]) == 0
+    real = h5py.File
+
+    class Unlocked(real):  # type: ignore[misc,valid-type]
+        def __init__(self, *given: Any, locking: Any = None, **how: Any) -> None:
+            if locking == "best-effort":
+                raise OSError(
+                    f"Unable to synchronously open file (unable to lock file, errno = {number}, ...)"
+                )
+            super().__init__(*given, locking=locking, **how)
+
+    monkeypatch.setattr(h5py, "File", Unlocked)
+    assert main(["check", "s.h5"]) == 0

@@ -20,7 +20,7 @@ from springcheck.studies.precision import text
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
 from springcheck.text.wording import count
-from test_taking_up import raising
+from stores import raising
 
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterator
 from dataclasses import fields, replace
@@ -16,6 +17,8 @@ from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import measure as census
+from springcheck.studies.census import table
+from springcheck.studies.census.limit import first_limit
 from springcheck.studies.census.result import Entry
 from springcheck.studies.team import Processes
 
@@ -123,3 +126,83 @@ def test_states_of_another_scheme_are_no_held_force() -> None:
         found = census._held(scene, simulate.run(scene, label))
         assert found in ("", "force-held-1")
         assert not found
+
+
+def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = ["census", *(x for label in OWN[:2] for x in ("--method", label)), "-o", "a.h5", "--json"]
+    assert main(first) == 0
+    old = capsys.readouterr().out
+    Path("old.json").write_text(old)
+    # another version, another scheme, and a method that is gone
+    changed = json.loads(old)
+    changed["entries"][0].update(version="springcheck 0.0.9", found="implicit-euler")
+    changed["entries"].append({**changed["entries"][1], "method": "gone:one", "note": "<b>&"})
+    Path("other.json").write_text(json.dumps(changed))
+    again = ["census", "--method", OWN[0], "--method", OWN[1], "-o", "b.h5"]
+    assert main([*again, "--against", "old.json", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["changes"] == []
+    assert main([*again, "--force", "--against", "other.json", "--page", "t.html", "--csv", "t.csv"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        "own:euler, scheme, from the states: implicit Euler -> explicit Euler (springcheck 0.0.9 -> " in said
+    )
+    assert "gone:one is no longer here" in said
+    page = Path("t.html").read_text()
+    assert len(page.encode()) < 500_000
+    assert "springcheck census --method own:euler" in page
+    assert main([*again, "--force", "--add", "other.json", "--page", "t.html", "--quiet"]) == 0
+    page = Path("t.html").read_text()
+    assert "gone:one" in page
+    assert "&lt;b&gt;&amp;" in page
+    assert page.count("<tr>") == 4
+    with open("t.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["scheme"] for row in rows] == ["explicit Euler", "semi-implicit Euler, kick-drift"]
+    assert [row["limit"] for row in rows] == ["0.0000", "2.0000"]
+    assert all(row["version"].startswith("springcheck ") for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--page", "notes.txt"], "it is there and no such table"),
+        (["--csv", "."], "it is a folder"),
+        (["--csv", "no/t.csv"], "there is no folder"),
+        (["--against", "notes.txt"], "is no JSON document of springcheck census"),
+        (["--add", "nosuch.json"], "No such file"),
+        (["--against", ""], ""),
+    ],
+)
+def test_bad_input_to_the_tables_options_is_said_before_anything_runs(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("notes.txt").write_text("mine")
+    assert main(["census", "--method", "own:euler", "-o", "c.h5", *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert not Path("c.h5").exists()
+    assert Path("notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("label", "limit"),
+    [
+        ("own:euler", 0.0),
+        ("own:semi-implicit-euler", 2.0),
+        ("own:rk4", 2 * 2**0.5),
+        ("own:implicit-euler", np.inf),
+        ("own:yoshida4", 1.573409),
+    ],
+)
+def test_the_first_limit_is_read_from_states(label: str, limit: float) -> None:
+    scene = load_scene("spring-uneven")
+    assert first_limit(scene, engines.parse(label)) == pytest.approx(limit, abs=2e-5)
+
+
+def test_the_kept_table_has_no_row_that_is_declared_otherwise() -> None:
+    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
+    assert all(entry["agrees"] for entry in document["entries"])
+    names = {entry["method"].partition(":")[0] for entry in document["entries"]}
+    programs = [entry for entry in document["entries"] if entry["method"].startswith("command:")]
+    assert len(names - {"command"}) + len(programs) >= 20

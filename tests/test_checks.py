@@ -21,7 +21,7 @@ from springcheck.studies.faults import clean, steppers
 Need = Callable[[str], None]
 
 PLAIN = [
-    name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow and not s.mixes
+    name for name, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("mixes")
 ]  # fmt: skip
 ENGINES = [
     "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:verlet", "openmm:leapfrog",

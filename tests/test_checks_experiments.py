@@ -83,7 +83,7 @@ def test_the_reference_of_the_well_agrees_with_its_elliptic_function() -> None:
 
 
 def test_symmetric_schemes_are_those_that_are_their_own_adjoint() -> None:
-    found = {name for name, s in schemes.SCHEMES.items() if s.one_step and experiments.symmetric(s)}
+    found = {name for name, s in schemes.SCHEMES.items() if s.has("one-step", "reversible")}
     assert {"velocity-verlet", "position-verlet", "implicit-midpoint", "trapezoidal", "forest-ruth"} <= found
     assert not {"explicit-euler", "implicit-euler", "semi-implicit-euler", "ruth3", "rk4"} & found
 

@@ -24,7 +24,7 @@ from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 from springcheck.studies.precision import accuracy, fits
 from springcheck.studies.precision.points import Point
-from springcheck.studies.run import measure as session
+from springcheck.studies.run.tally import Tally
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
 NAN = float("nan")
@@ -394,7 +394,7 @@ def test_a_way_back_that_explodes_does_not_excuse_itself() -> None:
 def test_what_is_no_number_stays_in_the_error_and_the_energy_of_a_report() -> None:
     scene = uneven()
     run = plain(scene)
-    tally = session._Tally(scene)
+    tally = Tally(scene)
     with np.errstate(all="ignore"):
         tally.add(run)
         tally.add(replace(run, p=row(run.p, 7, NAN)))
@@ -460,6 +460,6 @@ def test_the_sign_of_the_energy_drift_is_that_of_the_gain_whatever_the_start(tmp
     scene = replace(scenes.load_scene("inverted"), q=np.array([1.1]), p=np.array([0.1]), steps=5)
     assert scene.system.energy(scene.q, scene.p) < 0
     run = plain(scene)
-    tally = session._Tally(scene)
+    tally = Tally(scene)
     tally.add(replace(run, p=run.p * 2))
     assert tally.drift > 0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +40,10 @@ def test_the_example_takes_at_most_sixty_lines() -> None:
 
 def test_the_example_passes_every_check() -> None:
     found = conformance.checks_of(made(CODE))
-    assert len(found) == 1 + len(conformance.TESTS)
+    names = [x.name for x in found]
+    right = [name for name in names if name.startswith("right on uneven-")]
+    assert len(right) > 6
+    assert names == ["declaring imports no library", *right, *conformance.TESTS]
     for check in found:
         check()
 
@@ -52,10 +57,10 @@ HALF = f"self.kick(self.h / 2)\n{STEP}"
 MOVED = "        scene.q.setflags(write=True)\n        scene.q[0] += 1e-3\n"
 
 FAULTS = [
-    ("right on uneven scenes", HALF, f"self.kick(self.h)\n{STEP}"),
-    ("right on uneven scenes", "self.q[i] - at", "self.q[i]"),
-    ("right on uneven scenes", "self.h * y / m", "self.h * y"),
-    ("right on uneven scenes", "self.h * y / m", "(1 + 1e-12) * self.h * y / m"),
+    ("right on", HALF, f"self.kick(self.h)\n{STEP}"),
+    ("right on", "self.q[i] - at", "self.q[i]"),
+    ("right on", "self.h * y / m", "self.h * y"),
+    ("right on", "self.h * y / m", "(1 + 1e-12) * self.h * y / m"),
     ("rows in parts", ROW, f"        self.p = [x + 1e-9 for x in self.p]\n{ROW}"),
     ("frames apart", "for _ in range(every)", "for _ in range(min(every, 9))"),
     ("scene untouched", COUNT, COUNT + MOVED),
@@ -70,13 +75,45 @@ FAULTS = [
 @pytest.mark.parametrize(("name", "old", "new"), FAULTS)
 def test_each_check_rejects_a_broken_engine(name: str, old: str, new: str) -> None:
     assert old in CODE
-    check = next(x for x in conformance.checks_of(made(CODE.replace(old, new, 1))) if x.name == name)
-    with pytest.raises(AssertionError):
-        check()
+    found = [x for x in conformance.checks_of(made(CODE.replace(old, new, 1))) if x.name.startswith(name)]
+    said = []
+    for check in found:
+        try:
+            check()
+        except AssertionError as error:
+            said.append(str(error))
+    assert said
+    if name == "right on":
+        # what the states show, and how many verdicts failed
+        assert all(re.search(r" is not velocity-verlet on uneven-\d+", one) for one in said)
+        assert all(re.search(r"\n\d+ of \d+ failed: ", one) for one in said)
 
 
 def test_every_check_has_a_broken_engine_that_it_rejects() -> None:
-    assert {name for name, *_ in FAULTS} == set(conformance.TESTS)
+    assert {name for name, *_ in FAULTS} == {"right on", *conformance.TESTS}
+
+
+def test_a_wrong_engine_is_told_what_its_states_show() -> None:
+    wrong = made(CODE.replace("self.h * y / m", "self.h * y", 1))
+    check = next(x for x in conformance.checks_of(wrong) if x.name == "right on uneven-1")
+    with pytest.raises(AssertionError, match=r"on uneven-1: .*mass") as caught:
+        check()
+    assert "What the states show" not in str(caught.value)
+
+
+def test_pytest_shows_the_sentence_and_no_frames_of_ours(tmp_path: Path) -> None:
+    code = CODE.replace("self.h * y / m", "self.h * y", 1)
+    (tmp_path / "my_engine.py").write_text(code)
+    (tmp_path / "test_mine.py").write_text(
+        "from my_engine import ENGINE\n"
+        "from springcheck.conformance import parametrize_with_checks\n\n"
+        "@parametrize_with_checks(ENGINE)\ndef test_springcheck(check):\n    check()\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "uneven-1"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "is not velocity-verlet on uneven-1: " in done.stdout
+    assert "conformance.py:" not in done.stdout
+    assert "test_mine.py:6" in done.stdout
 
 
 def test_what_is_refused_in_words_is_no_fault() -> None:
@@ -115,7 +152,9 @@ def test_a_wrong_trajectory_is_told_in_words() -> None:
     scene = load_scene("spring-uneven")
     run = simulate.run(scene, "own:euler")
     conformance.assert_right(scene, run)
-    with pytest.raises(AssertionError, match=r"own:euler is not rk4 on spring-uneven:\n  step-defect: "):
+    with pytest.raises(
+        AssertionError, match=r"own:euler is not rk4 on spring-uneven: .*xplicit Euler.*\n  step-defect: "
+    ):
         conformance.assert_right(scene, replace(run, scheme="rk4"))
 
 

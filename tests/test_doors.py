@@ -267,3 +267,25 @@ def test_a_program_in_awk_is_judged_too(capsys: pytest.CaptureFixture[str]) -> N
         pytest.skip("no awk")
     command = f"awk=sh {EXAMPLES / 'euler.sh'} {{scene}} {{out}}"
     assert run(capsys, "--command", command, "--scheme", "semi-implicit-euler")["status"] == 0
+
+
+def test_mended_code_runs_again_and_the_others_are_shown_all_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code = "def mine(q, p, h, force, mass):\n    p = p + h * fores(q)\n    return q + h * p / mass, p\n"
+    (tmp_path / "mine.py").write_text(code)
+    command = ["run", "spring", "--method", "own:euler", "--method", "own:rk4", "--stepper", "mine.py:mine"]
+    for _ in range(2):
+        assert main(command) == 2
+        said, why = capsys.readouterr()
+        assert "own:rk4" in said
+        assert said.strip().endswith("nothing is stored: stepper:mine did not run")
+        assert "mine failed: NameError" in why
+        assert "(mine.py, line 2)" in why
+        assert not (tmp_path / "spring.h5").exists()
+    (tmp_path / "mine.py").write_text(code.replace("fores", "force"))
+    assert main(command) == 0
+    assert "stepper:mine" in capsys.readouterr().out
+    assert (tmp_path / "spring.h5").exists()
+    assert not (tmp_path / "spring.h5.parts").exists()

@@ -260,7 +260,7 @@ def test_every_engine_has_methods_of_known_schemes() -> None:
 
     for name in engines.names():
         for method in engines.engine(name).methods.values():
-            assert method.adaptive != schemes.scheme(method.scheme).one_step
+            assert method.adaptive != schemes.scheme(method.scheme).has("one-step")
 
 
 @pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:verlet", "sundials:bdf"])

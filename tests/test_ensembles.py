@@ -16,7 +16,7 @@ from springcheck import cli, simulate, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.studies.ensemble import measure, page, shown, vary
-from springcheck.studies.run import measure as main_job
+from springcheck.studies.run.tally import Tally
 from springcheck.studies.team import Processes
 
 BOTH, SOLVED = ["own:*", "ase:velocity-verlet"], ["own:euler", "sundials:bdf"]
@@ -60,7 +60,7 @@ def test_a_cell_has_the_numbers_of_a_run_of_its_own(
         for j in range(cells.cells):
             one = varied.whole({axis.field: float(columns[axis.field][j]) for axis in cells.axes})
             run = simulate.run(one, tally.method)
-            tell = main_job._Tally(one)
+            tell = Tally(one)
             tell.add(run)
             assert columns["steps"][j] == run.outcome.step
             assert measure.OUTCOMES[columns["outcome"][j]] == run.outcome.status
@@ -151,7 +151,9 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     vary_two = ["--vary", "spring.0.stiffness=0.5:8:6:log", "--vary", "time.step=0.01:0.2:5"]
     arguments = ["run", "spring-uneven", *vary_two, "--method", "own:*", "--workers", "2"]
     assert cli.main(arguments) == 0
-    assert "30 cells, a grid over spring.0.stiffness, time.step" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "30 cells, a grid over spring.0.stiffness, time.step" in told
+    assert "no cell is judged" in told
     path = "spring-uneven-ensemble.h5"
     assert cli.main(["inspect", path, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)

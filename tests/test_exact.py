@@ -11,7 +11,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from springcheck.physics import exact
+import springcheck
+from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
@@ -369,17 +370,37 @@ def test_a_chain_over_thirteen_decades_keeps_the_digits_of_every_particle() -> N
     assert np.all(solution.doubt(1.0)[0][:3] < 1e3 * exact.EPS)
 
 
-def test_no_error_below_that_of_the_exact_solution_is_reported() -> None:
-    import springcheck
-    from springcheck.studies.run.measure import _Tally
+def test_an_error_below_that_of_the_exact_solution_is_marked_so(tmp_path: Path) -> None:
+    from springcheck.studies.run import measure, text
+    from springcheck.studies.run.tally import Tally
 
-    rng = np.random.default_rng(2)
-    scene = exact_check.large(rng)
+    scene = exact_check.large(np.random.default_rng(2))
     known = exact.uncertainty(scene, scene.step * scene.steps)
-    run = springcheck.exact(replace(scene, every=scene.steps))
-    tally = _Tally(scene)
-    tally.add(run)
-    assert tally.error >= known > 1e-15
+    assert known > 1e-15
+    tally = Tally(scene)
+    # the exact solution itself, in doubles
+    tally.add(springcheck.exact(replace(scene, every=scene.steps)))
+    assert tally.error < known <= tally.doubt
+    report = measure.run(replace(scene, steps=1, every=1), tmp_path / "x.h5", methods=["own:rk4"])
+    (line,) = report.runs
+    said = replace(report, runs=(replace(line, error_below=True, max_error=known),))
+    assert f"<{known:.2e}" in "".join(str(cell) for row in text._runs(said.runs).rows for cell in row)
+
+
+@pytest.mark.parametrize("n", [40, 60_000])
+def test_the_stated_error_of_a_long_chain_is_some_roundings_of_its_length(n: int) -> None:
+    scene = builders.chain(n, 1.3, 2.9, waves=[(1, 1.0), (7, 0.3)], step=0.03, steps=2000)
+    stated = exact.uncertainty(scene, scene.step * scene.steps)
+    # what rounding leaves moves the fastest wave, whose energy is (n/7)**2 times that of the same slow one
+    assert stated < 64 * 24 * np.log2(8 * n) * n / 7 * exact.EPS
+    # another route: each standing wave by itself
+    t = scene.step * scene.steps
+    q = np.zeros(n, np.longdouble)
+    for mode, size in ((1, 1.0), (7, 0.3)):
+        w = 2 * np.sqrt(2.9 / 1.3) * np.sin(np.pi * mode / (2 * (n + 1)))
+        q += size * np.cos(w * t) * builders.standing(n, [(mode, 1.0)])
+    found, _ = exact.true_motion(scene, np.array([scene.steps]), scene.step)
+    assert np.max(np.abs(found[0] - q)) < 1e-13
 
 
 def test_what_takes_more_digits_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,9 +22,9 @@ def test_a_check_says_its_sentence_and_what_it_needs(check: checks.Check) -> Non
     assert check.needs in said
 
 
-@pytest.mark.parametrize("name", schemes.SCHEMES)
+@pytest.mark.parametrize("name", [*schemes.SCHEMES, *schemes.ATTACHED])
 def test_a_scheme_says_its_step_and_source(name: str) -> None:
-    scheme, said = schemes.SCHEMES[name], list(explain.lines(name))
+    scheme, said = schemes.scheme(name), list(explain.lines(name))
     assert sum(line.startswith("  ") for line in said) >= max(1, len(scheme.stages), len(scheme.b))
     assert scheme.source in " ".join(said)
 
@@ -109,3 +109,29 @@ def test_show_replaces_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert mine.read_text() == "mine"
     assert main(["show", "sprin"]) == 2
     assert "spring" in capsys.readouterr().err
+
+
+def test_the_words_of_the_readme_are_explained() -> None:
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (.*?) \| (.*) \|$", text.partition("## Ten words")[2].partition("\n## ")[0], re.M)
+    assert len(rows) > 10
+    for name, meaning in rows[1:]:
+        assert list(explain.lines(name)) == [f"{name}: {meaning}"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [("shadow", "shadow energy"), ("ulp", "ulp"), ("Method", "engine, method"), ("h-omega", "h omega")],
+)
+def test_a_word_is_found_by_its_beginning(asked: str, word: str) -> None:
+    assert next(explain.lines(asked)).startswith(f"{word}: ")
+
+
+def test_a_splitting_with_a_stage_of_friction_is_conformally_symplectic() -> None:
+    assert "conformally symplectic" in " ".join(explain.lines("langevin-middle"))
+    assert "conformally" not in " ".join(explain.lines("velocity-verlet"))
+
+
+def test_a_held_force_speeds_up_along_itself() -> None:
+    # F is the force, -k q on a spring: v' = v + h F/m
+    assert "v' = v + h F/m" in " ".join(explain.lines("held-force"))

@@ -132,6 +132,7 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))
     assert cli.main(["faults", "--json", "--workers", "1"]) == 0
     document = json.loads(capsys.readouterr().out)
+    assert document.pop("schema") == "springcheck/faults/1"
     assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
     assert document["limits"]["stiffness"]["step-defect"] < 1e-14
     assert document["clean_runs"] == 5
@@ -143,7 +144,7 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     assert said.partition("Stored in")[0].strip() in capsys.readouterr().out
     assert trial.stored("f.h5").document() == document
     assert cli.main(["plot", "f.h5", "--quiet"]) == 0
-    assert [path.name for path in sorted(tmp_path.rglob("*.png"))] == ["faults.png"]
+    assert [path.name for path in sorted(tmp_path.rglob("*.png"))] == ["faults-checks.png", "faults.png"]
     assert cli.main(["faults", "-o", "f.h5"]) == 2
     assert "--force" in capsys.readouterr().err
     assert store.check("f.h5") == []

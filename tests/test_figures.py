@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,44 @@ def test_every_scheme_has_a_look_of_its_own() -> None:
     assert len({looks.LOOKS[name] for name in looks.LOOKS}) == len(looks.LOOKS)
     assert looks.look("a plug-in's") == looks.look("a plug-in's")
     assert looks.look("a plug-in's") not in looks.LOOKS.values()
+
+
+def test_every_engine_s_mark_is_in_the_font_of_the_figures() -> None:
+    from matplotlib import font_manager, ft2font
+
+    font = ft2font.FT2Font(font_manager.findfont("DejaVu Sans"))
+    marks = [*looks.MARKS.values(), *looks._OTHER_MARKS]
+    assert [sign for _, sign in marks if not font.get_char_index(ord(sign))] == []
+    assert "fault" in looks.MARKS
+    assert len(set(marks)) == len(marks)
+
+
+def test_a_run_that_failed_is_drawn_in_red_on_top_of_the_scheme_that_it_breaks() -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    made = runs(scene, "own:semi-implicit-euler", "own:velocity-verlet")
+    right = made["own:semi-implicit-euler"]
+    wrong = replace(right, label="stepper:mine", q=right.q * 1.1)
+    made = {"stepper:mine": wrong, **made}
+    for figure in trajectories.of_runs(scene, made, made, failed=["stepper:mine"]).values():
+        (line,) = [x for x in figure.axes[0].lines if x.get_label() == "FAILED: stepper:mine"]
+        assert line.get_color() == looks.FAILED
+        # only marks stand above it
+        above = [x for x in figure.axes[0].lines if x.get_zorder() > line.get_zorder()]
+        assert all(x.get_linestyle() == "None" for x in above)
+        texts = [x.get_text() for x in figure.legends[0].get_texts()]
+        schemes_of = [text for text in texts if text not in ("exact solution", "start", "separatrix")]
+        assert schemes_of[0].startswith("FAILED: stepper:mine")
+        assert schemes_of[1].startswith("semi-implicit Euler")
+
+
+def test_marks_of_runs_that_lie_on_one_another_stand_apart() -> None:
+    scene = scenefile.load_scene("free")
+    made = runs(
+        scene, *(f"own:{name}" for name in ("euler", "semi-implicit-euler", "velocity-verlet", "rk4"))
+    )
+    axes = trajectories.of_runs(scene, made, made)["phase-portrait"].axes[0]
+    first = [x.get_xdata()[0] for x in axes.lines if x.get_label() in made]
+    assert len(first) == len(set(first)) == 4
 
 
 def test_every_colour_is_seen_on_white_and_on_black() -> None:
@@ -247,3 +286,14 @@ def test_the_exact_solution_is_a_smooth_line_where_a_stiff_motion_decays_at_once
     assert (t[0], t[-1]) == (0, pytest.approx(20))
     jumps = np.hypot(*(np.diff(x, axis=0) / np.ptp(x, axis=0) for x in (q, p)))
     assert np.max(jumps) < 0.1
+
+
+def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
+    scene = scenefile.load_scene("spring")
+    made = runs(scene, *OWN)
+    figure = trajectories.of_runs(scene, made, made)["energy"]
+    title = " ".join(figure._suptitle.get_text().split())  # type: ignore[attr-defined]
+    # (h w)**2 = 0.01
+    assert "explicit Euler gains 1 % a step" in title
+    assert "implicit Euler loses 0.99 % a step" in title
+    assert "semi-implicit" not in title

@@ -14,9 +14,10 @@ import pytest
 from springcheck import store
 from springcheck.cli import main
 from springcheck.engines.own import compiled
+from springcheck.figures import style
 from springcheck.physics.scenefile import folder
 from springcheck.store import files, parts
-from test_store import LABELS, scene, trajectory, written
+from stores import LABELS, scene, trajectory, written
 
 pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
 
@@ -108,7 +109,9 @@ def test_force_replaces_a_store_that_is_damaged(tmp_path: Path) -> None:
         assert store.check(name) == []
 
 
-def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_replaces_no_figure_but_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["run", "spring", *OWN, "-o", "a.h5"]) == 0
     assert main(["run", "spring", "--method", "own:implicit-euler", "--quiet", "-o", "b.h5"]) == 0
     assert main(["plot", "a.h5"]) == 0
@@ -118,7 +121,10 @@ def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str])
     assert main(["plot", "b.h5"]) == 0
     assert {path: path.read_bytes() for path in first} == first
     assert main(["plot", "a.h5"]) == 0
-    refused(capsys, ["plot", "b.h5", "-o", "figures/a"], "figures/a", "a.h5")
+    with monkeypatch.context() as patch:
+        # before the work
+        patch.setattr(style, "_drawn", None)
+        refused(capsys, ["plot", "b.h5", "-o", "figures/a"], "figures/a", "a.h5")
     assert {path: path.read_bytes() for path in first} == first
     mine = next(iter(first))
     mine.write_text("mine")

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import os
+import subprocess
+import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +18,10 @@ import h5py
 import MDAnalysis
 import numpy as np
 import pytest
+import scipy.io
 from ase import Atoms
 
-from springcheck import simulate
+from springcheck import formats, simulate
 from springcheck.cli import main
 from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
@@ -198,6 +204,113 @@ def named_in_npz(run: Trajectory) -> list[str]:
     return ["x.npz", "--columns", "t=clock,q=a,p=b"]
 
 
+def rows_of(run: Trajectory) -> dict[str, list[float]]:
+    return {"t": run.t.tolist(), "q": run.q[:, 0].tolist(), "p": run.p[:, 0].tolist()}
+
+
+def gzipped(run: Trajectory) -> list[str]:
+    Path("x.csv.gz").write_bytes(gzip.compress(Path(csv(run)[0]).read_bytes()))
+    return ["x.csv.gz"]
+
+
+def fortran(run: Trajectory) -> list[str]:
+    """As Fortran writes double precision with D24.16, here with the digit that is lacking."""
+    path = Path(blanks(run)[0])
+    rows = [" ".join(f"{float(x):.17e}" for x in line.split()) for line in path.read_text().splitlines()]
+    path.write_text("\n".join(rows).replace("e", "D") + "\n")
+    return ["x.txt", "--columns", "t,q,v"]
+
+
+def plain_xyz(run: Trajectory) -> list[str]:
+    out = []
+    for t, q, p in zip(run.t, run.q, run.p, strict=True):
+        numbers = (*(q * LINE), *(p / SCENE.m * LINE))
+        out += ["1", f"made by hand, t = {float(t)!r}", "Ar " + " ".join(f"{x:.17g}" for x in numbers)]
+    Path("x.xyz").write_text("\n".join(out) + "\n")
+    return ["x.xyz"]
+
+
+def lammps_log(run: Trajectory) -> list[str]:
+    """Two runs, the second from the frame that the first ended with."""
+    lines = ["LAMMPS (29 Aug 2024)", "thermo_style custom step v_q v_p", "Per MPI rank memory allocation 3"]
+    half = len(run.t) // 2
+    for part in (range(half + 1), range(half, len(run.t))):
+        lines.append("   Step          v_q           v_p      ")
+        lines += [f"{i:10d} {run.q[i, 0]:.17g} {run.p[i, 0]:.17g}" for i in part]
+        lines += ["Loop time of 0.0123 on 1 procs for 100 steps with 1 atoms", "", "Performance: 12 ns/day"]
+    Path("log.lammps").write_text("\n".join(lines) + "\n")
+    return ["log.lammps", "--step", repr(SCENE.step)]
+
+
+def json_of_lists(run: Trajectory) -> list[str]:
+    Path("x.json").write_text(json.dumps({"made": "by hand", **rows_of(run)}))
+    return ["x.json"]
+
+
+def json_of_rows(run: Trajectory) -> list[str]:
+    known = rows_of(run)
+    rows = [dict(zip(known, row, strict=True)) for row in zip(*known.values(), strict=True)]
+    Path("x.json").write_text(json.dumps(rows, indent=1))
+    return ["x.json"]
+
+
+def excel(run: Trajectory) -> list[str]:
+    pytest.importorskip("openpyxl")
+    pytest.importorskip("pandas").DataFrame(rows_of(run)).to_excel("x.xlsx", index=False)
+    return ["x.xlsx"]
+
+
+def parquet(run: Trajectory) -> list[str]:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("pandas").DataFrame(rows_of(run)).to_parquet("x.parquet")
+    return ["x.parquet"]
+
+
+def feather(run: Trajectory) -> list[str]:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("pandas").DataFrame(rows_of(run)).to_feather("x.feather")
+    return ["x.feather"]
+
+
+def matlab(run: Trajectory) -> list[str]:
+    scipy.io.savemat("x.mat", rows_of(run))
+    return ["x.mat"]
+
+
+def matlab_7_3(run: Trajectory) -> list[str]:
+    """HDF5 after a block of MATLAB's own, every array turned: rows are columns."""
+    with h5py.File("x.mat", "w", userblock_size=512) as file:
+        for name, values in rows_of(run).items():
+            file[name] = np.array([values])
+    content = bytearray(Path("x.mat").read_bytes())
+    content[:19] = b"MATLAB 7.3 MAT-file"
+    Path("x.mat").write_bytes(content)
+    return ["x.mat"]
+
+
+def octave(run: Trajectory) -> list[str]:
+    """As ``save -hdf5`` writes it: each array in a group of its name."""
+    with h5py.File("x.h5", "w") as file:
+        for name, values in rows_of(run).items():
+            file[f"{name}/type"], file[f"{name}/value"] = np.bytes_("matrix"), np.array([values]).T
+    return ["x.h5"]
+
+
+def amber(run: Trajectory) -> list[str]:
+    """In double precision, which AmberTools can write; velocities in its own unit of time."""
+    with scipy.io.netcdf_file("x.nc", "w") as file:
+        file.Conventions = b"AMBER"
+        for name, size in (("frame", None), ("atom", 1), ("spatial", 3)):
+            file.createDimension(name, size)
+        file.createVariable("time", "d", ("frame",))[:] = run.t
+        for name, values in (("coordinates", run.q * LINE), ("velocities", run.p / SCENE.m * LINE)):
+            variable = file.createVariable(name, "d", ("frame", "atom", "spatial"))
+            variable[:] = values[:, None, :] / (16 if name == "velocities" else 1)
+            if name == "velocities":
+                variable.scale_factor = 16.0
+    return ["x.nc"]
+
+
 def h5md(run: Trajectory) -> list[str]:
     with h5py.File("x.h5md", "w") as file:
         for name, values in (("position", run.q * LINE), ("velocity", run.p / SCENE.m * LINE)):
@@ -218,6 +331,8 @@ WRITERS: list[Writer] = [
     csv, with_index, printed_with_index, decimal_commas, blanks,
     six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
+    gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows, excel, parquet, feather, matlab,
+    matlab_7_3, octave, amber,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
     csv, blanks, npz, in_space, dump, trr, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
@@ -347,7 +462,7 @@ def test_a_file_that_ends_before_its_scene_says_so(capsys: pytest.CaptureFixture
     short = replace(run, t=run.t[:-3], q=run.q[:-3], p=run.p[:-3])
     assert main(["judge", *csv(short), "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"]) == 0
     steps = SCENE.steps - 3 * SCENE.every
-    assert f"ends after {steps:,} of the scene's {SCENE.steps:,} steps" in capsys.readouterr().out
+    assert f"ends after {steps:,} steps, the scene after {SCENE.steps:,}" in capsys.readouterr().out
 
 
 BAD = [
@@ -376,6 +491,108 @@ def test_a_bad_file_is_one_line(text: str, said: str, capsys: pytest.CaptureFixt
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
     assert any(part in lines[0] for part in said.split("|")), lines
+
+
+def test_what_is_of_no_format_is_told_which_are_read(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("x.bin").write_bytes(b"\xff\xfe\x00\x01" * 99)
+    assert main(["identify", "x.bin"]) == 2
+    said = capsys.readouterr().err
+    for one in formats.FORMATS:
+        assert one.name in said
+    with pytest.raises(SystemExit):
+        main(["identify", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    for one in formats.FORMATS:
+        assert one.name in told
+
+
+@pytest.mark.parametrize("write", [excel, parquet, feather, matlab, amber, ase_trajectory, trr], ids=name_of)
+def test_a_library_reads_in_a_process_of_its_own(write: Writer) -> None:
+    arguments = write(made("own:euler"))
+    command = [sys.executable, "-m", "springcheck", "identify", *arguments, "--json"]
+    done = subprocess.run([*command, "--mass", str(SCENE.m[0])], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert json.loads(done.stdout)["scheme"] == "explicit-euler"
+
+
+HARMFUL = {
+    "x.gro": "x\n-3\n" * 9,
+    "brackets.csv": "[" * 100_000 + ",t,q,p\n0,1,2\n",
+    "digits.csv": "q" + "1" * 100_000 + ",t,q,p\n0,1,2\n",
+    "dots.csv": "q" + "._" * 100_000 + "x,t,q,p\n0,1,2,3\n",
+    "names.csv": ",".join(["n" * 65_000] * 50) + "\n" + ",".join(["0"] * 50) + "\n",
+    "negative.dump": "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n-1\nITEM: ATOMS id x y z vx vy vz\n" * 9,
+    "many.dump": "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n999999999\nITEM: ATOMS id x y z vx vy vz\n",
+    "none.xyz": "0\n\n" * 9,
+    "many.xyz": "999999999999\nt=0\nAr 0 0 0\n",
+    "endless.log": "LAMMPS (1 Jan 2024)\n" + "Step v_q\n" * 99,
+    "deep.json": "{" + '"a":[' * 100_000,
+    "true.dcd": "\x54\0\0\0CORD" + "\xff" * 300,
+    "short.dcd": "\x54\0\0\0CORD",
+    "x.traj": "- of UlmASE-Trajectory" + "\0" * 200,
+    "x.xtc": "\0\0\x07\xcb" + "\x7f" * 200,
+    "x.trr": "\0\0\x07\xc9" + "\x7f" * 200,
+    "x.xlsx": "PK\x03\x04[Content_Types].xml",
+    "x.nc": "CDF\x01" + "\x7f" * 300,
+    "x.parquet": "PAR1" + "\xff" * 99 + "PAR1",
+    "x.feather": "ARROW1" + "\xff" * 99,
+    "x.mat": "MATLAB 5.0 MAT-file" + " " * 105 + "\0\x01IM" + "\x0f\0\0\0\xff\xff\xff\x7f" * 9,
+    "x.gz": "\x1f\x8b\x08\0nothing",
+}
+
+
+def test_a_file_made_to_do_harm_is_one_line() -> None:
+    for name, content in HARMFUL.items():
+        Path(name).write_bytes(content.encode("latin-1"))
+    lines = answered(*HARMFUL)
+    for name, line in zip(HARMFUL, lines, strict=True):
+        assert line.startswith(f"springcheck: {name}")
+        assert len(line) < 500
+
+
+def answered(*files: str) -> list[str]:
+    """What identify says of files, as a program of its own within the limits that are promised."""
+    limited = (
+        f"import resource as r; r.setrlimit(r.RLIMIT_AS, ({1 << 30},) * 2); "
+        "r.setrlimit(r.RLIMIT_CPU, (20, 20)); from springcheck.__main__ import main; raise SystemExit(main())"
+    )
+    command = [sys.executable, "-c", limited, "identify", *files]
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stdout) == (2, ""), done
+    return done.stderr.splitlines()
+
+
+def one_line(name: str) -> str:
+    (line,) = answered(name)
+    return line
+
+
+def test_what_unpacks_to_gigabytes_is_one_line() -> None:
+    with zipfile.ZipFile("x.npz", "w", zipfile.ZIP_DEFLATED) as file, file.open("t.npy", "w") as member:
+        for _ in range(400):
+            member.write(bytes(1 << 20))
+    assert "can be read" in one_line("x.npz")
+    with gzip.open("x.csv.gz", "wt") as file:
+        file.write("t,q,p\n")
+        for _ in range(200):
+            file.write("0,0,0\n" * 65_536)
+    assert "numbers" in one_line("x.csv.gz")
+    with gzip.open("line.csv.gz", "wb") as file:
+        for _ in range(200):
+            file.write(bytes(1 << 20))
+    assert "longer than" in one_line("line.csv.gz")
+    with open("sparse.csv", "wb") as file:
+        file.truncate(900_000_000)
+    assert "longer than" in one_line("sparse.csv")
+
+
+def test_a_table_of_forty_megabytes_is_read_within_the_limits() -> None:
+    t = np.arange(700_000) * 0.1
+    rows = [f"{x:.17g},{np.cos(x):.17g},{-np.sin(x):.17g}" for x in t[:7000]]
+    Path("x.csv").write_text("t,q,p\n" + "\n".join(rows * 100))
+    assert Path("x.csv").stat().st_size > 3.9e7
+    assert "not at a constant interval" in one_line("x.csv")
 
 
 def test_names_that_are_wrong_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:

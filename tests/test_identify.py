@@ -17,11 +17,11 @@ from scipy.integrate import solve_ivp
 from springcheck.doors.function import load
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify, identify_stepper
-from springcheck.identify.search import aliases
+from springcheck.identify.hypothesis import aliases
 from springcheck.physics.arrays import Floats, Force
 from springcheck.schemes import SCHEMES, matrix, step
 
-STEPPING = [s.name for s in SCHEMES.values() if s.one_step and not s.mixes]
+STEPPING = [s.name for s in SCHEMES.values() if s.has("one-step") and not s.has("mixes")]
 SPRINGS = 4
 """Random springs per scheme; validation/identify_census.py takes 200."""
 
@@ -184,7 +184,8 @@ def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_c
         found = identify(made.t, coarse(made.q), coarse(made.p), **made.names)
         assert (name, made.stride) in [(x.scheme, x.stride) for x in found.candidates], found
         assert found.scheme in (name, None)
-        assert (found.scheme is None) == (len(schemes(found)) > 1)
+        # without a stated step what lies between two schemes may fit, and one alone need not be named
+        assert found.scheme is None or len(schemes(found)) == 1
         assert (found.verdict == "named") == (found.scheme is not None)
         named += found.scheme == name
     assert named > 0

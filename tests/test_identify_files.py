@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -155,7 +157,8 @@ def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
     text = " ".join(capsys.readouterr().out.split())
     # any symmetric scheme fits at a scale of its own, near 1/1.7 = 0.588; one that is not has one alone
-    assert "bead: Several schemes would fit at a scale of velocities" in text
+    assert "not known here, which keeps areas and is symmetric in time, or a known one" in text
+    assert "or: Several schemes would fit at a scale of velocities" in text
     assert "exact: 0.595733; velocity-verlet: 0.566082; position-verlet: 0.611256" in text
     t, q, v = motion("semi-implicit-euler", 3)
     assert main(["identify", written(t, q, 1.7 * v)]) == 1
@@ -173,7 +176,7 @@ def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.Captur
     first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
     assert lines[first + 1].startswith("        ")
     text = " ".join(" ".join(lines).split())
-    assert text.startswith("bead: several schemes, which the data cannot tell apart one of: exact; velocity-")
+    assert text.startswith("bead: several schemes, which the data cannot tell apart one of: exact; rk4, 1 to")
     assert "; rk4, 1 to 100 steps a frame;" in text
     assert "no error of a step is visible" in text
 
@@ -286,3 +289,41 @@ def test_a_coordinate_that_moves_in_the_last_frame_alone_is_said(capsys: pytest.
     path = written(t, np.hstack([q, beside]), np.hstack([v, kicked]))
     assert main(["identify", path]) == 2
     assert "rests but for the last frame" in capsys.readouterr().err
+
+
+def edited(change: Callable[[h5py.File], None]) -> str:
+    """A store of ours that somebody has changed."""
+    assert main(["run", "spring-uneven", "--method", "own:euler", "--quiet", "-o", "s.h5"]) == 0
+    with h5py.File("s.h5", "r+") as file:
+        change(file)
+    return "s.h5"
+
+
+def test_a_store_that_lost_its_mark_is_read_through_its_views(capsys: pytest.CaptureFixture[str]) -> None:
+    file = edited(lambda file: file.attrs.__delitem__("format"))
+    assert main(["identify", file, "--json"]) == 0
+    assert document(capsys)["scheme"] == "explicit-euler"
+
+
+def test_what_is_wrong_with_a_store_is_said_of_it_and_the_program_ends_in_order() -> None:
+    file = edited(lambda file: file["parameters/own:euler"].attrs.__setitem__("frames", "x"))
+    command = [sys.executable, "-m", "springcheck", "identify", file]
+    done = subprocess.run(command, capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b"frames" in done.stderr
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_a_view_of_another_file_is_refused_and_the_program_ends_in_order() -> None:
+    t, q, v = motion()
+    file = written(t, q, v)
+    with h5py.File(file, "r+") as opened:
+        view = h5py.VirtualLayout((101, 1, 1), "<f8")
+        view[:, :, 0] = h5py.VirtualSource("other.h5", "x", (101, 1), "<f8")
+        del opened["particles/bead/position/value"]
+        opened.create_virtual_dataset("particles/bead/position/value", view)
+    command = [sys.executable, "-m", "springcheck", "identify", file]
+    done = subprocess.run(command, capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b"shows another file, other.h5" in done.stderr
+    assert done.stderr.count(b"\n") == 1

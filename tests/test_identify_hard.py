@@ -540,3 +540,22 @@ def test_a_clock_that_adds_up_twelve_steps_to_a_frame_is_even() -> None:
     t_, q_, v_ = np.array(rows).T
     found = identify(t_, q_, v=v_, mass=1.0, stiffness=0.01)
     assert (found.scheme, found.stride, found.fits) == ("semi-implicit-euler", 12, True)
+
+
+@pytest.mark.parametrize("digits", [10, 12, 14, 15, 16])
+@pytest.mark.parametrize("frames", [401, 1001, 4001])
+def test_a_clock_that_adds_up_and_is_written_as_text_keeps_its_step(digits: int, frames: int) -> None:
+    m, k, h = 3.7, 2.9, 0.1
+    t, q, v = 0.0, 0.3, 0.7 / m
+    rows = []
+    for _ in range(frames):
+        rows.append([float(f"{x:.{digits}g}") for x in (t, q, v)])
+        v = v + h / 2 * (-k * q / m)
+        q = q + h * v
+        v = v + h / 2 * (-k * q / m)
+        t += h
+    times, positions, velocities = np.array(rows).T
+    found = identify(times, positions[:, None], v=velocities[:, None], mass=np.array([m]))
+    assert found.scheme == "velocity-verlet"
+    # of 16 digits times are doubles, whose sum is no longer known to the bit
+    assert abs(found.step / h - 1) < (1e-12 if digits == 16 else 1e-16)

@@ -341,6 +341,30 @@ def test_a_program_that_was_called_ends_with_all_that_it_has_started(swallowed: 
     assert interrupting._left(process.pid) == 0
 
 
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes in")
+@pytest.mark.parametrize("signals", [("SIGHUP",), ("SIGQUIT",), ("SIGINT", "SIGINT")])
+def test_a_command_ends_with_its_grandchildren_whatever_signal_comes(
+    signals: tuple[str, ...], tmp_path: Path
+) -> None:
+    """A terminal sends its signals to every process of the group, the program's parent among them."""
+    (tmp_path / "slow.sh").write_text(f"#!/bin/sh\nsleep 60 &\ntouch {tmp_path}/begun\nsleep 60\n")
+    (tmp_path / "slow.sh").chmod(0o755)
+    command = ["run", "spring", "--command", "x=./slow.sh {scene} {out}", "--method", "command:x"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "springcheck", *command],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        while not (tmp_path / "begun").exists() and process.poll() is None:
+            time.sleep(0.05)
+        for name in signals:
+            os.killpg(process.pid, getattr(signal, name))
+            time.sleep(0.05)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.startswith("springcheck: interrupted")
+    assert interrupting._left(process.pid) == 0
+
+
 SLOW_DISK = """interrupts.GRACE = 0.1
     import ctypes, os, signal, threading
     from springcheck import simulate, store

@@ -17,7 +17,9 @@ from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, Wall
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 
-FIXED = [n for n, s in schemes.SCHEMES.items() if s.one_step and not s.flow and not s.mixes]
+FIXED = [
+    n for n, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow") and not s.has("mixes")
+]
 
 
 def plain(scene: Scene, name: str) -> Trajectory:

@@ -228,3 +228,43 @@ def test_frames_of_another_shape_are_refused_in_one_line(change: dict[str, Any])
     run = steppers.record(scene, schemes.SCHEMES["rk4"], steppers.textbook(scene, schemes.SCHEMES["rk4"]))
     with pytest.raises(SpringcheckError, match=r"^plain: [^\n]*$"):
         springcheck.judge(scene, replace(run, **change))
+
+
+def lattice(n: int, every: int, *, link: float = 1.3, light: float = 1.0) -> Scene:
+    """A chain of n particles, each with a site of its own that hardens; the first one's numbers times
+    `light`."""
+    rng, each = np.random.default_rng(n), np.arange(n)
+    own = np.where(each == 0, light, 1.0)
+    m = own * 10 ** rng.uniform(-0.3, 0.3, n)
+    joins = link * np.where(each[1:] == 1, light, 1.0)
+    terms = (
+        WallSpring(i=each, k=0.5 * own, at=each.astype(float)),
+        Spring(a=each[:-1], b=each[1:], k=joins, rest=np.ones(n - 1)),
+        Quartic(i=each, b=own, at=each.astype(float)),
+    )
+    start = each + 0.3 * rng.normal(size=n), m * rng.normal(size=n)
+    made = clean.scene(m, terms, *start, step=0.1, steps=6 * every, every=every)
+    return replace(made, quantities=("q", "p"))
+
+
+@pytest.mark.parametrize("every", [2, 50])
+def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_vectors(every: int) -> None:
+    scene = lattice(33, every)
+    assert failed(scene, plain(scene, "velocity-verlet")) == []
+    wrong = plain(scene, "velocity-verlet", lattice(33, every, link=1.3 * (1 + 1e-10)))
+    assert "step-defect" in failed(scene, wrong)
+    # as many as have them are seen ten times as sharply
+    few = lattice(32, every)
+    known = [checks.Case(trajectory=plain(x, "velocity-verlet"), scene=x).ahead for x in (scene, few)]
+    assert all(ahead is not None for ahead in known)
+    many, exact = (float(np.median(ahead.allowance)) for ahead in known if ahead is not None)
+    assert exact < many < 40 * exact
+
+
+def test_a_light_one_among_many_joined_particles_is_seen() -> None:
+    scene = lattice(40, 2, light=1e-9)
+    run = plain(scene, "velocity-verlet")
+    assert failed(scene, run) == []
+    p = run.p.copy()
+    p[3:, 0] *= 1 + 1e-9
+    assert "step-defect" in failed(scene, replace(run, p=p))

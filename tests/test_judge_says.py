@@ -19,7 +19,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.studies.extremes import grid, running
 from springcheck.studies.faults import clean
-from springcheck.studies.run import measure
+from springcheck.studies.run import measure, text
 
 Need = Callable[[str], None]
 LAZY = "ase:velocity-verlet"
@@ -160,3 +160,87 @@ def test_what_the_scenes_say_of_verlet_s_frequency_follows_from_their_numbers() 
             assert all(part in source for part in said)
     source = (Path(__file__).parent.parent / "data" / "scenes" / "morse-bond.toml").read_text()
     assert f"{2990.9463**2 / (4 * 52.8186):.2f} 1/cm" in source
+
+
+def test_judge_says_what_run_says_and_counts_what_failed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    run = simulate.run(scene, "own:velocity-verlet")
+    np.savetxt(tmp_path / "a.csv", np.c_[run.t, run.q, run.p], fmt="%.17g", delimiter=",", header="t,q,p")
+    judged = ["judge", str(tmp_path / "a.csv"), "--scene", "spring-uneven", "--scheme"]
+    assert main([*judged, "velocity-verlet"]) == 0
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert " verdicts passed, 0 failed" in last
+    assert main([*judged, "semi-implicit-euler"]) == 1
+    said = capsys.readouterr().out
+    assert "What the states show: " in said
+    assert "elocity Verlet" in said.partition("What the states show: ")[2]
+    assert " failed: step-defect, " in said.strip().splitlines()[-1]
+
+
+def test_times_in_another_unit_are_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulate.run(scenefile.load_scene("ch-bond"), "own:velocity-verlet")
+    table = np.c_[run.t * 1000, run.q, run.p]
+    names = ["t", *(f"q{i}" for i in range(run.q.shape[1])), *(f"p{i}" for i in range(run.q.shape[1]))]
+    np.savetxt(tmp_path / "a.csv", table, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
+    arguments = ["judge", str(tmp_path / "a.csv"), "--scene", "ch-bond", "--scheme", "velocity-verlet"]
+    assert main(arguments) == 2
+    assert "the times look like fs: frames lie" in capsys.readouterr().err
+
+
+def far_and_near() -> Scene:
+    """A mass at a wall 1e9 away, whose motion is some ulp of its place, beside one at the origin."""
+    return clean.scene(
+        np.array([3.7, 1.3]),
+        (clean.walls(np.array([2.9, 1.7]), np.array([1e9, 0.0])),),
+        np.array([1e9 + 1e-6, 0.3]),
+        np.array([0.0, 0.7]),
+        step=0.1,
+        steps=60,
+    )
+
+
+def test_a_motion_below_the_rounding_of_its_place_is_named(tmp_path: Path) -> None:
+    scene = far_and_near()
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    (right,) = checks.judge(scene, run, [checks.step_defect])
+    assert right.passed is True
+    assert f"q of particle 0, p of particle 0 {checks.BLIND}" in right.why
+    # it may stand still, the other one may not
+    for j, passed in ((0, True), (1, False)):
+        q, p = run.q.copy(), run.p.copy()
+        q[:, j], p[:, j] = q[0, j], p[0, j]
+        (found,) = checks.judge(scene, replace(run, q=q, p=p), [checks.step_defect])
+        assert found.passed is passed
+    report = measure.run(scene, tmp_path / "a.h5", methods=["own:velocity-verlet"])
+    said = "\n".join(str(line) for line in text.lines(report))
+    assert f"own:velocity-verlet: q of particle 0, p of particle 0 {checks.BLIND}" in said
+
+
+def test_nothing_is_named_that_stays_by_right() -> None:
+    """The momentum of a free particle does not move, and any other one is seen."""
+    free = clean.scene(
+        np.array([3.7, 1.3]),
+        (clean.walls(np.array([0.0, 1.7]), np.zeros(2)),),
+        np.array([0.3, 0.3]),
+        np.array([0.2, 0.7]),
+        step=0.1,
+        steps=60,
+    )
+    (found,) = checks.judge(free, springcheck.simulate(free, "own:velocity-verlet"), [checks.step_defect])
+    assert checks.BLIND not in found.why
+
+
+def test_what_would_be_seen_is_of_the_spring_that_shows_least() -> None:
+    """A weak spring beside a stiff one on the same particle is seen 1e3 times worse."""
+    strong, weak = 2.9, 2.9e-3
+    walls = clean.walls(np.array([strong, weak]), np.array([0.0, 0.0]))
+    near = replace(walls, i=np.array([0, 0]))
+    single = clean.scene(np.array([3.7]), (near,), np.array([0.3]), np.array([0.7]), step=0.1, steps=60)
+    (both,) = checks.judge(single, springcheck.simulate(single, "own:velocity-verlet"), [checks.step_defect])
+    alone = lone(1.0)
+    (lonely,) = checks.judge(alone, springcheck.simulate(alone, "own:velocity-verlet"), [checks.step_defect])
+    assert both.sees.stiffness is not None
+    assert lonely.sees.stiffness is not None
+    assert 300 < both.sees.stiffness / lonely.sees.stiffness < 3e4

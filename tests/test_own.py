@@ -40,7 +40,7 @@ from springcheck.physics.terms import (
 from springcheck.schemes.rounding import Met
 
 SCHEMES = tuple(method.scheme for method in ENGINE.methods.values())
-IMPLICIT = tuple(name for name in SCHEMES if schemes.SCHEMES[name].implicit)
+IMPLICIT = tuple(name for name in SCHEMES if schemes.SCHEMES[name].has("implicit"))
 LAYOUTS = ("one", "many", "chain", "held chain", "joined")
 
 
@@ -64,7 +64,7 @@ def random_scene(layout: str, seed: int, scheme: str) -> Scene:
     m, q, p = rng.uniform(0.1, 9, n), rng.normal(size=n), rng.normal(size=n)
     h = float(rng.choice([-1, 1]) * rng.uniform(0.001, 0.3))
     k = rng.normal(1, 1, n) * (rng.random(n) < 0.8)
-    mixes, linear = schemes.SCHEMES[scheme].mixes, schemes.SCHEMES[scheme].implicit
+    mixes, linear = schemes.SCHEMES[scheme].has("mixes"), schemes.SCHEMES[scheme].has("implicit")
     friction = () if seed % 2 or layout == "one" else (Damping(i=np.arange(n), c=rng.uniform(0.01, 0.4, n)),)
     if layout == "one":
         return scene(m, q, p, wall(k, fast=mixes), step=h)
@@ -146,7 +146,7 @@ def test_all_200_steps_equal_the_loops_of_the_blog_bit_for_bit(
 
 
 def test_every_scheme_of_one_step_is_an_own_method_and_three_of_them_run_unasked() -> None:
-    assert set(SCHEMES) == {name for name, scheme in schemes.SCHEMES.items() if scheme.one_step}
+    assert set(SCHEMES) == {name for name, scheme in schemes.SCHEMES.items() if scheme.has("one-step")}
     unasked = ["own:euler", "own:semi-implicit-euler", "own:implicit-euler"]
     assert [str(label) for label in engines.match(("own:*",))] == unasked
     assert [str(label) for label in engines.match(("*",))][:3] == unasked
@@ -186,7 +186,7 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
             assert np.array_equal(rest_p, p[10:])
         assert not np.array_equal(q[0], q[1])
         laws: dict[str, Any] = {
-            "stiffness": system.hessian(what.q) if law.implicit else None,
+            "stiffness": system.hessian(what.q) if law.has("implicit") else None,
             "rate": system.friction_rates if system.is_damped else None,
         }
         before = tuple(np.vstack([a, b[:-1]]).astype(np.longdouble) for a, b in ((what.q, q), (what.p, p)))
@@ -195,9 +195,9 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
         )
         parts = {name: system.magnitude(terms=getattr(system, name)) for name in ("slow", "fast")}
         stiff, rate = laws["stiffness"], laws["rate"]
-        kicks = [kind for kind, _ in law.stages if kind in ("kick", "pull", "slow", "fast")] or law.b
         met = [
-            Met(magnitude=parts.get(str(x), system.magnitude()), stiffness=stiff, joined=True) for x in kicks
+            Met(magnitude=parts.get(terms, system.magnitude()), stiffness=stiff, joined=True)
+            for terms, *_ in law.evaluations
         ]
         size = schemes.magnitude_step(law, *before, h=what.step, m=what.m, met=met, rate=rate)
         # a force is a sum over up to 17 terms: one more rounding for each
@@ -209,7 +209,7 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_every_own_method_passes_its_verdicts_at_every_record_interval(scheme: str) -> None:
     method = next(method for method in ENGINE.methods.values() if method.scheme == scheme)
-    implicit = schemes.SCHEMES[scheme].implicit
+    implicit = schemes.SCHEMES[scheme].has("implicit")
     pair = Spring(a=np.array([0]), b=np.array([1]), k=np.array([2.9]), rest=np.array([0.7]))
     walls = wall([3.1], [-0.4], [0], fast=True)
     bent = () if implicit else (Quartic(i=np.array([1]), b=np.array([0.3]), at=np.array([0.2])),)
@@ -435,15 +435,22 @@ def test_an_implicit_step_refuses_what_its_factors_would_not_fit(monkeypatch: py
     assert simulation.prepare(chain(40), "trapezoidal", 0.1).compiled is False
 
 
-def test_a_scheme_without_a_solver_is_refused() -> None:
+def test_a_scheme_that_the_loops_do_not_have_is_carried_out_by_its_definition() -> None:
     twice = replace(
         schemes.SCHEMES["implicit-midpoint"],
         a=((Fraction(1, 4), Fraction(0)), (Fraction(1, 2), Fraction(1, 4))),
         b=(Fraction(1, 2), Fraction(1, 2)),
     )
-    with pytest.raises(MethodError, match="has no solver here"):
-        simulation.prepare(springs(2), twice, 0.1)
-    with pytest.raises(MethodError, match="neither stages nor a tableau"):
+    halves = [
+        simulation.prepare(springs(2), name, h) for name, h in ((twice, 0.1), ("implicit-midpoint", 0.05))
+    ]
+    ends = np.empty((2, 2, 1, 2))
+    for one, every, rows in zip(halves, (3, 6), ends, strict=True):
+        one.advance(every, *rows)
+    # six implicit stages, each solved to a few roundings
+    np.testing.assert_allclose(ends[0], ends[1], rtol=64 * 2.0**-53)
+    assert halves[0].force_calls == 6
+    with pytest.raises(MethodError, match="no fixed step"):
         simulation.prepare(springs(2), "bdf", 0.1)
 
 

@@ -20,17 +20,17 @@ from springcheck.cli import main, page
 from springcheck.cli.page.content import drawn
 from springcheck.cli.page.sections import Section
 from springcheck.errors import StoreError
-from springcheck.figures import looks
+from springcheck.figures import charts, looks
+from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import STUDIES, charts, keeper
-from springcheck.studies.charts import Bank, Chart, Curve, Scale, Tiles
+from springcheck.studies import STUDIES, keeper
 from springcheck.studies.extremes import measure as atlas
 from springcheck.studies.faults import measure as faults
 from springcheck.studies.faults.result import Clean, FaultReport
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
-from springcheck.text.lines import Table, plain, table
+from springcheck.text.lines import TextTable, plain, table
 
 HOSTILE = (
     "</title></script><script>document.documentElement.dataset.hurt=1</script><img src=x onerror='1'>\"'&"
@@ -129,9 +129,14 @@ def test_a_failed_verdict_is_open_and_named(content: page.Content) -> None:
     first = content.methods[0]
     wrong = replace(first.verdicts[0], passed=False, value=2.0, bound=1.0)
     text = page.html(replace(content, methods=(replace(first, verdicts=(wrong,)), *content.methods[1:])))
-    assert text.count("<details open>") == 1
+    assert text.count('<details class="method" open>') == 1
     assert "1 FAILED" in text
-    assert "<details open>" not in page.html(content)
+    # and it is said before anything else
+    head = text.partition("<h2")[0]
+    assert re.search(rf"\b1 of \d+ failed: {first.method}", head)
+    assert f"FAILED {first.method} {wrong.check}: " in head
+    assert " open>" not in page.html(content)
+    assert re.search(r"\d+ verdicts passed, 0 failed", page.html(content).partition("<h2")[0])
 
 
 def _hostile(content: page.Content) -> page.Content:
@@ -165,7 +170,7 @@ def _hostile(content: page.Content) -> page.Content:
         sections=(section,),
         scene=replace(content.scene, title=HOSTILE, source=HOSTILE),
         scene_text=HOSTILE,
-        not_trusted=(store.Finding(place=HOSTILE, what=HOSTILE),),
+        not_trusted=(store.Damage(place=HOSTILE, what=HOSTILE),),
         methods=(replace(first, method=HOSTILE, scheme=HOSTILE, verdicts=verdicts),),
         same=tuple(replace(one, labels=(HOSTILE,) * len(one.labels)) for one in content.same),
         comparison=replace(content.comparison, labels=(HOSTILE,) * len(content.comparison.labels)),
@@ -217,7 +222,7 @@ def test_other_scenes_are_reported_too(name: str, tmp_path: Path) -> None:
     content = page.gather(tmp_path / "a.h5")
     text = page.html(content)
     assert len(text.encode()) < 500_000
-    assert (content.data["spring"] is None) == ("does not compute anything again" in text)
+    assert (content.data["linear"] is None) == ("does not compute the motion again" in text)
     assert (content.data["spring"] is None) == (name != "lc-circuit")
 
 
@@ -276,7 +281,7 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     assert section.name == name
     assert section.banks
     assert all(f'<div id="{bank}"></div>' in text for bank in section.banks)
-    tables = [block for block in section.blocks if isinstance(block, Table)]
+    tables = [block for block in section.blocks if isinstance(block, TextTable)]
     assert tables
     tags = Tags(text)
     assert all(
@@ -365,8 +370,8 @@ def _checked(chromium: Browser) -> tuple[str, str]:
 def test_a_browser_gets_the_same_doubles(content: page.Content, opened: Any) -> None:
     found, said = _checked(opened(content))
     assert found == "equal"
-    assert "Your browser = this file, to the last bit" in said
-    assert all(f"{label}: 201 frames, each q and p the same double" in said for label in OWN)
+    assert "Your browser = this file: 4 of 4 methods to the last bit, 0 to rounding" in said
+    assert f"each q and p the same double (201 frames): {', '.join(OWN)}" in said
 
 
 def test_a_browser_gets_the_same_doubles_of_another_spring(tmp_path: Path, opened: Any) -> None:
@@ -386,7 +391,60 @@ def test_a_browser_sees_one_changed_bit(content: page.Content, opened: Any) -> N
     found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
     assert found == "differs"
     assert "own:semi-implicit-euler differs first in frame 150, t = 15" in said
-    assert "own:euler: 201 frames" in said
+    assert "each q and p the same double (201 frames): own:euler" in said
+
+
+EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")
+
+
+@pytest.mark.parametrize(
+    "name", ["spring", "spring-uneven", "overdamped", "stiff-spring", "inverted", "free"]
+)
+def test_every_scheme_of_one_particle_is_computed_again(tmp_path: Path, opened: Any, name: str) -> None:
+    base = scenes.load_scene(name)
+    measure.run(replace(base, steps=min(base.steps, 400)), tmp_path / "a.h5", methods=EVERY)
+    content = page.gather(tmp_path / "a.h5")
+    found, said = _checked(opened(content))
+    assert found == "equal", said
+    assert "not computed again" not in said
+    # a shift of a thousandth in any one of them is seen, in most a far smaller one
+    for i in range(0, len(content.data["runs"]), 5):
+        runs = json.loads(json.dumps(content.data["runs"]))
+        runs[i]["q"][-1] += 1e-3 * max(abs(float(q)) for q in runs[i]["q"])
+        found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
+        assert found == "differs", (runs[i]["label"], said)
+
+
+def test_counts_that_are_not_those_of_the_tables_are_told(
+    content: page.Content, chromium: Browser, tmp_path: Path
+) -> None:
+    text = page.html(content)
+    shown = re.search(r"> 9 passed|✓ (\d+) passed", text)
+    assert shown
+    for old, new, said in (
+        (shown[0], shown[0].replace(shown[1] or "9", "7"), "are not those of their table"),
+        (content.summary_line, content.summary_line.replace("verdicts", "of 99 verdicts"), "the head says"),
+        ("<td>passed</td>", '<td class="bad">FAILED</td>', "are not those of their table"),
+    ):
+        assert old in text
+        (tmp_path / "a.html").write_text(text.replace(old, new, 1), encoding="utf-8")
+        chromium.open(tmp_path / "a.html")
+        found, words = _checked(chromium)
+        assert found == "differs", new
+        assert said in words
+
+
+def test_what_failed_is_drawn_and_the_check_says_so(tmp_path: Path, opened: Any) -> None:
+    measure.run(scenes.load_scene("spring"), tmp_path / "a.h5", methods=OWN, faults=["friction=1e-3"])
+    content = page.gather(tmp_path / "a.h5")
+    assert content.methods[0].method == "fault:friction"
+    chromium = opened(content)
+    found, said = _checked(chromium)
+    assert found == "equal"
+    assert "fault:friction is not" in said
+    assert "and its verdicts say so" in said
+    picture = chromium.run('document.querySelector("#motion figure svg").innerHTML')
+    assert "rgb(221, 0, 51)" in picture
 
 
 def test_a_browser_runs_nothing_of_a_hostile_store(content: page.Content, opened: Any) -> None:

@@ -170,6 +170,75 @@ def test_a_bad_file_is_answered_in_one_line(
     assert said in lines[0]
 
 
+ENDS: dict[str, tuple[str, str]] = {
+    "sys.exit(0)": ("start", "bad:m failed: SystemExit: 0 (bad.py, line"),
+    "os._exit(0)": ("advance", "bad:m failed: it ended the program (exit status 0)"),
+    "os._exit(1)": ("version", "bad cannot be imported: it ended the program (exit status 1)"),
+    "os.kill(os.getpid(), 11)": ("advance", "bad:m failed: it crashed (SIGSEGV)"),
+    "os.abort()": ("start", "bad:m failed: it crashed (SIGABRT)"),
+    "os.kill(os.getpid(), 8)": ("import", "bad.py cannot be imported: it crashed (SIGFPE)"),
+    "raise BaseException('x')": ("advance", "bad:m failed: BaseException: x (bad.py, line"),
+    "raise GeneratorExit": ("start", "bad:m failed: GeneratorExit (bad.py, line"),
+    "raise MemoryError": ("advance", "bad:m failed: MemoryError (bad.py, line"),
+    "raise Mute": ("start", "bad:m failed: Mute: its text cannot be made (bad.py, line"),
+}
+
+
+def harmful(path: Path, where: str, act: str) -> Path:
+    """An engine that does this at some place, and stands still."""
+    harm = {"start": "return S()", "advance": "q[:], p[:] = 1, 0", "version": "{}"}
+    wrong = {"start": f"{act}; return S()", "advance": f"{act}; q[:], p[:] = 1, 0", "version": "act()"}
+    parts = harm | {key: text for key, text in wrong.items() if key == where}
+    text = bad(path, **parts).read_text()
+    head = (
+        "import os, sys, threading, time\nclass Mute(Exception):\n    def __str__(self): raise ValueError\n"
+    )
+    head += f"def act():\n    {act}\n    return {{}}\n" + "act()\n" * (where == "import")
+    path.write_text(head + text)
+    return path
+
+
+@pytest.mark.parametrize("act", ENDS)
+def test_an_engine_that_ends_the_program_is_named_and_what_others_finished_is_kept(
+    act: str, tmp_path: Path
+) -> None:
+    where, said = ENDS[act]
+    harmful(tmp_path / "bad.py", where, act)
+    done = springcheck(tmp_path, "run", "spring", "--engine", "bad.py", "--method", "own:euler", "-o", "s.h5")
+    assert done.returncode == 2
+    assert said in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+    # the others are shown all the same, and nothing reads as if all had passed
+    assert not done.stdout or "bad:m" in done.stdout
+    if where in ("start", "advance"):
+        assert [part.name for part in (tmp_path / "s.h5.parts").glob("run-*")] == ["run-own%3Aeuler.h5"]
+
+
+@pytest.mark.parametrize(
+    ("where", "act"),
+    [
+        ("start", "print('noise'); os.system('echo noise')"),
+        ("advance", "print('noise', flush=True)"),
+        ("start", "sys.stdout.close()"),
+        ("start", "os.close(1)"),
+        ("advance", "threading.Thread(target=time.sleep, args=(99,)).start()"),
+        ("start", "os.fork()"),
+        ("version", "print('noise')"),
+    ],
+)
+def test_nothing_that_an_engine_does_to_the_program_stands_in_its_document(
+    where: str, act: str, tmp_path: Path
+) -> None:
+    harmful(tmp_path / "bad.py", where, act)
+    command = ["run", "spring", "--engine", "bad.py", "--method", "own:euler", "--json", "-o", "s.h5"]
+    done = springcheck(tmp_path, *command)
+    # it stands still, and fails for it
+    assert done.returncode == 1, done.stderr
+    assert [run["method"] for run in json.loads(done.stdout)["runs"]] == ["own:euler", "bad:m"]
+    assert "noise" in done.stderr or "noise" not in act
+    assert "springcheck:" not in done.stderr
+
+
 def test_a_missing_file_is_answered_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", "--engine", "nowhere.py"]) == 2
     assert capsys.readouterr().err == "springcheck: nowhere.py: there is no such file\n"

@@ -114,19 +114,28 @@ def test_with_friction_energies_are_measured_against_the_exact_loss(capsys: Capt
     assert "below 1 passes" in said
 
 
+def _turned(*, k: float, b: float, m: float, q: float, p: float) -> float:
+    """The square of the largest position of a quartic well."""
+    energy = k * q**2 / 2 + b * q**4 / 4 + p**2 / (2 * m)
+    return float((-k + np.sqrt(k**2 + 4 * b * energy)) / b)
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
         ("spring-uneven", np.sqrt(2.9 / 3.7)),
         ("carbon-monoxide", np.sqrt(1145328.357 * (1 / 12 + 1 / 15.99491461957))),
         ("overdamped", np.sqrt(2.9 / 1.3)),
-        ("anharmonic", np.sqrt((2.9 + 3 * 1.7 * 0.9**2) / 1.3)),
+        # where it is stiffest, at its turning point: b x**4/4 + k x**2/2 = E
+        ("anharmonic", np.sqrt((2.9 + 3 * 1.7 * _turned(k=2.9, b=1.7, m=1.3, q=0.9, p=0.7)) / 1.3)),
         ("free", 0.0),
         ("inverted", 0.0),
     ],
 )
 def test_the_fastest_frequency_of_a_scene(name: str, expected: float) -> None:
-    assert fastest(scenefile.load_scene(name)) == pytest.approx(expected, rel=1e-12)
+    # an anharmonic motion is looked at in so many places, 1e-5 beside its turning point at most
+    rel = 2e-5 if name == "anharmonic" else 1e-12
+    assert fastest(scenefile.load_scene(name)) == pytest.approx(expected, rel=rel)
 
 
 def test_stability_speaks_of_the_scene(capsys: Captured) -> None:

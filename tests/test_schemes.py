@@ -35,7 +35,7 @@ MATRICES = {
 }
 MATRICES["trapezoidal"] = MATRICES["implicit-midpoint"]
 
-ONE_STEP = [scheme for scheme in SCHEMES.values() if scheme.one_step]
+ONE_STEP = [scheme for scheme in SCHEMES.values() if scheme.has("one-step")]
 
 
 def one(scheme: Scheme, k: float = K, h: float = H) -> np.ndarray:
@@ -102,7 +102,7 @@ def test_the_closed_form_is_what_stepping_gives(scheme: Scheme, k: float) -> Non
     walked = [z]
     for _ in range(50):
         walked.append(found[0] @ walked[-1])
-    y, v = schemes.propagate(found, z[:1], z[1:], np.arange(51), area_preserving=scheme.symplectic)
+    y, v = schemes.propagate(found, z[:1], z[1:], np.arange(51), area_preserving=scheme.has("symplectic"))
     states = np.stack([y[:, 0], v[:, 0]], axis=1)
     size = np.maximum.accumulate(np.max(np.abs(walked), axis=1))
     # 50 steps of extended arithmetic, enlarged by the condition of a map near its limit

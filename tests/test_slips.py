@@ -198,7 +198,7 @@ def test_a_mistake_of_ours_is_one_line_and_shows_its_place_when_asked(
     monkeypatch.setattr(cli, "main", wrong)
     for name in ("install", "finish"):
         monkeypatch.setattr(interrupts, name, lambda: None)
-    assert __main__.main() == 2
+    assert __main__._main() == 2
     said = capsys.readouterr().err
     assert said.startswith(
         "springcheck: ZeroDivisionError: division by zero; this is a mistake in springcheck"
@@ -251,3 +251,57 @@ def test_a_run_that_decays_into_subnormal_numbers_says_so(capsys: pytest.Capture
         capsys.readouterr().out
     )
     assert springcheck.simulate(springcheck.load_scene("spring"), "own:implicit-euler").outcome.message == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--method", "verlet"], "did you mean openmm:verlet?"),
+        (["--method", "@cpu"], "a platform goes with a method, as openmm:"),
+        (["--set", "stiffness=2"], "--set stiffness=2: which one? spring.0.stiffness"),
+        (["--set", "spring.0.stiffness=2 N/m"], "a number alone is needed, in the scene's unit, as 2"),
+        (
+            ["--stepper", "three.py:step"],
+            "three.py:step: step(q, p, h) cannot be called as a step: step(q, p, h,",
+        ),
+    ],
+)
+def test_a_slip_is_answered_with_what_was_meant(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "three.py").write_text("def step(q, p, h):\n    return q, p\n")
+    assert main(["run", "spring", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+
+
+def test_every_method_runs_by_all_and_by_a_star(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "a.h5")
+    assert main(["run", "spring", "-o", path]) == 0
+    said = capsys.readouterr().out
+    (line,) = [one for one in said.splitlines() if "not among the default methods; --all" in one]
+    assert "own:rk4" in line
+    assert "own:euler" not in line
+    counts = []
+    for arguments in (["--all"], ["--method", "*"]):
+        assert main(["run", "spring", *arguments, "-o", path, "--force", "--json"]) in (0, 1, 2)
+        document = json.loads(capsys.readouterr().out)
+        counts.append(len(document["runs"]))
+        assert document["others"] == []
+        assert "own:rk4" in {run["method"] for run in document["runs"]}
+    assert counts[0] == counts[1] > 25
+
+
+def test_run_says_which_methods_its_step_is_too_long_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", "multiple-time-steps", "--step", "0.347", "--steps", "200", "--method", "own:respa8"]
+    main([*arguments, "--method", "own:implicit-euler", "-o", str(tmp_path / "a.h5")])
+    said = capsys.readouterr().out
+    assert "h = 0.347 is beyond the limit of r-RESPA" in said
+    assert " here, 0.3468: own:respa8" in said
+    main(["run", "spring", "--method", "own:euler", "-o", str(tmp_path / "b.h5")])
+    assert "beyond" not in capsys.readouterr().out

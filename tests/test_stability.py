@@ -13,12 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.text import Text
 
-from springcheck import engines, schemes
+from springcheck import engines, schemes, simulate
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
+from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
 
 LABELS = [str(label) for label in engines.match(("*",)) if propagators.has_one_step(label)]
@@ -137,3 +139,60 @@ def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
     for name in ("limits", "resonances", "regions", "costs-overdamped"):
         assert f"stability-{name}.png" in written
         assert (tmp_path / f"stability-{name}.png").stat().st_size > 10_000
+
+
+LONGEST = [
+    # with friction: from the roots of the one-step map, by hand; explicit Euler w2 h**2 - r h + 1 = 1
+    ("overdamped", "own:euler", 0.00669602),
+    ("overdamped", "own:semi-implicit-euler", 0.00669569),
+    ("overdamped", "own:velocity-verlet", 0.0133917),
+    ("rlc-circuit", "own:euler", 22.0 * 47e-9),
+    ("rlc-circuit", "own:semi-implicit-euler", 2.38953e-5),
+    # the first resonance: h w = 3.100202 of the fast spring, w**2 = 42.5 (1/1.3 + 1/0.9)
+    ("multiple-time-steps", "own:respa8", 3.100202 / np.sqrt(42.5 * (1 / 1.3 + 1 / 0.9))),
+    ("multiple-time-steps", "own:velocity-verlet", 2 / 8.969653440918822),
+]
+
+
+@pytest.mark.parametrize(("name", "method", "limit"), LONGEST)
+def test_the_largest_step_is_where_the_scene_itself_begins_to_grow(
+    name: str, method: str, limit: float, need: Need
+) -> None:
+    need(method)
+    scene, label = scenes.load_scene(name), engines.parse(method)
+    found = longest(schemes.scheme(engines.method(label).scheme), scene)
+    assert found == pytest.approx(limit, rel=1e-5)
+
+    def reach(h: float) -> float:
+        run = simulate.run(replace(scene, step=h, steps=40_000, every=100, quantities=("q", "p")), label)
+        return float(np.max(np.abs(run.q)) / max(abs(scene.q)))
+
+    below, above = reach(found * (1 - 2e-3)), reach(found * (1 + 2e-3))
+    assert below < 10
+    # the lightly damped circuit grows by 7e-6 a step there, the others by far more
+    assert above > (1.2 if name == "rlc-circuit" and method == "own:euler" else 1e10) * below
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "said"),
+    [
+        ("overdamped", "own:euler", "within the limit of every method"),
+        ("morse-bond", "own:velocity-verlet", "where its motion is stiffest: w = 979.4"),
+        ("multiple-time-steps", "own:respa8", "0.3468"),
+    ],
+)
+def test_a_study_prints_the_limits_of_the_scene(name: str, method: str, said: str, need: Need) -> None:
+    need(method)
+    study = stability.measure(scenes.load_scene(name), [method])
+    text = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
+    text += f"{study.largest(study.limits[0]):.4g}"
+    assert said in text
+    assert "no step is too long" not in text
+    (row,) = study.document()["methods"]
+    assert row["largest_step"] == pytest.approx(study.largest(study.limits[0]))
+
+
+def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Need) -> None:
+    need("own:respa8")
+    study = stability.measure(scenes.load_scene("spring"), ["own:respa8", "own:velocity-verlet"])
+    assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)

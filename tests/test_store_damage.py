@@ -21,8 +21,8 @@ import pytest
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison
-from springcheck.store import checking, seal, trust
-from test_store import LABELS, scene, trajectory
+from springcheck.store import apart, checking, seal, trust
+from stores import LABELS, scene, trajectory
 
 READERS: list[Callable[[Path], object]] = [
     store.read,
@@ -235,7 +235,7 @@ def test_a_file_that_another_program_is_writing_is_told(tmp_path: Path) -> None:
 def test_a_reader_that_crashes_or_never_ends_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "s.h5"
     path.touch()
-    monkeypatch.setattr(trust, "LIMIT", 1.0)
+    monkeypatch.setattr(apart, "LIMIT", 1.0)
     monkeypatch.setattr(trust, "MODULE", "broken")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     for body, said in (

@@ -21,7 +21,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.trajectory import Comparison
 from springcheck.studies.stability import regions
 from springcheck.studies.stability.result import REGIONS
-from test_store import LABELS, scene, trajectory, written
+from stores import LABELS, scene, trajectory, written
 
 OPTIONS: dict[str, Any] = {"swmr": True, "locking": False}
 """How jupyterlab-h5web opens files."""

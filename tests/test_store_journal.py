@@ -19,7 +19,7 @@ from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.store import adopt, files, merge, seal
 from springcheck.store.parts import claim, parts_folder
-from test_store import LABELS, assert_same, scene, trajectory, written
+from stores import LABELS, assert_same, scene, trajectory, written
 
 
 class Killed(BaseException):
@@ -232,7 +232,7 @@ import resource, sys
 from springcheck import store
 from springcheck.errors import StoreError
 sys.path.insert(0, sys.argv[3])
-from test_store import LABELS, scene, trajectory
+from stores import LABELS, scene, trajectory
 s = scene(steps=4000)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
 try:

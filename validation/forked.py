@@ -20,6 +20,7 @@ import traceback
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -190,7 +191,8 @@ def _perform(commands: Sequence[Sequence[str]], answers: Path) -> None:
         interrupts._State.errors = 2
         sys.argv[1:] = command
         try:
-            status = program.main()
+            # this process is forked already: one that waits for another would carry out what follows as well
+            status = program._main()
             sys.stdout.flush()
         except SystemExit as ended:
             status = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
@@ -209,46 +211,50 @@ def _perform(commands: Sequence[Sequence[str]], answers: Path) -> None:
 
 def _shortened() -> None:
     """Leave out what takes longest: figures, and the start of Python in the process that tries a file."""
-    from springcheck.store import __main__ as tried
-    from springcheck.store import trust
+    from springcheck.store import apart
     from springcheck.studies import study
 
     setattr(study.Study, "draw", lambda *_, **__: [])  # noqa: B010
     size = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
-    def called(words: Sequence[str], timeout: float, **_: Any) -> subprocess.CompletedProcess[bytes]:
-        read, write = os.pipe()
+    def read(module: str, kind: str, path: Path, *words: str) -> bytes:
+        limit = apart.LIMIT + path.stat().st_size / apart.SPEED
+        pipe, write = os.pipe()
         child = os.fork()
         if child == 0:
             try:
-                tried.limit(int(words[6]), int(words[7]) + size)
+                apart._limit(int(limit) + 1, apart.MEMORY + size)
                 os.dup2(os.open(os.devnull, os.O_RDWR), 2)
-                os.write(write, tried.main(words[4], Path(words[5])).encode()[:60_000])
+                found = import_module(f"{module}.__main__").main(kind, path, *words)
+                with open(write, "wb") as answer:
+                    answer.write(found)
             finally:
                 # what is raised is no answer
                 os._exit(int(sys.exc_info()[0] is not None))
         os.close(write)
         signal.signal(signal.SIGALRM, lambda *_: os.kill(child, signal.SIGKILL))
-        signal.setitimer(signal.ITIMER_REAL, timeout)
-        with open(read, "rb") as pipe:
-            said = pipe.read()
+        signal.setitimer(signal.ITIMER_REAL, 6 * limit)
+        with open(pipe, "rb") as answer:
+            said = answer.read()
         ended = os.waitpid(child, 0)[1]
         signal.setitimer(signal.ITIMER_REAL, 0)
-        return subprocess.CompletedProcess(words, os.waitstatus_to_exitcode(ended), said, b"")
+        if ended:
+            raise apart.EndedError("does not end as it should")
+        return said
 
-    setattr(trust, "called", called)  # noqa: B010
+    setattr(apart, "read", read)  # noqa: B010
 
 
 def _import() -> None:
     """Import what the commands import, so that a forked one need not."""
     from springcheck import formats, plot, simulate  # noqa: F401
     from springcheck.cli import commands, file, inspect, page  # noqa: F401
-    from springcheck.identify import files, stepper, text  # noqa: F401
+    from springcheck.figures import render  # noqa: F401
+    from springcheck.identify import files, stepper  # noqa: F401
     from springcheck.studies.extremes import figure  # noqa: F401
     from springcheck.studies.precision import figure as f1  # noqa: F401
     from springcheck.studies.precision import measure  # noqa: F401
     from springcheck.studies.run import figure as f2  # noqa: F401
-    from springcheck.studies.stability import figure as f3  # noqa: F401
     from springcheck.studies.stability import measure as m1  # noqa: F401
 
 

@@ -509,6 +509,63 @@ def a_sparse_file(file: Any, rng: random.Random, folder: Path) -> None:
             file[f"{BASE}/{name}"].attrs[key] = value
 
 
+@kind
+def a_circle_of_unmarked_groups(file: Any, rng: random.Random, folder: Path) -> None:
+    del file.attrs["format"]
+    tops = [file.create_group(f"ring {i}") for i in range(12)]
+    for one in tops:
+        for j, other in enumerate(tops):
+            one[f"to {j}"] = other
+
+
+@kind
+def many_labels_on_one_group(file: Any, rng: random.Random, folder: Path) -> None:
+    file[f"parameters/{LABEL}"].attrs.create("x", "x" * REPEATED, dtype=h5py.string_dtype())
+    for i in range(1_000):
+        for tree in ("parameters", "observables", "particles"):
+            file[f"{tree}/own:{i}"] = file[f"{tree}/{LABEL}"]
+
+
+@kind
+def columns_linked_to_each_other(file: Any, rng: random.Random, folder: Path) -> None:
+    name = rng.choice(["verdicts", "comparison", "precision/x"])
+    group = file.require_group(name)
+    group.attrs["kind"] = "table"
+    group["wide"] = np.zeros(REPEATED // 4)
+    for i in range(200):
+        group[f"x{i}"] = group["wide"]
+
+
+@kind
+def a_million_verdicts(file: Any, rng: random.Random, folder: Path) -> None:
+    for name in list(file["verdicts"]):
+        old = file["verdicts"][name]
+        values = np.resize(old[()], REPEATED // 9)
+        kept = h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
+        replace(file, f"verdicts/{name}", data=values, dtype=kept)
+
+
+@kind
+def a_document_of_many_megabytes(file: Any, rng: random.Random, folder: Path) -> None:
+    name = rng.choice(["precision", "stability", "extremes"])
+    text = rng.choice(["[" + "[]," * (2 * REPEATED) + "1]", '{"a": "' + "x" * (6 * REPEATED) + '"}'])
+    file.require_group("documents").create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
+
+
+@kind
+def declared_frames_of_h5md(file: Any, rng: random.Random, folder: Path) -> None:
+    del file.attrs["format"]
+    rows = 1 << rng.choice([25, 28])
+    for name in ("position", "velocity"):
+        element = f"particles/{LABEL}/{name}"
+        for kind in ("value", "time", "step"):
+            del file[f"{element}/{kind}"]
+        view = h5py.VirtualLayout((rows, 1, 3), "<f8")
+        view[:201, :, 0] = h5py.VirtualSource(".", f"{BASE}/q/value", (201, 1), "<f8")
+        file.create_virtual_dataset(f"{element}/value", view, fillvalue=0.0)
+        file[f"{element}/time"], file[f"{element}/step"] = 0.1, 1
+
+
 def base(folder: Path) -> Path:
     """A whole store of two trajectories."""
     from springcheck.cli import main

@@ -55,8 +55,8 @@ from arguments import arguments
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import DAMPED, UNDAMPED, Family
+from springcheck.identify.hypothesis import aliases, frictionless
 from springcheck.identify.recurrence import classes
-from springcheck.identify.search import aliases, frictionless
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 

@@ -3,18 +3,23 @@
     python validation/judge_campaign.py [FIRST COUNT [FILE [thorough]]]
 
 Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
-ones of implicit schemes up to 1e4; every scheme with a step of its own; every 1 to 2000 steps; ten legal
-orders of operation (as written, in extended precision and rounded once a step or never, velocities instead
-of momenta, terms in another order, row by row, fused products, the one-step matrix less 1 and whole,
-velocities rebuilt from positions); and faults of more than a hundred kinds: every parameter of every term
-and of the grid, coefficients of the schemes, every other scheme, and what happens to states on their way.
+ones of implicit schemes up to 1e4; two in five are hard ones: stiffnesses 10 decades apart, walls 1e9
+amplitudes away, hubs, 33 to 48 particles; every scheme with a step of its own; every 1 to 2000 steps; ten
+legal orders of operation (as written, in extended precision and rounded once a step or never, velocities
+instead of momenta, terms in another order, row by row, fused products, the one-step matrix less 1 and
+whole, velocities rebuilt from positions), and four forms of an implicit step (`implicit_forms.py`); and
+faults of more than a hundred kinds: every parameter of every term and of the grid, coefficients of the
+schemes, every other scheme, and what happens to states on their way.
 
 A set is all verdicts on one trajectory; a scene has two of legal engines and two of faulty ones.  A false
-alarm is a failed verdict on a legal engine.  A fault counts where its effect on a recorded frame exceeds 20
-allowances, or what the scheme rounds along a step if that is more: the frame is that far from the scheme's
-own steps, in extended precision, from the frame before.  It is missed where no verdict fails and the step
-defect does not say that it cannot tell.  Allowances are the judge's own; the noise of the legal engines,
-printed beside, says how far they are from what rounding really does.
+alarm is a failed verdict on a legal engine.
+
+How large a fault is follows from no allowance of the judge.  The defect of a coordinate is how far recorded
+frames are from the scheme's own steps, in extended precision, from the frame before; its noise is the
+largest defect that any legal engine has in it on that scene, all forms tried, and half an ulp of it at
+least.  A fault counts where its defect in some coordinate is more than 20 times the noise.  It is told where
+a verdict fails, or where each such coordinate is named as one that cannot be judged, or the step defect says
+that it cannot tell; else it is missed, and by which factor of the noise is counted in decades.
 
 With `thorough` a set is all experiments of `run --thorough` with one own method on one such scene; FILE,
 which holds blocks of one kind, may be - for none.
@@ -34,6 +39,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+import implicit_forms
 from arguments import arguments
 from springcheck import checks, engines, schemes, simulate
 from springcheck.physics.arrays import Floats
@@ -43,9 +49,9 @@ from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, W
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 
-FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.one_step and not s.flow)
+FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow"))
 COUNTED = 20.0
-"""Allowances from which a fault counts."""
+"""Times the noise of right engines from which a fault counts."""
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]
@@ -65,7 +71,7 @@ def random_scene(rng: np.random.Generator, scheme: schemes.Scheme) -> Scene:
     each = np.arange(n)
     kinds = ["wall", "wall", "chain", "quartic", "double", "cosine", "morse", "inverted", "free"]
     chosen = {str(x) for x in rng.choice(kinds, int(rng.integers(1, 3)))}
-    if scheme.mixes:
+    if scheme.has("mixes"):
         chosen |= {"wall", "fast"}
     at = size * rng.normal(size=n) * (rng.random() < 0.5)
     terms: list[Term] = []
@@ -101,11 +107,50 @@ def random_scene(rng: np.random.Generator, scheme: schemes.Scheme) -> Scene:
     made = clean.scene(m, tuple(terms), q, p, step=1.0, steps=2)
     w = float(np.sqrt(np.max(made.system.gershgorin(q) / m)) + np.max(made.system.friction_rates)) or rate
     hw = float(rng.choice([rng.uniform(0.02, 1.2), 10 ** rng.uniform(-3, -0.5)]))
-    if scheme.implicit and made.system.is_linear and rng.random() < 0.5:
+    if scheme.has("implicit") and made.system.is_linear and rng.random() < 0.5:
         hw = float(10 ** rng.uniform(0, 4))
     every, frames = grid(rng)
     sign = -1 if rng.random() < 0.15 and not damped else 1
     return replace(made, step=sign * hw / w, every=every, steps=every * frames, quantities=("q", "p"))
+
+
+def hard_scene(rng: np.random.Generator, scheme: schemes.Scheme) -> Scene:
+    """Stiffnesses decades apart, far walls, hubs, or many particles, under linear terms or hardening ones."""
+    kind = str(rng.choice(["stiff", "stiff", "far", "hub", "many"]))
+    n = int({"stiff": rng.integers(2, 5), "far": rng.integers(1, 4), "hub": rng.integers(4, 13)}.get(
+        kind, rng.integers(33, 49)
+    ))  # fmt: skip
+    each, ends = np.arange(n), np.arange(n - 1)
+    m, soft = spread(rng, 1, n), float(spread(rng, 1)[0])
+    at, rest = np.zeros(n), rng.uniform(0, 2, n - 1)
+    terms: list[Term] = []
+    if kind == "far":
+        at = 10 ** rng.uniform(0, 9, n) * rng.choice([-1, 1], n) * (rng.random(n) < 0.6)
+        terms.append(WallSpring(i=each, k=soft * spread(rng, 0.5, n), at=at))
+    else:
+        ratio = 10 ** rng.uniform(0, 10, n - 1) if kind == "stiff" else spread(rng, 1, n - 1)
+        terms.append(Spring(a=0 * ends if kind == "hub" else ends, b=ends + 1, k=soft * ratio, rest=rest))
+        held = each if kind == "many" and rng.random() < 0.5 else each[:1]
+        terms.append(WallSpring(i=held, k=soft * np.ones(len(held)), at=np.zeros(len(held))))
+    if kind == "many" and rng.random() < 0.5 and not scheme.has("implicit"):
+        terms.append(Quartic(i=each, b=soft * spread(rng, 0.5, n), at=np.zeros(n)))
+    if scheme.has("mixes"):
+        terms.append(WallSpring(i=each, k=30 * soft * np.ones(n), at=at, fast=True))
+    damped = scheme.name not in ("langevin-middle", "langevin-middle-early") and rng.random() < 0.2
+    if damped:
+        terms.append(Damping(i=each, c=m * np.sqrt(soft) * spread(rng, 2, n)))
+    q = at + rng.normal(size=n)
+    if kind in ("stiff", "many"):
+        q = np.concatenate([[0.0], np.cumsum(rest)]) + 10 ** rng.uniform(-9, 0) * rng.normal(size=n)
+    made = clean.scene(m, tuple(terms), q, m * np.sqrt(soft) * rng.normal(size=n), step=1.0, steps=2)
+    w = float(np.sqrt(np.max(made.system.gershgorin(q) / m)) + np.max(made.system.friction_rates))
+    hw = float(rng.choice([rng.uniform(0.02, 1.2), 10 ** rng.uniform(-3, -0.5)]))
+    if scheme.has("implicit"):
+        hw = float(10 ** rng.uniform(-1, 5.5))
+    every, frames = grid(rng)
+    if kind == "many":
+        every, frames = min(every, 20), min(frames, 12)
+    return replace(made, step=hw / w, every=every, steps=every * frames, quantities=("q", "p"))
 
 
 def grid(rng: np.random.Generator) -> tuple[int, int]:
@@ -172,7 +217,7 @@ def velocities(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -
         return system.force(q, v * m) / m
 
     parts = tuple((lambda q, v, part=part: part(q, v * m) / m) for part in system.parts)
-    slope = (lambda q: (system.hessian(q) / m[:, None], True)) if scheme.implicit else None
+    slope = (lambda q: (system.hessian(q) / m[:, None], True)) if scheme.has("implicit") else None
 
     rate = system.friction_rates if system.is_damped else None
 
@@ -232,13 +277,17 @@ def affine(scene: Scene, scheme: schemes.Scheme) -> tuple[Any, Any]:
     right = extended(scene, scheme)
     none = np.zeros(scene.n, dtype=np.longdouble)
     o = np.concatenate(right(none, none))
-    rows = np.eye(2 * scene.n).astype(np.longdouble)
-    return np.stack([np.concatenate(right(*np.split(row, 2))) - o for row in rows], axis=1), o
+    # as large as walls are far, or the difference would be of their roundings
+    rows = np.eye(2 * scene.n).astype(np.longdouble) * FAR
+    return np.stack([(np.concatenate(right(*np.split(row, 2))) - o) / FAR for row in rows], axis=1), o
+
+
+FAR = 2.0**40
 
 
 def matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
     """The one-step matrix less 1 and what the origin becomes, for linear scenes."""
-    if not scene.system.is_linear or scheme.implicit:
+    if not scene.system.is_linear or scheme.has("implicit"):
         return written(scene, scheme, rng)
     right, origin = affine(scene, scheme)
     less, constant = (right - np.eye(2 * scene.n)).astype(np.float64), origin.astype(np.float64)
@@ -253,7 +302,7 @@ def matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> St
 
 def whole_matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
     """The one-step matrix as it is, its elements near 1 rounded: of scenes without constant forces."""
-    if not scene.system.is_linear or scheme.implicit:
+    if not scene.system.is_linear or scheme.has("implicit"):
         return written(scene, scheme, rng)
     right, origin = affine(scene, scheme)
     if np.any(origin != 0):
@@ -267,6 +316,17 @@ def whole_matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator)
     return step
 
 
+def form(name: str) -> Callable[[Scene, schemes.Scheme, np.random.Generator], Step]:
+    """An implicit step of a linear scene as some engines write it."""
+
+    def made(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+        if scheme.name not in implicit_forms.THETA or not scene.system.is_linear:
+            return written(scene, scheme, rng)
+        return implicit_forms.step(scene, scheme, name, per_row=bool(rng.random() < 0.5))
+
+    return made
+
+
 LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] = {
     "as written": written,
     "extended": wide,
@@ -278,6 +338,7 @@ LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] =
     "compensated": compensated,
     "rebuilt": rebuilt,
     "whole matrix": whole_matrix,
+    **{name: form(name) for name in implicit_forms.FORMS},
 }
 
 
@@ -293,7 +354,8 @@ def extended(scene: Scene, scheme: schemes.Scheme) -> Callable[[Any, Any], tuple
     def step(q: Any, p: Any) -> tuple[Any, Any]:
         return schemes.step(
             scheme, q.astype(np.longdouble), p.astype(np.longdouble), h=scene.step, m=scene.m,
-            force=system.force, stiffness=stiff if scheme.implicit else None, parts=system.parts, rate=rate,
+            force=system.force, stiffness=stiff if scheme.has("implicit") else None, parts=system.parts,
+            rate=rate,
         )  # fmt: skip
 
     return step
@@ -549,10 +611,13 @@ class Counts:
     seen_below: int = 0
     untold: int = 0
     missed: list[str] = field(default_factory=list)
+    """Those above 20 times the noise that nothing tells."""
+    decades: dict[str, int] = field(default_factory=dict)
+    """How many of them by the decade of that factor."""
     numbers: list[str] = field(default_factory=list)
     """Verdicts whose value or bound is no finite number."""
     kinds: dict[str, int] = field(default_factory=dict)
-    """Faults above `COUNTED` allowances of each kind."""
+    """Faults above `COUNTED` times the noise of each kind."""
     noise: dict[str, float] = field(default_factory=dict)
     """The largest part of its bound that each check has seen in a legal engine."""
 
@@ -560,7 +625,7 @@ class Counts:
         """Another block's counts to these."""
         for one in fields(self):
             mine, more = getattr(self, one.name), getattr(other, one.name)
-            if one.name == "kinds":
+            if one.name in ("kinds", "decades"):
                 more = {key: mine.get(key, 0) + value for key, value in more.items()}
             elif one.name == "noise":
                 more = {key: max(mine.get(key, 0.0), value) for key, value in more.items()}
@@ -571,9 +636,10 @@ class Counts:
         return (
             f"{self.sets} sets, {self.verdicts} verdicts; {self.legal} runs of legal engines: "
             f"{len(self.alarms)} false alarms, at most of the bound: {noise}; "
-            f"{self.faults} faults, {self.large} of {len(self.kinds)} kinds above {COUNTED:g} allowances: "
-            f"{self.seen} seen, {self.untold} not told, {len(self.missed)} missed; {self.seen_below} smaller "
-            f"ones seen; {len(self.numbers)} verdicts without a number"
+            f"{self.faults} faults, {self.large} of {len(self.kinds)} kinds above {COUNTED:g} times the "
+            f"noise: {self.seen} seen, {self.untold} named as not told, {len(self.missed)} missed "
+            f"({', '.join(f'{n} below {x}' for x, n in sorted(self.decades.items()))}); {self.seen_below} "
+            f"smaller ones seen; {len(self.numbers)} verdicts without a number"
         )
 
 
@@ -597,22 +663,57 @@ def one(seed: int, counts: Counts) -> None:
     """One scene: two legal engines, and two faults."""
     rng = np.random.default_rng([12, seed])
     scheme = schemes.SCHEMES[str(rng.choice(FIXED))]
-    scene = random_scene(rng, scheme)
+    if rng.random() < 0.2:
+        scheme = schemes.SCHEMES[str(rng.choice(list(implicit_forms.THETA)))]
+    scene = (hard_scene if rng.random() < 0.4 else random_scene)(rng, scheme)
+    forms = scheme.name in implicit_forms.THETA and scene.system.is_linear
+    mine = [x for x in LEGAL if x != "rebuilt" or scheme.name == "semi-implicit-euler"]
+    mine = [x for x in mine if x not in implicit_forms.FORMS or forms]
+    chosen = [str(x) for x in rng.choice(mine, 2, replace=False)]
     with np.errstate(all="ignore"):
-        for order in map(str, rng.choice(list(LEGAL), 2, replace=False)):
-            if order == "rebuilt" and scheme.name != "semi-implicit-euler":
+        noise: Floats | None = None
+        for order in mine:
+            if order not in (*chosen, "as written", "matrix", *implicit_forms.FORMS):
                 continue
-            right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
-            right = replace(right, rebuilds_velocity=order == "rebuilt")
-            what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
-            _legal(counts, checks.judge(scene, right), what)
+            try:
+                right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
+            except np.linalg.LinAlgError:
+                continue
+            rebuilds = order == "rebuilt" or (forms and order in implicit_forms.REBUILDS)
+            right = replace(right, rebuilds_velocity=rebuilds)
+            if _subnormal(right):
+                return
+            found = _defect(scene, right)
+            if found is not None and not rebuilds:
+                noise = found if noise is None else np.maximum(noise, found)
+            if order in chosen:
+                what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
+                _legal(counts, checks.judge(scene, right), what)
         for name in rng.choice(list(FAULTS), 2, replace=False):
             eps = float(10 ** rng.uniform(-16, -0.3))
             wrong = FAULTS[str(name)](scene, scheme, eps, rng)
             if wrong is None or len(wrong.t) < 2:
                 continue
             what = f"seed {seed}, {scheme.name}, {name} by {eps:.2g}, every {scene.every}"
-            _fault(counts, scene, wrong, str(name), what)
+            _fault(counts, scene, wrong, noise, str(name), what)
+
+
+def _subnormal(run: Trajectory) -> bool:
+    """Whether a motion decays to where doubles lose digits: the textbook engine's solver stops there."""
+    sizes = np.abs(np.concatenate([run.q, run.p]))
+    return bool(np.any((sizes > 0) & (sizes < 1e-290)))
+
+
+def _defect(scene: Scene, run: Trajectory) -> Floats | None:
+    """The largest defect of each q and p (2, n) over the frames, half an ulp of it at least."""
+    ahead = checks.Case(trajectory=run, scene=scene).ahead if len(run.t) > 1 else None
+    if ahead is None:
+        return None
+    states = np.stack([run.q, run.p])
+    off = np.abs(ahead.end - states[:, 1:])
+    return np.asarray(
+        np.max(np.maximum(off, np.spacing(np.abs(states[:, 1:])) / 2), axis=1, initial=0.0), np.float64
+    )
 
 
 def _legal(counts: Counts, verdicts: list[Verdict], what: str) -> None:
@@ -625,32 +726,40 @@ def _legal(counts: Counts, verdicts: list[Verdict], what: str) -> None:
             counts.noise[v.check] = max(counts.noise.get(v.check, 0.0), v.value / v.bound)
 
 
-def _fault(counts: Counts, scene: Scene, wrong: Trajectory, kind: str, what: str) -> None:
+def _fault(
+    counts: Counts, scene: Scene, wrong: Trajectory, noise: Floats | None, kind: str, what: str
+) -> None:
     counts.faults += 1
-    case = checks.Case(trajectory=wrong, scene=scene)
-    effect = 0.0
-    if case.ahead is not None:
-        right = extended(scene, case.scheme)
-        q, p = wrong.q[:-1].astype(np.longdouble), wrong.p[:-1].astype(np.longdouble)
-        for _ in range(scene.every):
-            q, p = right(q, p)
-        off = np.abs(q - wrong.q[1:]), np.abs(p - wrong.p[1:])
-        ratios = [np.where(d == 0, 0, d / of) for d, of in zip(off, case.ahead.allowance, strict=True)]
-        effect = float(np.nanmax([0.0, *np.ravel(ratios)]))
+    defect = _defect(scene, wrong)
+    effect = np.zeros((2, scene.n))
+    if defect is not None and noise is not None:
+        effect = np.nan_to_num(defect / noise, nan=0.0, posinf=np.inf)
     verdicts = judged(counts, scene, wrong, what)
     seen = any(v.passed is False for v in verdicts)
-    if effect <= max(COUNTED, case.roundings):
+    largest = float(np.max(effect))
+    if largest <= COUNTED:
         counts.seen_below += seen
         return
     counts.large += 1
     counts.kinds[kind] = counts.kinds.get(kind, 0) + 1
-    defect = next(v for v in verdicts if v.check == "step-defect")
+    step = next(v for v in verdicts if v.check == "step-defect")
     if seen:
         counts.seen += 1
-    elif defect.passed is None or "may grow to all" in defect.why:
+    elif step.passed is None or "may grow to all" in step.why or _named(step.why, effect > COUNTED):
         counts.untold += 1
     else:
-        counts.missed.append(f"{what}: effect {effect:.3g}")
+        counts.missed.append(f"{what}: {largest:.3g} times the noise")
+        decade = f"1e{int(np.ceil(np.log10(min(largest, 1e300))))}"
+        counts.decades[decade] = counts.decades.get(decade, 0) + 1
+
+
+def _named(why: str, off: Any) -> bool:
+    """Whether every coordinate that is off (2, n) is named as one that cannot be judged."""
+    said = next((part for part in why.split("; ") if part.endswith(checks.BLIND)), "")
+    names = [f"{'qp'[i]} of particle {j}" for i, j in np.argwhere(off)]
+    return bool(said) and (
+        " more cannot" in said or all(f"{name}," in f"{said}," or name in said for name in names)
+    )
 
 
 def experiments(seed: int, counts: Counts) -> None:

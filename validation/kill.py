@@ -122,12 +122,12 @@ def lost(path: Path, seed: int, stored: dict[str, str], listed: set[str]) -> lis
     return missing
 
 
-def found_by_check(path: Path) -> list[store.Finding]:
+def found_by_check(path: Path) -> list[store.Damage]:
     """What `check` says; nothing where there is no file yet."""
     try:
         return store.check(path)
     except StoreError as error:
-        return [] if "no such file" in str(error) else [store.Finding(place="/", what=str(error))]
+        return [] if "no such file" in str(error) else [store.Damage(place="/", what=str(error))]
 
 
 def digest(path: Path, label: str) -> str:

@@ -39,10 +39,31 @@ Series = list[list[Any]]
 """Coefficients of each particle's position in powers of time."""
 
 
+def along_axes(table: dict[str, Any]) -> dict[str, Any]:
+    """The same scene file with a particle of one axis for each axis of each: springs act on each alike."""
+    rows = table.get("particle", ())
+    if not any(isinstance(row.get("position"), list) for row in rows):
+        return table
+    apart: list[dict[str, Any]] = []
+    number: dict[tuple[int, str], int] = {}
+    for i, row in enumerate(rows):
+        for axis, *start in zip("xyz", row["position"], row.get("momentum", [0.0] * 3), strict=False):
+            number[i, axis] = len(apart)
+            apart.append({"mass": row["mass"], "position": start[0], "momentum": start[1]})
+    springs = []
+    for row in table.get("spring", ()):
+        particle = next(end for end in row["ends"] if end != "wall")
+        for axis in row.get("axis", "xyz"[: len(rows[particle]["position"])]):
+            ends = [end if end == "wall" else number[end, axis] for end in row["ends"]]
+            springs.append({**row, "ends": ends})
+    return {**table, "particle": apart, "spring": springs}
+
+
 class System:
     """Masses, start, and the laws of a scene file."""
 
     def __init__(self, table: dict[str, Any]) -> None:
+        table = along_axes(table)
         rows = table.get("particle") or table.get("rotor") or table["inductor"]
         names = {
             "particle": ("mass", "position", "momentum"),

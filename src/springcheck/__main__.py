@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import threading
 import warnings
 
 from springcheck import interrupts
@@ -10,9 +11,16 @@ from springcheck import interrupts
 
 def main() -> int:
     """The command line as a program of its own, which can be interrupted from its first line on."""
+    status = interrupts.supervised()
+    return interrupts.ends(_main()) if status is None else status
+
+
+def _main() -> int:
     interrupts.install()
     # what is imported stays: until a command begins its work nothing is searched for cycles
     gc.disable()
+    # figures are drawn without any window, whatever is meant to show them elsewhere
+    os.environ["MPLBACKEND"] = "agg"
     try:
         from springcheck import cli
         from springcheck.cli import slips
@@ -25,6 +33,9 @@ def main() -> int:
         interrupts.finish()
         # what a command has made ends with it: the interpreter need not search it for cycles at its exit
         gc.freeze()
+    except SystemExit as ended:
+        # argparse: --help, or a mistake that it has named
+        status = ended.code if isinstance(ended.code, int) else 2
     except BaseException as error:
         # an import that was interrupted may raise an error of its own
         if interrupts.seen():
@@ -35,6 +46,10 @@ def main() -> int:
         status = 2
     if interrupts.seen():
         interrupts.leave()
+    if any(not one.daemon for one in threading.enumerate() if one is not threading.main_thread()):
+        # left by a plug-in or a library: nobody waits for them
+        sys.stdout.flush()
+        os._exit(interrupts.ends(status))
     return status
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from springcheck import checks
 from springcheck import simulate as driver
 from springcheck.checks import compare as comparing
-from springcheck.errors import SpringcheckError
+from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -42,19 +42,26 @@ def run(
     found = _scene(scene)
     named = (methods,) if isinstance(methods, str) else tuple(methods)
     place = Path(path or f"{found.name}.h5")
-    return measure.run(found, place, methods=named, force=force, thorough=thorough)
+    report = measure.run(found, place, methods=named, force=force, thorough=thorough)
+    for why in report.broke.values():
+        raise MethodError(why)
+    return report
 
 
 def simulate(
-    scene: Scene | str | Path, method: str, *, progress: driver.Progress | None = None
+    scene: Scene | str | Path,
+    method: str,
+    *,
+    progress: driver.Progress | None = None,
+    seed: int | None = None,
 ) -> Trajectory:
     """A scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
 
-    `progress` is called with the number of steps done since its last call.
+    `progress` is called with the number of steps done since its last call; `seed` is that of a random method.
 
     Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
     """
-    return driver.run(_scene(scene), method, progress=progress)
+    return driver.run(_scene(scene), method, progress=progress, seed=seed)
 
 
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
@@ -64,8 +71,19 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
     """
     found, run = _scene(scene), _trajectory(trajectory)
     frames = len(run.t)
-    for name, shape in {"q": (frames, found.n), "p": (frames, found.n), "energy": (frames,)}.items():
+    for name, shape in {
+        "t": (frames,),
+        "q": (frames, found.n),
+        "p": (frames, found.n),
+        "energy": (frames,),
+    }.items():
         values = getattr(run, name)
+        kind = getattr(values, "dtype", None)
+        if values is not None and (kind is None or kind.kind != "f"):
+            given = f"an array of {kind}" if kind is not None else f"a {type(values).__name__}"
+            raise SpringcheckError(
+                f"{run.label}: {name} is {given}; an array of floating-point numbers is needed"
+            )
         if values is not None and (np.shape(values) != shape or not frames):
             raise SpringcheckError(
                 f"{run.label}: {name} has the shape {np.shape(values)}; {frames} times of scene {found.name} "

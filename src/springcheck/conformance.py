@@ -18,6 +18,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,12 @@ from springcheck.physics.trajectory import Trajectory
 __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "uneven_scenes"]
 
 SEED = 20260101
+
+SHOWN = ". What the states show: "
+"""Before the sentence of `identify` in the reason of a verdict."""
+
+__tracebackhide__ = True
+"""pytest leaves our frames out, and shows those of the engine and of its test."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,23 +71,35 @@ def checks_of(engine: Engine) -> list[Check]:
         engines.bring(engine, "the tests of its own")
     labels = [Label(engine=engine.name, method=name) for name in engine.methods]
     found = [Check("declaring imports no library", labels[0], _imports_nothing)]
-    return found + [Check(name, label, test) for label in labels for name, test in TESTS.items()]
+    for label in labels:
+        scenes = _some(label)
+        found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
+        found += [Check(name, label, test) for name, test in TESTS.items()]
+    return found
 
 
 def assert_right(scene: Scene, run: Trajectory) -> None:
-    """AssertionError, with every verdict that failed and why, where a trajectory is not its scheme's."""
-    wrong = [verdict for verdict in checks.judge(scene, run) if verdict.passed is False]
+    """AssertionError where a trajectory is not its scheme's: what its states show, what failed, and why."""
+    from springcheck.identify import files
+
+    verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
+    wrong = [verdict for verdict in verdicts if verdict.passed is False]
     if wrong:
+        _, _, shown = next((v.why for v in wrong if SHOWN in v.why), "").partition(SHOWN)
         lines = [
             f"  {verdict.check}: {verdict.value:.3g} where {verdict.bound:.3g} {verdict.unit} is allowed; "
-            f"{verdict.why}"
+            f"{verdict.why.partition(SHOWN)[0]}"
             for verdict in wrong
         ]
-        raise AssertionError(f"{run.label} is not {run.scheme} on {scene.name}:\n" + "\n".join(lines))
+        said = f": {shown}" if shown else ""
+        raise AssertionError(
+            f"{run.label} is not {run.scheme} on {scene.name}{said}\n"
+            + "\n".join([*lines, checks.summary(verdicts)])
+        )
 
 
 def uneven_scenes() -> Iterator[Scene]:
-    """Twelve scenes of uneven numbers, so that no mass, stiffness, step or rest point can hide."""
+    """Scenes of uneven numbers, so that no mass, stiffness, step, rest point or axis can hide."""
     rng = np.random.default_rng(SEED)
 
     def some(low: float, high: float, n: int) -> Floats:
@@ -105,10 +124,32 @@ def uneven_scenes() -> Iterator[Scene]:
             step=float(rng.uniform(0.02, 0.05 if number == 10 else 0.2)),
             steps=120, every=1 if number % 3 else 3,
         )  # fmt: skip
+    for number, axes in enumerate(([0, 1, 2], [1, 2], [0, 1, 2, 3, 4, 5])):
+        n = len(axes)
+        of = np.array(axes) // 3
+        m, k = some(0.4, 4.0, 2)[of], some(0.5, 3.0, 2)[of]
+        held = WallSpring(i=np.arange(n), k=k, at=np.zeros(n))
+        pairs = Spring(a=np.arange(3), b=np.arange(3, 6), k=np.full(3, some(0.5, 2.0, 1)), rest=np.zeros(3))
+        yield Scene(
+            name=f"uneven-axes-{number + 1}", places=np.array(axes), m=m,
+            q=some(-1.2, 1.2, n), p=some(-1.5, 1.5, n),
+            terms=(held, pairs) if n == 6 else (held,), step=float(rng.uniform(0.02, 0.2)), steps=120,
+        )  # fmt: skip
 
 
 def _served(label: Label) -> list[Scene]:
     """Those of the uneven scenes that a method serves; else scenes of what it is for."""
+    found = _some(label)
+    if not found:
+        raise AssertionError(f"{label} serves none of the scenes: {_refusal(label)}")
+    return found
+
+
+def _refusal(label: Label) -> str | None:
+    return engines.refusal(next(uneven_scenes()), label)
+
+
+def _some(label: Label) -> list[Scene]:
     several = list(uneven_scenes())
     for scenes in (
         several,
@@ -119,7 +160,7 @@ def _served(label: Label) -> list[Scene]:
         found = [scene for scene in scenes if engines.refusal(scene, label) is None]
         if found:
             return found
-    raise AssertionError(f"{label} serves none of the scenes: {engines.refusal(several[0], label)}")
+    return []
 
 
 def _damped(scene: Scene) -> Scene:
@@ -177,13 +218,17 @@ def _imports_nothing(label: Label) -> None:
     )
 
 
-def _right(label: Label) -> None:
-    for scene in _served(label):
+def _right(label: Label, scene: Scene) -> None:
+    """Every verdict on a scene passes."""
+    try:
         run = simulate.run(scene, label)
-        assert run.outcome.status == "complete", (
-            f"{label} {run.outcome.status} on {scene.name}: {run.outcome.message}"
-        )
-        assert_right(scene, run)
+    except MethodError as error:
+        # the line of the engine that raised stands in the message
+        raise AssertionError(f"{label} does not run {scene.name}: {error}") from None
+    assert run.outcome.status == "complete", (
+        f"{label} {run.outcome.status} on {scene.name}: {run.outcome.message}"
+    )
+    assert_right(scene, run)
 
 
 def _advanced(scene: Scene, label: Label, every: int, *parts: int) -> Floats:
@@ -255,7 +300,6 @@ def _versions(label: Label) -> None:
 
 
 TESTS: dict[str, Callable[[Label], None]] = {
-    "right on uneven scenes": _right,
     "rows in parts": _chunks,
     "frames apart": _strides,
     "scene untouched": _untouched,

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 LONGEST_MESSAGE = 480
 """Characters of a message, which is one line: what a file says in it may be longer."""
+
+LONGEST_WORD, MOST_WORDS = 100, 2000
+"""Characters of a word that may be mistyped, and how many it is compared with."""
 
 _STRANGE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 """Unicode's controls, formats (which turn the direction of writing), surrogates, and ends of lines."""
@@ -67,7 +71,10 @@ def told(error: BaseException, file: object = "") -> str:
     frames = list(traceback.extract_tb(error.__traceback__))
     inside = [frame for frame in frames if file and Path(frame.filename) == Path(str(file))]
     deepest = (inside or frames)[-1] if frames else None
-    message = " ".join(str(error).split())
+    try:
+        message = " ".join(str(error).split())
+    except BaseException:
+        message = "its text cannot be made"
     if len(message) > LONGEST_MESSAGE:
         message = message[:LONGEST_MESSAGE] + " ..."
     where = f" ({Path(deepest.filename).name}, line {deepest.lineno})" if deepest is not None else ""
@@ -78,7 +85,9 @@ def nearest(word: str, known: Iterable[str], before: str = "") -> str:
     """ ", did you mean ...?" where one of the known words is close, else nothing."""
     from difflib import get_close_matches
 
-    close = get_close_matches(word, list(known), n=1)
+    # the time that a comparison takes grows with the square of the lengths
+    short = (one for one in known if len(one) <= LONGEST_WORD)
+    close = get_close_matches(word[:LONGEST_WORD], list(islice(short, MOST_WORDS)), n=1)
     return f", did you mean {before}{close[0]}?" if close else ""
 
 

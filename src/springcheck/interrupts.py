@@ -1,4 +1,5 @@
-"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.
+"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.  The end of a
+program that code of others has ended: it is theirs, and never a result.
 
 Only the program's entry point installs this: a library leaves signals to the program that imports it.
 What is imported here is what the interpreter has loaded by itself, so that no moment is left without it.
@@ -7,6 +8,7 @@ What is imported here is what the interpreter has loaded by itself, so that no m
 from __future__ import annotations
 
 import _thread
+import contextlib
 import os
 import signal
 import sys
@@ -26,7 +28,7 @@ GRACE = 1.5
 """Seconds from the signal to the end of the process, whatever it is doing: native code that does not return,
 a library that has swallowed the exception, a terminal that takes no more output."""
 
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 
 
 class _State:
@@ -40,6 +42,13 @@ class _State:
     message = "interrupted"
     ends: ClassVar[set[Callable[[], object]]] = set()
     """What the end of the process takes with it, wherever it is then: temporary folders, other processes."""
+    board: Any = None
+    """Memory shared with the parent process: whether the program has ended by itself, and whom it calls."""
+    ended: ClassVar[dict[str, str]] = {}
+    """Code of others that has ended the program before, and how."""
+    mask: Any = None
+    lifeline = -1
+    """Ends with the parent process."""
     errors = 2
     """Standard error as it was: a library's messages may be caught while the signal comes; 2 until `install`
     keeps another."""
@@ -68,6 +77,101 @@ def install() -> None:
         os.set_blocking(write, False)
         signal.set_wakeup_fd(write, warn_on_full_buffer=False)
         _thread.start_new_thread(_watch, (read,))
+    if _State.mask is not None:
+        _thread.start_new_thread(_end_with_parent, (_State.lifeline,))
+        signal.pthread_sigmask(signal.SIG_SETMASK, _State.mask)
+
+
+def _end_with_parent(lifeline: int) -> None:
+    """Whoever kills the process that waits for this one means this one."""
+    os.read(lifeline, 1)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def supervised() -> int | None:
+    """Carry the program out in a process of its own -> its exit status; None in that process.
+
+    What a plug-in or a library does to it (`os._exit`, SIGSEGV, SIGABRT ...) ends that process alone.  Where
+    it is known which of them was called (see `calling`), the program is begun anew: it takes up what was
+    finished, and refuses those that ended it (see `ended_by`).
+    """
+    if not hasattr(os, "fork") or os.environ.get("SPRINGCHECK_TRACEBACK"):
+        return None
+    import mmap
+
+    for number in (0, 1, 2):
+        # a standard stream that was closed leads nowhere: no pipe of ours may take its place
+        with contextlib.suppress(OSError):
+            os.fstat(number)
+            continue
+        os.open(os.devnull, os.O_RDWR)
+    _State.board = board = mmap.mmap(-1, _PAGE)
+    numbers = [getattr(signal, name) for name in SIGNALS]
+    # nohup and shells that start a command in the background have signals ignored
+    heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    while True:
+        _State.lifeline, held = os.pipe()
+        # a signal between here and `install` waits for it
+        _State.mask = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+        child = os.fork()
+        if child == 0:
+            for number in heard:
+                signal.signal(number, signal.SIG_DFL)
+            os.close(held)
+            return None
+        os.close(_State.lifeline)
+        status = _waited_for(child, heard)
+        os.close(held)
+        if board[0]:
+            return int(board[1])
+        if -status in (signal.SIGKILL, *numbers):
+            # somebody has ended it; this one ends in the same way
+            os.kill(os.getpid(), -status)
+        name = bytes(board[2:]).partition(b"\0")[0].decode("utf-8", "replace")
+        how = f"ended the program (exit status {status})"
+        if status < 0:
+            how = f"crashed ({signal.Signals(-status).name})"
+        if _State.seen or not name or name in _State.ended:
+            sys.stderr.write(f"springcheck: {name or 'code that it was given, or a library'} {how}\n")
+            return 2
+        _State.ended[name] = f"it {how}"
+
+
+def _waited_for(child: int, heard: Sequence[int]) -> int:
+    """The exit status of a child, which gets the signals that this process hears."""
+
+    def forward(number: int, frame: object) -> None:
+        _State.seen = True
+        os.kill(child, number)
+
+    for number in heard:
+        signal.signal(number, forward)
+    signal.pthread_sigmask(signal.SIG_SETMASK, _State.mask)
+    _, raw = os.waitpid(child, 0)
+    for number in heard:
+        signal.signal(number, signal.SIG_DFL)
+    return os.waitstatus_to_exitcode(raw)
+
+
+_PAGE = 4096
+
+
+def calling(name: str) -> None:
+    """Code of others of this name is called from here on; "" for none."""
+    if _State.board is not None:
+        _State.board[2:_PAGE] = name.encode("utf-8", "replace")[: _PAGE - 3].ljust(_PAGE - 2, b"\0")
+
+
+def ended_by(*names: str) -> str:
+    """How code of one of these names has ended the program before; "" where none has."""
+    return next((_State.ended[name] for name in names if name in _State.ended), "")
+
+
+def ends(status: int) -> int:
+    """The program ends by itself, with this exit status, whatever happens to it from here on."""
+    if _State.board is not None:
+        _State.board[0:2] = bytes((1, status & 0xFF))
+    return status
 
 
 def seen() -> bool:
@@ -116,7 +220,7 @@ def leave() -> None:
             stream.flush()
         except (OSError, ValueError, AttributeError):
             continue
-    os._exit(STATUS)
+    os._exit(ends(STATUS))
 
 
 class held:  # noqa: N801  (a context manager reads as a word)

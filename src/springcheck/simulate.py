@@ -19,6 +19,7 @@ from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
+from springcheck.thermal import THERMOSTATS
 
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
@@ -53,13 +54,35 @@ SUBNORMAL = (
 )
 
 
+MOST_SEED = 900_000_000
+"""Seeds go from 1 to this, which every library takes: LAMMPS has no larger one, and 0 asks OpenMM for any."""
+
+
+def checked_seed(seed: int | None) -> int:
+    """The seed that is given, or one that is drawn.  MethodError where it is out of range."""
+    if seed is None:
+        import secrets
+
+        return 1 + secrets.randbelow(MOST_SEED)
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 1 <= seed <= MOST_SEED:
+        raise MethodError(f"seed = {seed!r}: a whole number from 1 to {MOST_SEED} is needed")
+    return seed
+
+
 def play(
-    scene: Scene, label: Label, sink: Sink, *, progress: Progress | None = None, planned: int = 0
+    scene: Scene,
+    label: Label,
+    sink: Sink,
+    *,
+    progress: Progress | None = None,
+    planned: int = 0,
+    seed: int | None = None,
 ) -> Trajectory:
     """Run a scene and hand every recorded frame, the start first, to `sink`; returns the run without frames.
 
     Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
-    through.  For `planned` see `bare`.
+    through.  For `planned` see `bare`.  A random method takes the seed that is given, or one that is drawn;
+    the run keeps it.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -69,8 +92,15 @@ def play(
         raise MethodError(f"{label}: {reason}")
     method = engines.method(label)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
+    origin = {}
+    if method.generator:
+        seed = checked_seed(seed)
+        draws = f"{THERMOSTATS[method.scheme].fresh} a step and particle"
+        origin = {"seed": str(seed), "generator": method.generator, "threads": "1", "draws": draws}
+    elif seed is not None:
+        raise MethodError(f"{label}: it has no noise, and takes no seed")
     began = perf_counter()
-    simulation = engines.start(ahead, label)
+    simulation = engines.start(ahead, label, seed)
     start_seconds = perf_counter() - began
 
     with_energy = "energy" in scene.quantities
@@ -115,7 +145,7 @@ def play(
         arithmetic=engines.arithmetic(label),
         rebuilds_velocity=method.rebuilds_velocity,
         off_axis=getattr(simulation, "off_axis", None),
-        origin=engines.origin_of(label),
+        origin={**engines.origin_of(label), **origin},
     )
 
 
@@ -209,11 +239,14 @@ class Gather:
         return replace(run, t=self._t[:f], q=self._q[:f], p=self._p[:f], energy=energy)
 
 
-def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) -> Trajectory:
+def run(
+    scene: Scene, method: str | Label, *, progress: Progress | None = None, seed: int | None = None
+) -> Trajectory:
     """Run a scene by one method and return its trajectory, row 0 the start.
 
     `method` is a label such as ``"ase:velocity-verlet"`` or ``"openmm:verlet@CPU"``.  A run that
-    diverges or stops returns what was finite, and says so in `outcome`.
+    diverges or stops returns what was finite, and says so in `outcome`.  `seed` is that of a random method,
+    drawn where it is left out; the trajectory keeps it in `origin`.
 
     Raises:
         MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
@@ -221,7 +254,7 @@ def run(scene: Scene, method: str | Label, *, progress: Progress | None = None) 
     """
     label = engines.parse(method) if isinstance(method, str) else method
     gather = Gather(scene)
-    return gather.onto(play(scene, label, gather, progress=progress))
+    return gather.onto(play(scene, label, gather, progress=progress, seed=seed))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,23 +280,27 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     engines.load(label.engine)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
-    simulations = [engines.start(ahead, label) for _ in range(copies)]
+    simulations = [engines.start(ahead, label, 1) for _ in range(copies)]
     start_seconds = perf_counter() - began
     every = 1 if read else scene.steps
     rows = min(CHUNK // scene.n or 1, scene.steps // every)
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
     whole, rest = divmod(scene.steps // every, rows)
     piece = scene.steps if method.adaptive else PIECE
-    began = perf_counter()
-    for simulation in simulations:
-        if not read:
-            _advance(simulation, scene.steps, min(piece, scene.steps), q, p)
-            continue
-        for _ in range(whole):
-            simulation.advance(every, q, p)
-        if rest:
-            simulation.advance(every, q[:rest], p[:rest])
-    run_seconds = perf_counter() - began
+
+    def timed() -> float:
+        began = perf_counter()
+        for simulation in simulations:
+            if not read:
+                _advance(simulation, scene.steps, min(piece, scene.steps), q, p)
+                continue
+            for _ in range(whole):
+                simulation.advance(every, q, p)
+            if rest:
+                simulation.advance(every, q[:rest], p[:rest])
+        return perf_counter() - began
+
+    run_seconds = engines.guarded(label, timed)
     return Bare(
         timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
         force_calls=simulations[0].force_calls,

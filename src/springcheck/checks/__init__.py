@@ -22,22 +22,25 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.checks import check, experiments, laws
+from springcheck.checks import check, experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
-from springcheck.checks.motion import closed_form, frequency, momentum, shadow_energy
+from springcheck.checks.check import shared
+from springcheck.checks.motion import angular_momentum, closed_form, frequency, momentum, shadow_energy
 from springcheck.checks.record import energies, grid, line, start, times
+from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import CONTRACTED, arithmetic, first_off, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 
 __all__ = [
-    "ALL", "CHECKS", "CONTRACTED", "TELLING", "THOROUGH", "Bench", "Case", "Check", "Experiment", "Run",
-    "arithmetic", "closed_form", "energies", "first_off", "frequency", "judge",
-    "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "start", "status", "step_defect",
-    "tolerance", "tolerance_bound", "worst",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "TELLING", "THOROUGH", "Bench", "Case", "Check",
+    "Experiment",
+    "Run", "angular_momentum", "arithmetic", "bridges", "closed_form", "energies", "first_off", "frequency",
+    "judge", "judge_seeds", "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "shared", "start",
+    "status", "step_defect", "summary", "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 Check: TypeAlias = check.Check[Case]
@@ -54,6 +57,7 @@ CHECKS: tuple[Check, ...] = (
     shadow_energy,
     frequency,
     momentum,
+    angular_momentum,
     energies,
     tolerance,
 )
@@ -64,6 +68,7 @@ THOROUGH: tuple[Experiment, ...] = (
     experiments.symplecticity,
     experiments.reversibility,
     experiments.mirror,
+    experiments.orientation,
     experiments.repeatability,
     experiments.company,
     laws.order,
@@ -75,10 +80,21 @@ THOROUGH: tuple[Experiment, ...] = (
 
 ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
 
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
+"""Checks of a trajectory of a thermostat, which no law of a deterministic motion holds for."""
 
-_TELLING = [one.name for one in ALL if one.family in ("motion", "map", "law") and one is not momentum]
-TELLING = frozenset(["identified", *_TELLING])
+
+_TELLING = [
+    one.name
+    for one in ALL
+    if one.family in ("motion", "map", "law") and one not in (momentum, angular_momentum)
+]
+TELLING = frozenset(["identified", *_TELLING, *(one.name for one in thermal.DRAWN)])
 """Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""
+
+
+MOST_NAMED = 8
+"""Methods or checks that a summary names."""
 
 
 def not_judged(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
@@ -92,6 +108,39 @@ def status(verdicts: Sequence[Verdict]) -> Literal[0, 1, 2]:
     if any(verdict.passed is False for verdict in verdicts):
         return 1
     return 2 if not_judged(verdicts) or not verdicts else 0
+
+
+def summary(verdicts: Sequence[Verdict]) -> str:
+    """How many verdicts passed, or which failed, in words: the last line of every report."""
+    failed = [verdict for verdict in verdicts if verdict.passed is False]
+    judged = sum(1 for verdict in verdicts if verdict.passed is not None)
+    rest = len(verdicts) - judged
+    beside = f", {rest} not applicable" if rest else ""
+    if not failed:
+        return f"{judged} verdict{'' if judged == 1 else 's'} passed, 0 failed{beside}"
+    methods = list(dict.fromkeys(verdict.method for verdict in failed))
+    whose = {verdict.method for verdict in verdicts}
+    names = methods if len(whose) > 1 else list(dict.fromkeys(verdict.check for verdict in failed))
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"{len(failed)} of {judged} failed: {', '.join(names[:MOST_NAMED])}{more}{beside}"
+
+
+def explained(
+    scene: Scene,
+    run: Trajectory,
+    verdicts: Sequence[Verdict],
+    shown: Callable[[Scene, Trajectory, int], str],
+) -> list[Verdict]:
+    """The verdicts on a trajectory, the first that failed with what the states around its first step off are.
+
+    `shown(scene, run, frame)` is the sentence, "" where the states show nothing.
+    """
+    first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
+    if first is None:
+        return list(verdicts)
+    said = shown(scene, run, first_off(Case(trajectory=run, scene=scene)) or 0)
+    why = f"{first.why}. What the states show: {said}" if said else first.why
+    return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
 def judge_thoroughly(
@@ -115,18 +164,33 @@ def judge_thoroughly(
             verdicts.append(check.verdict(label, experiment.name, str(error)))
         if progress:
             progress(1)
-    return verdicts
+    return shared(verdicts)
+
+
+def judge_seeds(scene: Scene, label: str, seed: int) -> list[Verdict]:
+    """Every experiment with the seeds of a random method; one that it cannot serve does not apply."""
+    from springcheck.checks.seeds import SEEDED, Seeded
+
+    found = []
+    for one in SEEDED:
+        try:
+            found.append(one(Seeded(scene=scene, label=label, seed=seed)))
+        except MethodError as error:
+            found.append(check.verdict(label, one.name, str(error)))
+    return shared(found)
 
 
 def judge(
-    scene: Scene, trajectory: Trajectory, checks: Sequence[Check] = CHECKS, *, piece: bool = False
+    scene: Scene, trajectory: Trajectory, checks: Sequence[Check] | None = None, *, piece: bool = False
 ) -> list[Verdict]:
     """Every check of a trajectory of this scene, or of a piece of one, which may begin after the start.
 
-    What does not apply is among them, `passed` None.
+    What does not apply is among them, `passed` None.  Left out, the checks are those of the kind of scheme.
     """
     case = Case(trajectory=trajectory, scene=scene, piece=piece)
-    return [check(case) for check in checks]
+    if checks is None:
+        checks = RANDOM if case.law.has("random") else CHECKS
+    return shared([one(case) for one in checks])
 
 
 def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
@@ -141,6 +205,9 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
         sees = Limits.least(one.sees for one in judged)
         # where it fails first is what is looked for, and how badly at the worst
         failed = next((one for one in judged if one.passed is False), verdict)
+        if verdict.unit == check.DECADES:
+            # the worst of several is as bad as this so many times as often
+            verdict = replace(verdict, value=verdict.value - float(np.log10(len(judged))))
         out.append(replace(verdict, why=failed.why, sees=sees))
     return out
 

@@ -44,9 +44,24 @@ class Bench:
         return self.run(replace(self.scene, every=1, steps=min(self.scene.steps, 200)), self.label)
 
     @property
+    def trajectory(self) -> Trajectory:
+        """That run, as the trajectory that a requirement is asked of."""
+        return self.forwards
+
+    @property
     def scheme(self) -> schemes.Scheme:
         """The scheme that the method claims to run."""
         return schemes.scheme(self.forwards.scheme)
+
+    @cached_property
+    def law(self) -> schemes.Law:
+        """What follows from it on the scene."""
+        return schemes.Law(scheme=self.scheme, scene=self.scene, h=self.scene.step)
+
+    @property
+    def tolerance(self) -> float:
+        """That which an adaptive solver is given."""
+        return self.scene.tolerance
 
     @property
     def stiffness(self) -> Floats:

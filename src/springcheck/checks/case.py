@@ -11,23 +11,18 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.checks import rounding
-from springcheck.checks.stretch import JOINED, Stretch, follow
+from springcheck.checks.claim import Claim
+from springcheck.checks.stretch import Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
-from springcheck.physics.scene import Scene
-from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.trajectory import Trajectory
-from springcheck.schemes.stepping import Slope
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Case:
-    """A trajectory, or a piece of it, with what the checks share: computed at most once."""
+class Case(Claim):
+    """A claim with what the checks share: computed at most once."""
 
-    trajectory: Trajectory
-    scene: Scene
     piece: bool = False
     """Whether the trajectory may begin after the start, as the later pieces of a long one do."""
 
@@ -41,28 +36,6 @@ class Case:
             self._made[work] = work(self)
         return self._made[work]  # type: ignore[no-any-return]
 
-    @property
-    def label(self) -> str:
-        """The label of the method."""
-        return self.trajectory.label
-
-    @property
-    def scheme(self) -> schemes.Scheme:
-        """The scheme that the method claims to run."""
-        return schemes.scheme(self.trajectory.scheme)
-
-    @cached_property
-    def judged(self) -> Scene:
-        """The scene with its parameters as the engine's arithmetic keeps them."""
-        arithmetic = self.trajectory.arithmetic
-        scene = self.scene.system.in_single if arithmetic.parameters == "single" else self.scene
-        return scene.system.scaled(1 + arithmetic.excess) if arithmetic.excess else scene
-
-    @property
-    def system(self) -> System:
-        """What follows from that scene."""
-        return self.judged.system
-
     @cached_property
     def steps(self) -> Integers:
         """The number of steps behind each frame."""
@@ -72,37 +45,25 @@ class Case:
             len(self.trajectory.t)
         ) * self.trajectory.every
 
-    @cached_property
-    def linear(self) -> bool:
-        """Whether each normal mode has a one-step matrix of its own."""
-        return self.scene.system.has_modes and not self.mixed
+    @property
+    def tolerance(self) -> float | None:
+        """That of an adaptive solver."""
+        return self.trajectory.tolerance
 
     @property
-    def mixed(self) -> bool:
-        """Whether the scheme acts at different times by slow and by fast springs, and there are both."""
-        return self.scheme.mixes and any(term.is_potential for term in self.scene.system.slow)
+    def linear(self) -> bool:
+        """Whether each normal mode has a one-step matrix of its own."""
+        return self.scene.system.has_modes and not self.law.has("mixes")
 
     @property
     def area_preserving(self) -> bool:
         """Whether every step keeps area: a symplectic scheme, and no friction."""
-        return self.scheme.symplectic and not self.scene.system.is_damped
+        return self.law.has("symplectic", "undamped")
 
-    @cached_property
-    def law(self) -> dict[str, Any]:
-        """What `schemes.step` needs beside the forces."""
-        scene = self.judged
-        stiff: Extended | Slope | None = None
-        if self.scheme.implicit and not self.system.is_linear:
-            stiff = scene.system.slope
-        elif self.scheme.implicit:
-            stiff = scene.system.curvatures(scene.q)
-        return {"stiffness": stiff, "rate": scene.system.friction_rates if scene.system.is_damped else None}
-
-    @cached_property
+    @property
     def matrices(self) -> Extended:
         """One-step matrices of the modes, on (y, v)."""
-        one, modes = np.ones(1, dtype=np.longdouble), self.system.modes
-        return schemes.matrix(self.scheme, h=self.trajectory.step, m=one, k=modes.w2, c=modes.rate)
+        return self.law.propagator
 
     @cached_property
     def w(self) -> Extended:
@@ -111,47 +72,14 @@ class Case:
         w = np.sqrt(np.abs(self.system.modes.w2))
         return np.asarray(np.where(w > 0, w, 1 / np.longdouble(duration)))
 
-    def step(
-        self,
-        q: Extended,
-        p: Extended,
-        *,
-        near: Extended | None = None,
-        forces: Callable[[Iterable[Term]], Force] | None = None,
-        met: list[Reals] | None = None,
-        slope: Slope | None = None,
-    ) -> tuple[Extended, Extended]:
-        """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
-
-        `slope` stands for the scene's own where the states are not positions.  `near` is where an engine
-        came to: of several solutions of an implicit step, the one there is the scheme's.
-        """
-        scene = self.judged
-        forces = forces or scene.system.force_of
-        law = self.law | ({"stiffness": slope} if slope and callable(self.law["stiffness"]) else {})
-        with np.errstate(all="ignore"):
-            a, b = schemes.step(
-                self.scheme,
-                q,
-                p,
-                h=self.trajectory.step,
-                m=scene.m,
-                force=forces(scene.terms),
-                parts=(forces(scene.system.slow), forces(scene.system.fast)),
-                met=met,
-                near=near,
-                **law,
-            )
-        return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
-
     @cached_property
     def ahead(self) -> Stretch | None:
         """The scheme's own next frame after each frame but the last, and what rounding may do to it.
 
-        None where so many steps, or so many joined particles, are only judged by the energy norm.
+        None where so many steps are only judged by the energy norm.
         """
-        every, scene = self.trajectory.every, self.judged
-        if every > 1 and (every > REPEATED or (scene.n > JOINED and not self.system.is_separate)):
+        every = self.trajectory.every
+        if every > REPEATED:
             return None
         return follow(self, *self._starts, every)
 
@@ -188,21 +116,16 @@ class Case:
         with np.errstate(all="ignore"):
             return rounding.of_step(self, q, p, places, smallest=smallest)
 
-    @property
-    def placed(self) -> bool:
-        """Whether it matters for rounding at which positions a step evaluates the force."""
-        return self.scheme.implicit or not self.system.is_linear
-
     @cached_property
     def allowance_of_stretches(self) -> Extended:
-        """One rounding of what a step adds up on each stretch between frames (f-1,), as `Norm.size`.
+        """One rounding of what a step adds up on each stretch between frames (f-1,), as `Norm.most`.
 
         Of both ends, the far one where the scheme itself comes to, and of what lies before: a frame that is
         wrong must not enlarge what it is judged by.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             ends = self.allowance, self.allowance_at(*self.next_states)
-            return np.maximum.accumulate(np.max([self.system.norm.size(*end) for end in ends], axis=0))
+            return np.maximum.accumulate(np.max([self.system.norm.most(*end) for end in ends], axis=0))
 
     @cached_property
     def mode_start(self) -> tuple[Extended, Extended]:
@@ -221,40 +144,41 @@ class Case:
         """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
 
         One rounding a step, enlarged by the map from the step where it arises, and all of one sign; of a
-        splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.size`.
+        splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.most`.
         """
         total, grown = schemes.amplification(self.matrices, self.w, self.steps)
-        size = self.system.norm.size(*self.allowance)
+        size = self.system.norm.most(*self.allowance)
         size = np.maximum.accumulate(np.concatenate([size[:1], size]))
         if self.steps[0] == 0:
             first = size[0]
         else:
             # a piece of a long run: what came before it is bounded by the envelope of the motion
             before = self.envelope, (self.scene.q, self.scene.p)
-            first = np.max([self.system.norm.size(*self.allowance_at(*x)) for x in before])
+            first = np.max([self.system.norm.most(*self.allowance_at(*x)) for x in before])
         bound = np.asarray(self.roundings * total)
         condition = float(np.max(schemes.condition(self.matrices, self.w)))
         if np.isfinite(condition):
             bound = np.minimum(bound, condition * self.walk(self.steps))
         return bound, np.asarray(np.maximum(size, first * grown))
 
-    def walk(self, steps: Integers) -> Floats:
+    def walk(self, steps: Reals | Integers, turn: float | None = None) -> Floats:
         """What the roundings of so many steps add up to in the coordinates in which a step is a rotation, in
         allowances of a step (f,); infinite but for kicks and drifts in double precision without friction.
 
         Roundings of states are as good as random: they walk, 5 standard deviations of one unit each.  A
         coefficient is rounded once, and so acts at every step: a kick and a drift turn the phase by h w, as
         far as an engine makes them, and the factor of the whole state, near 1, where it has one.  A closed
-        form that rounds like the engine is no walk.
+        form that rounds like the engine is no walk.  `turn` is h w, that of the modes unless it is given.
         """
-        kinds, how = {kind for kind, _ in self.scheme.stages}, self.trajectory.arithmetic
+        how, plain = self.trajectory.arithmetic, self.law.has("plain", "undamped")
         double = how.state == how.force == 2.0**-53 and not how.quantum
-        if not WIDE or not kinds or kinds - {"kick", "drift"} or not double or self.scene.system.is_damped:
+        if not WIDE or not plain or not double:
             return np.full(len(steps), np.inf)
         n = steps.astype(np.float64)
-        turn = min(abs(self.trajectory.step) * float(np.max(self.w)), 2.0)
+        turn = abs(self.trajectory.step) * float(np.max(self.w)) if turn is None else turn
+        turn = min(turn, 2.0)
         added = max(1, int(np.max(self.scene.system.pulls())))
-        return np.asarray(5 * np.sqrt(n) + (2 * turn * added + 1.5) * n)
+        return np.asarray(DEVIATIONS * np.sqrt(n) + (2 * turn * added + 1.5) * n)
 
     @cached_property
     def strongest(self) -> Reals:
@@ -290,22 +214,6 @@ class Case:
         q = np.abs(modes.rest) + modes.spread(reach / self.w) / modes.root_m
         return np.asarray(q), np.asarray(modes.spread(reach) * modes.root_m)
 
-    @cached_property
-    def origins(self) -> Floats:
-        """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
-        have their rest lengths, or from the nearest place to which a term of its own ties a particle."""
-        rest = self.system.rest_positions
-        zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
-        for term in self.judged.terms:
-            if term.bodies == 1 and term.origin:
-                np.minimum.at(sites, term.particles[0], np.abs(term.elongation(zero)))
-        return np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
-
-    @property
-    def roundings(self) -> int:
-        """Roundings along one step."""
-        return schemes.roundings(self.scheme)
-
 
 def overflows(how: Arithmetic) -> str:
     """The reason of steps that are off because their forces leave the range of a fixed-point sum."""
@@ -325,6 +233,9 @@ def least_moved(moved: Reals) -> Reals:
     """
     return np.asarray(np.minimum(moved, np.append(moved[:1], moved[:-1])))
 
+
+DEVIATIONS = 5.0
+"""Standard deviations of a random walk of roundings that are allowed: more come about once in 1.7 million."""
 
 REPEATED = 2000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""

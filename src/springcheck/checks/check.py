@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, Literal, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
+from springcheck.checks.requires import REQUIREMENTS, missing
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 
@@ -26,9 +27,9 @@ class Subject(Protocol):
 
 Subject_contra = TypeVar("Subject_contra", bound=Subject, contravariant=True)
 
-Family: TypeAlias = Literal["record", "motion", "repeat", "map", "law"]
+Family: TypeAlias = Literal["record", "motion", "repeat", "map", "law", "noise"]
 """Facts of the record, to the bit; the recorded motion; two runs against each other, to the bit; the one-step
-map; laws over many runs, which do not look at the scene."""
+map; laws over many runs, which do not look at the scene; the draws of a thermostat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +45,42 @@ class Finding:
     """What else must be for it to pass."""
 
 
+@dataclass(frozen=True, slots=True)
+class Chance:
+    """A finding that only statistics can judge: the probability of a value as bad if all is right."""
+
+    chance: float
+    why: str
+    sees: Limits = NOT_KNOWN
+
+    @property
+    def finding(self) -> Finding:
+        """As a value and its bound, both in decades of chance; alone it has all of the false alarms."""
+        with np.errstate(divide="ignore"):
+            value = -np.log10(np.float64(self.chance))
+        return Finding(value, -np.log10(FALSE_ALARMS), DECADES, self.why, self.sees)
+
+
+FALSE_ALARMS = 1e-6
+"""Probability with which a command in which all is right reports that something is wrong, by chance."""
+
+DECADES = "decades of chance"
+"""Unit of verdicts on random numbers: a value of 3 comes about by chance once in 1000 times."""
+
+
+def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> list[Verdict]:
+    """The verdicts of one command, its false alarms shared out evenly over those on random numbers.
+
+    The sum of their chances is that of the command, however they depend on each other (Bonferroni).
+    """
+    random = [one.passed is not None and one.unit == DECADES for one in verdicts]
+    bound = float(np.log10(max(sum(random), 1) / false_alarms))
+    return [
+        replace(one, bound=bound, passed=bool(one.value <= bound)) if by_chance else one
+        for one, by_chance in zip(verdicts, random, strict=True)
+    ]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Check(Generic[Subject_contra]):
     """One check: call it with a `Case`, or an experiment with a `Bench`, and it returns its verdict."""
@@ -52,48 +89,52 @@ class Check(Generic[Subject_contra]):
     short: str
     """Its name in a narrow column."""
     family: Family
-    needs: str
-    """What must be there for it to apply."""
+    requires: frozenset[str]
+    """What must be there for it to apply, by the names of `requires.REQUIREMENTS`."""
     sentence: str
     """What holds where it passes."""
-    judge: Callable[[Subject_contra], Finding | str]
-    """What it finds, or why it does not apply."""
-    unless: Callable[[Any], str | None]
-    """Why it does not apply to a subject, or None; `judge` may find further reasons."""
+    judge: Callable[[Subject_contra], Finding | Chance | str]
+    """What it finds, or why what it measures says nothing."""
+
+    @property
+    def needs(self) -> str:
+        """What must be there for it to apply, in words."""
+        words = [one.word for one in REQUIREMENTS.values() if one.name in self.requires]
+        return ", ".join(words) or "every run"
 
     def __call__(self, subject: Subject_contra) -> Verdict:
-        return verdict(subject.label, self.name, self.unless(subject) or self.judge(subject))
+        return verdict(subject.label, self.name, missing(subject, self.requires) or self.judge(subject))
 
 
 def check(
     short: str,
     *,
     family: Family,
-    needs: str,
-    unless: Callable[[Any], str | None] = lambda subject: None,
-) -> Callable[[Callable[[Subject_contra], Finding | str]], Check[Subject_contra]]:
+    requires: Collection[str] = (),
+) -> Callable[[Callable[[Subject_contra], Finding | Chance | str]], Check[Subject_contra]]:
     """Make a check of a function: its name and the first line of its docstring are the check's own."""
 
-    def made(judge: Callable[[Subject_contra], Finding | str]) -> Check[Subject_contra]:
+    def made(judge: Callable[[Subject_contra], Finding | Chance | str]) -> Check[Subject_contra]:
         return Check(
             name=judge.__name__.replace("_", "-"),
             short=short,
             family=family,
-            needs=needs,
+            requires=frozenset(requires),
             sentence=(judge.__doc__ or "").partition("\n")[0],
             judge=judge,
-            unless=unless,
         )
 
     return made
 
 
-def verdict(method: str, check: str, found: Finding | str) -> Verdict:
+def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
     """Passed only if the value is a number within the bound.  A bound that is infinite says nothing, and a
     reason why the check does not apply is reported as such, never as passed.
 
     The verdict's value and bound are finite numbers: `BEYOND` stands for a value that is none, and fails.
     """
+    if isinstance(found, Chance):
+        found = found.finding
     if isinstance(found, Finding) and float(found.bound) == np.inf and not np.isnan(float(found.value)):
         found = "what rounding or the tolerance allows is beyond all numbers"
     if isinstance(found, str):

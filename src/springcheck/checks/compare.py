@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Literal
 
 import numpy as np
 
-from springcheck.checks.case import Case
+from springcheck.checks.case import DEVIATIONS, Case
 from springcheck.checks.solver import tolerance_bound
-from springcheck.checks.steps import fastest
+from springcheck.checks.steps import fastest, step_defect
 from springcheck.physics import exact
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory
 
@@ -21,11 +23,13 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Same:
-    """Trajectories that are one motion: no pair of neighbours differs by more than `allowed`."""
+    """Trajectories that are one motion: no two of them differ by more than `allowed`."""
 
     labels: tuple[str, ...]
     difference: float
     allowed: float
+    within: Literal["rounding", "tolerance"] = "rounding"
+    """What allows it: rounding alone, or the tolerance of some adaptive solver among them."""
 
 
 def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
@@ -57,7 +61,7 @@ def merge(comparisons: Sequence[Comparison]) -> Comparison:
 def allowed(scene: Scene, trajectory: Trajectory) -> float:
     """How far rounding, or the tolerance, may take a trajectory from the motion that it stands for."""
     case = Case(trajectory=trajectory, scene=scene)
-    if not case.scheme.one_step:
+    if not case.scheme.has("one-step"):
         return tolerance_bound(case)
     if len(trajectory.t) < 2:
         return 0.0
@@ -67,10 +71,13 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             sizes = np.asarray(unit / case.system.norm.unit, np.float64)
             return float(np.max((bound * sizes)[case.steps > 0], initial=0.0))
-    # roundings shift the energy, and with it the frequency of an anharmonic motion: steps**2
+    # roundings shift the energy, and with it the frequency of an anharmonic motion: as random ones do where
+    # they walk, and coefficients, which are rounded once, turn the phase at every step alike
     steps = float(case.steps[-1])
-    rounding = float(np.max(case.system.norm(*case.allowance)))
-    return case.roundings * rounding * steps * (1 + steps * fastest(case) * abs(trajectory.step) / 2)
+    rounding = float(np.max(case.system.norm.most(*case.allowance) / case.system.norm.unit))
+    turn = fastest(case) * abs(trajectory.step)
+    walk = float(case.walk(np.array([steps]), turn)[0]) + DEVIATIONS * steps**1.5 * turn / 2
+    return float(rounding * min(case.roundings * steps * (1 + steps * turn / 2), walk))
 
 
 def _telling(scene: Scene, trajectory: Trajectory) -> float:
@@ -82,32 +89,92 @@ def _telling(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:
-    """Groups of trajectories whose differences rounding and tolerances explain, largest group first."""
-    known = 0.0
-    if exact.has_true_motion(scene):
-        known = max(
-            (exact.uncertainty(scene, float(run.t[-1])) for run in trajectories.values()), default=0.0
-        )
-    limits = {EXACT: known} | {label: _telling(scene, run) for label, run in trajectories.items()}
-    labels = comparison.labels
-    limit = np.array([limits[label] for label in labels])
-    bounds = limit[:, None] + limit[None, :]
-    near = comparison.max_difference <= bounds
-    groups: list[set[int]] = []
-    for i in range(len(labels)):
-        joined = [group for group in groups if any(near[i, j] for j in group)]
-        groups = [group for group in groups if group not in joined] + [{i}.union(*joined)]
-    found = []
-    for group in groups:
-        if len(group) < 2:
-            continue
-        members = sorted(group)
-        block = np.ix_(members, members)
-        found.append(
-            Same(
-                labels=tuple(labels[i] for i in members),
-                difference=float(np.max(comparison.max_difference[block])),
-                allowed=float(np.max(bounds[block])),
-            )
-        )
-    return sorted(found, key=lambda same: -len(same.labels))
+    """Groups of trajectories of which every two are one motion, largest group first.
+
+    Within rounding: their difference is no larger than rounding allows, and where their schemes differ each
+    of them takes the other's steps, to rounding.  Within a tolerance: an adaptive solver is among them, and
+    the difference is no larger than its tolerance allows.
+    """
+    runs = {label: run for label, run in trajectories.items() if len(run.t) > 1}
+    limits = {label: _telling(scene, run) for label, run in runs.items()}
+    if EXACT in comparison.labels and runs:
+        known = max(exact.uncertainty(scene, float(run.t[-1])) for run in runs.values())
+        runs[EXACT], limits[EXACT] = _exact(scene, next(iter(runs.values()))), known
+    loose = {label for label, run in runs.items() if _is_adaptive(scene, run)}
+    found: list[Same] = []
+    for within in ("rounding", "tolerance"):
+        groups: list[list[str]] = []
+        for label in comparison.labels:
+            if label not in runs or (within == "rounding" and label in loose):
+                continue
+            joined = [
+                group
+                for group in groups
+                if all(_is_near(scene, runs, limits, comparison, (label, other)) for other in group)
+            ]
+            if joined:
+                joined[0].append(label)
+            else:
+                groups.append([label])
+        chosen = [
+            group for group in groups if len(group) > 1 and (within == "rounding" or loose & set(group))
+        ]
+        found += [_same(group, within, limits, comparison) for group in chosen]
+    return sorted(found, key=lambda same: (same.within, -len(same.labels)))
+
+
+def _is_adaptive(scene: Scene, run: Trajectory) -> bool:
+    return run.label != EXACT and not Case(trajectory=run, scene=scene).scheme.has("one-step")
+
+
+def _exact(scene: Scene, like: Trajectory) -> Trajectory:
+    """The exact solution at the frames of another trajectory."""
+    q, p = exact.true_motion(scene, Case(trajectory=like, scene=scene).steps, like.step)
+    states = {"q": np.asarray(q, np.float64), "p": np.asarray(p, np.float64)}
+    plain = {"arithmetic": Arithmetic(), "rebuilds_velocity": False, "energy": None}
+    return replace(like, label=EXACT, scheme=EXACT, **states, **plain)  # type: ignore[arg-type]
+
+
+def _is_near(
+    scene: Scene,
+    runs: Mapping[str, Trajectory],
+    limits: Mapping[str, float],
+    comparison: Comparison,
+    pair: tuple[str, str],
+) -> bool:
+    """Whether two trajectories are one motion."""
+    if not _difference(comparison, pair) <= limits[pair[0]] + limits[pair[1]]:
+        return False
+    one, other = (runs[label] for label in pair)
+    if one.scheme == other.scheme or any(_is_adaptive(scene, run) for run in (one, other)):
+        return True
+    return _takes_steps_of(scene, one, other) and _takes_steps_of(scene, other, one)
+
+
+def _takes_steps_of(scene: Scene, run: Trajectory, other: Trajectory) -> bool:
+    """Whether a trajectory could be one of another's scheme."""
+    if other.label == EXACT:
+        # the exact solution has no steps of its own; the other way round says it all
+        return True
+    told = step_defect(Case(trajectory=replace(run, scheme=other.scheme), scene=scene))
+    return told.passed is True
+
+
+def _difference(comparison: Comparison, pair: tuple[str, str]) -> float:
+    i, j = (comparison.labels.index(label) for label in pair)
+    return float(comparison.max_difference[i, j])
+
+
+def _same(
+    group: Sequence[str],
+    within: Literal["rounding", "tolerance"],
+    limits: Mapping[str, float],
+    comparison: Comparison,
+) -> Same:
+    pairs = list(combinations(group, 2))
+    return Same(
+        labels=tuple(group),
+        difference=max(_difference(comparison, pair) for pair in pairs),
+        allowed=max(limits[a] + limits[b] for a, b in pairs),
+        within=within,
+    )

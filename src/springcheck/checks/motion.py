@@ -9,13 +9,14 @@ from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
-from springcheck.checks.steps import STILL, closed_or_not
+from springcheck.checks.requires import CLOSED, MAP
+from springcheck.checks.steps import STILL
 from springcheck.physics.arrays import WIDE, Extended, Integers, Reals
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
 
-@check("closed", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
+@check("closed", family="motion", requires=CLOSED)
 def closed_form(case: Case) -> Finding | str:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
     q, p = case.system.modes.from_centres(*case.closed_states)
@@ -71,7 +72,7 @@ def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
     return f"; says nothing from step {case.steps[late[-1] + 1]} on, where that may be all of the {what}"
 
 
-@check("shadow", family="motion", needs="normal modes that a step turns", unless=closed_or_not)
+@check("shadow", family="motion", requires=CLOSED)
 def shadow_energy(case: Case) -> Finding | str:
     """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
     run = case.trajectory
@@ -124,11 +125,9 @@ def shadow_energy(case: Case) -> Finding | str:
     )
 
 
-@check("freq", family="motion", needs="a mode that oscillates without friction", unless=closed_or_not)
+@check("freq", family="motion", requires=CLOSED | {"undamped"})
 def frequency(case: Case) -> Finding | str:
     """The phase turns by the scheme's own frequency, to rounding."""
-    if case.scene.system.is_damped:
-        return "a phase that decays is seen in the closed form"
     turn = schemes.rotation(case.matrices)
     u0, v0 = case.mode_start
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
@@ -199,16 +198,10 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
     return x, np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
 
 
-@check("moment", family="motion", needs="nothing that holds a particle")
+@check("moment", family="motion", requires=MAP | {"unheld"})
 def momentum(case: Case) -> Finding | str:
     """Nothing outside pulls, so the total momentum stays."""
-    if any(term.bodies == 1 for term in case.scene.terms):
-        return "walls and fixed potentials take up momentum"
-    if not case.scheme.one_step:
-        return "an adaptive solver is judged by its tolerance"
     run = case.trajectory
-    if len(run.t) < 2:
-        return "there is no second frame"
     total = np.sum(run.p.astype(np.longdouble), axis=1)
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
@@ -241,3 +234,57 @@ def momentum(case: Case) -> Finding | str:
         f"forces cancel in pairs; {count(int(steps[worst + 1]), 'step')}, each rounded, all of one sign",
         Limits(reaction=float(off_by) if np.isfinite(off_by) else None),
     )
+
+
+@check("angular", family="motion", requires=MAP | {"alike", "one-area"})
+def angular_momentum(case: Case) -> Finding | str:
+    """Angular momentum q_x p_y - q_y p_x is kept where a step keeps area, and changes by its determinant."""
+    # a step that is one linear map A on both axes changes the area that they span, summed over particles, by
+    # det A, or not at all where A is symplectic: Hairer, Lubich & Wanner, chapter VI.2
+    run, steps = case.trajectory, case.steps
+    start = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
+    with np.errstate(over="ignore", invalid="ignore"):
+        noise = case.allowance_at(run.q, run.p)
+        if steps[0] != 0:
+            # nothing bounds the motion before this piece: it is judged from its own first frame on
+            steps, start = steps - steps[0], (run.q[0].astype(np.longdouble), run.p[0].astype(np.longdouble))
+        parts = [_areas(case, pair, (run.q, run.p), start, noise, steps) for pair in case.scene.system.alike]
+    off, unit, size = (np.concatenate(x) for x in zip(*parts, strict=True))
+    limit = np.tile(case.roundings * np.maximum(steps[1:], 1).astype(np.float64), len(parts))
+    seen = np.asarray(off / np.where(unit > 0, unit, 1), np.float64)
+    worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
+    told = np.isfinite(unit) & (size > limit * unit)
+    if seen[worst] <= limit[worst] and not np.any(told):
+        return "rounding may be as large as all of it"
+    share = (limit * unit)[told] / (size * np.tile(np.maximum(steps[1:], 1), len(parts)))[told]
+    return Finding(
+        seen[worst],
+        limit[worst],
+        "roundings",
+        f"roundings of {count(int(np.tile(steps[1:], len(parts))[worst]), 'step')}, all of one sign",
+        Limits(area=float(np.min(share, initial=np.inf))) if np.any(told) else Limits(),
+    )
+
+
+def _areas(
+    case: Case,
+    pair: tuple[Integers, Integers],
+    states: tuple[Reals, Reals],
+    start: tuple[Extended, Extended],
+    noise: tuple[Extended, Extended],
+    steps: Integers,
+) -> tuple[Extended, Extended, Extended]:
+    """Of two axes, at every frame but the first: how far the angular momentum is off, what a rounding of each
+    coordinate makes of it in one step at most, and how large it should be, (f-1,) each."""
+    x, y = pair
+    (q, p), (dq, dp) = (tuple(one.astype(np.longdouble) for one in two) for two in (states, noise))
+    factor: Extended | int = 1
+    if not case.area_preserving:
+        d = schemes.rotation(case.matrices).determinant[x]
+        factor = d ** steps[:, None].astype(np.longdouble)
+    first = start[0][x] * start[1][y] - start[0][y] * start[1][x]
+    expected = np.sum(first * factor * np.ones((len(steps), 1)), axis=1)
+    found = np.sum(q[:, x] * p[:, y] - q[:, y] * p[:, x], axis=1)
+    each = np.abs(q[:, x]) * dp[:, y] + np.abs(p[:, y]) * dq[:, x] + np.abs(q[:, y]) * dp[:, x]
+    unit = np.maximum.accumulate(np.sum(each + np.abs(p[:, x]) * dq[:, y], axis=1))
+    return np.abs(found - expected)[1:], unit[1:], np.abs(expected)[1:]

@@ -7,21 +7,20 @@ import numpy as np
 from springcheck.checks.case import REPEATED, Case
 from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
+from springcheck.physics.arrays import AS_WRITTEN, Arithmetic
 from springcheck.text.wording import count
 
 
-@check("start", family="record", needs="the first frame")
-def start(case: Case) -> Finding | str:
+@check("start", family="record", requires={"start"})
+def start(case: Case) -> Finding:
     """Row 0 is the start, exactly."""
     run, scene = case.trajectory, case.scene
-    if case.piece and case.steps[0] != 0:
-        return "this piece does not hold the start"
     value = float(np.max(np.abs([run.q[0] - scene.q, run.p[0] - scene.p])))
     return Finding(value, 0.0, "", "the start is recorded, not computed")
 
 
-@check("times", family="record", needs="frames")
-def times(case: Case) -> Finding | str:
+@check("times", family="record")
+def times(case: Case) -> Finding:
     """Times are the number of steps times the step, rounded once, up to where the run says it ended."""
     run = case.trajectory
     off = np.abs(run.t - case.steps * run.step)
@@ -30,8 +29,8 @@ def times(case: Case) -> Finding | str:
     return Finding(value, 0.0, "T", "one product, no accumulation; the last frame is the end")
 
 
-@check("grid", family="record", needs="frames")
-def grid(case: Case) -> Finding | str:
+@check("grid", family="record")
+def grid(case: Case) -> Finding:
     """The trajectory is the one that the scene asks for: its step, frames, quantities and tolerance, to its
     end."""
     run, scene = case.trajectory, case.scene
@@ -40,27 +39,51 @@ def grid(case: Case) -> Finding | str:
         wrong.append(f"the step is {run.step:g} instead of {scene.step:g}")
     if run.every != scene.every:
         wrong.append(f"frames are {count(run.every, 'step')} apart instead of {scene.every}")
-    fixed = case.scheme.one_step or case.scheme.flow or case.scheme.unnamed
-    if not fixed and run.tolerance != scene.tolerance:
+    if case.law.has("adaptive") and run.tolerance != scene.tolerance:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
     if run.energy is None and "energy" in scene.quantities:
         wrong.append("there are no energies")
+    wrong += beyond(run.arithmetic)
     if run.outcome.status == "continued" and not case.piece:
         wrong.append("it is a piece of a run that goes on")
     last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
     status = run.outcome.status
     if last > asked or (status == "complete" and last != asked):
         wrong.append(f"{last} of {asked} steps, and the run is called {status}")
-    elif status in ("stopped", "diverged") and not (_gives_up(case) or _explodes(case)):
+    elif (
+        status in ("stopped", "diverged")
+        and not case.law.has("random")
+        and not (_gives_up(case) or _explodes(case))
+    ):
         wrong.append(f"{status} after {last} of {asked} steps for no reason that is known here")
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
     return Finding(len(wrong), 0.0, "facts", why)
 
 
+MOST_DECLARED = {
+    "state": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
+    "force": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
+    "quantum": (2.0**-32, "the unit of 64-bit fixed point, half of it behind the point"),
+    "excess": (2.0**-31, "2**32 for 2**32 - 1 in 64-bit fixed point"),
+}
+"""The coarsest arithmetic that an engine may declare, and why: the bounds of all checks follow what it
+declares, and more would excuse any force."""
+
+
+def beyond(how: Arithmetic) -> list[str]:
+    """What of a declared arithmetic is coarser than any that is known."""
+    return [
+        f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
+        for name, (most, why) in MOST_DECLARED.items()
+        # decimals of a file are read off it, and not declared
+        if not 0 <= (value := getattr(how, name)) <= most and (name, how.name) != ("state", AS_WRITTEN)
+    ]
+
+
 def _gives_up(case: Case) -> bool:
     """Whether the engine may give up by itself, and says why: a solver that cannot hold its tolerance."""
     outcome = case.trajectory.outcome
-    return not case.scheme.one_step and outcome.status == "stopped" and bool(outcome.message)
+    return not case.law.has("one-step") and outcome.status == "stopped" and bool(outcome.message)
 
 
 HALF_RANGE = np.sqrt(np.finfo(np.float64).max)
@@ -76,7 +99,7 @@ def _explodes(case: Case) -> bool:
     limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE
     limit = min(limit, run.arithmetic.overflow)
     with np.errstate(all="ignore"):
-        if not case.scheme.one_step:
+        if not case.law.has("one-step"):
             if not exact.has_true_motion(case.scene):
                 return True
             ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
@@ -95,24 +118,23 @@ SINGLE_RANGE = float(np.sqrt(np.finfo(np.float32).max))
 """The same for single precision."""
 
 
-@check("line", family="record", needs="an engine in three dimensions")
-def line(case: Case) -> Finding | str:
-    """y and z stay exactly 0."""
+@check("line", family="record", requires={"three-dimensions"})
+def line(case: Case) -> Finding:
+    """Along axes that the scene leaves out nothing moves, exactly."""
     off = case.trajectory.off_axis
-    if off is None:
-        return "the engine moves along a line only"
-    return Finding(off, 0.0, "L", "every force along y and z is a product with 0")
+    assert off is not None
+    return Finding(off, 0.0, "L", "every force along another axis is a product with 0")
 
 
-@check("energy", family="record", needs="energies that are asked for")
-def energies(case: Case) -> Finding | str:
+@check("energy", family="record", requires={"energies"})
+def energies(case: Case) -> Finding:
     """Stored energies are those of the stored states, bit for bit."""
     run = case.trajectory
-    if run.energy is None:
-        return "the scene keeps no energies"
+    assert run.energy is not None
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
-    same = (again == run.energy) | (np.isnan(again) & np.isnan(run.energy))
+    stored = np.asarray(run.energy, np.float64)
+    same = (again == stored) | (np.isnan(again) & np.isnan(stored))
     # the energy of finite states may overflow; states that are no numbers have none
     same &= np.isfinite(run.q).all(axis=1) & np.isfinite(run.p).all(axis=1)
     value = float(np.count_nonzero(~same))

@@ -3,24 +3,20 @@ itself."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from springcheck import schemes
+from springcheck.checks.claim import Claim
 from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Reals
 from springcheck.physics.term import Term
 from springcheck.schemes.rounding import Met
-
-if TYPE_CHECKING:
-    from springcheck.checks.case import Case
 
 SMALLEST = np.longdouble(5e-324)
 """What an operation can lose to underflow: one unit of a subnormal double."""
 
 
 def of_step(
-    case: Case,
+    case: Claim,
     q: Reals,
     p: Reals,
     places: list[Reals] | None,
@@ -37,7 +33,7 @@ def of_step(
     """
     run, scene = case.trajectory, case.judged
     how = run.arithmetic
-    q, p = np.abs(q.astype(np.longdouble)), np.abs(p.astype(np.longdouble))
+    q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
     size_q, size_p = schemes.magnitude_step(
         case.scheme,
@@ -45,7 +41,7 @@ def of_step(
         p,
         h=run.step,
         m=m,
-        rate=scene.system.friction_rates if scene.system.is_damped else None,
+        rate=case.law.rate,
         met=_evaluations(case, places, recorded),
     )
     # the scheme's own step, which it is compared with, rounds as well
@@ -53,41 +49,42 @@ def of_step(
     # an engine may count positions from where the springs rest, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        of_p = of_p + how.state * m * (q + size_q) / h
+        of_p = of_p + how.state * m * (np.abs(q) + size_q) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
-    if case.scheme.implicit:
+    if case.scheme.has("implicit"):
         lost = lost * scene.n
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
-def _evaluations(case: Case, places: list[Reals] | None, recorded: bool) -> list[Met]:
+def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     acting = {"slow": scene.system.slow, "fast": scene.system.fast}
     found: list[Met] = []
     made: dict[tuple[str, float], Met] = {}
-    for number, (kind, part, at_end) in enumerate(scheme.evaluations):
+    for number, (terms, part, at_end) in enumerate(scheme.evaluations):
         # an engine may take a step's kick at once, and what its force lacks with it
         whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
-        known = kind, whole
+        known = terms, whole
         if places is not None or known not in made:
             near = None if places is None else places[number]
             bent = None if case.system.is_linear else near
             stiffness = None
-            if scheme.implicit:
-                stiffness = case.law["stiffness"] if bent is None else scene.system.slope(bent)[0]
+            if scheme.has("implicit"):
+                stiffness = case.law.stiffness if bent is None else scene.system.slope(bent)[0]
             made[known] = Met(
-                magnitude=_force(case, acting.get(kind, scene.terms), bent, whole, recorded and at_end),
+                magnitude=_force(case, acting.get(terms, scene.terms), bent, whole, recorded and at_end),
                 stiffness=stiffness,
                 joined=not scene.system.is_separate,
                 q=near,
+                pull=None if near is None else scene.system.potential_force(near, np.zeros_like(near)),
             )
         found.append(made[known])
     return found
 
 
-def _force(case: Case, terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
+def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
     """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
     quantum."""
     how = case.trajectory.arithmetic

@@ -12,77 +12,32 @@ from springcheck.checks import sight
 from springcheck.checks.case import REPEATED, Case, keeps, least_moved, overflows
 from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
+from springcheck.checks.requires import CLOSED, MAP, missing
 from springcheck.checks.stretch import Stretch, known
 from springcheck.physics.arrays import Arithmetic, Floats, Reals
-from springcheck.physics.scene import Scene
-from springcheck.physics.system import MOST_JOINED
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
-CONTRACTED = 1e-3
-"""Determinant of a step below which its powers are not formed: as the difference of two products it has
-lost 3 of the 19 digits of the reference there."""
+
+def bridges(case: Case) -> bool:
+    """Whether the closed form tells of a slip however long ago it was: it has one, and no more than half of
+    the motion decays within the run."""
+    if missing(case, CLOSED):
+        return False
+    decay = np.log(np.min(schemes.rotation(case.matrices).determinant)) * case.scene.steps / 2
+    return case.area_preserving or bool(decay >= -np.log(2.0))
 
 
-def no_map(case: Case) -> str | None:
-    """Why a check of the scheme's one-step map does not apply, or None."""
-    if case.scheme.unnamed:
-        return "its scheme is not known; --scheme NAME states it"
-    if not case.scheme.one_step:
-        return "an adaptive solver has no one-step map; it is judged by its tolerance"
-    if len(case.trajectory.t) < 2:
-        return "there is no second frame"
-    return None
-
-
-def closed_or_not(case: Case) -> str | None:
-    """Why the discrete motion has no closed form here, or None."""
-    reason = no_map(case)
-    if reason:
-        return reason
-    if case.mixed:
-        return "slow and fast springs act at different times: no normal mode stays by itself"
-    if not case.linear:
-        return (
-            "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
-            f"or more than {MOST_JOINED} particles are joined"
-        )
-    if np.any((case.system.modes.w2 == 0) & (case.system.modes.pull != 0)):
-        return "a mode under a constant force has no closed form here"
-    determinant = schemes.rotation(case.matrices).determinant
-    if not np.all(np.isfinite(determinant)):
-        return "the equation of an implicit step has no solution here"
-    if np.any(determinant <= 0):
-        return "the step reverses orientation (det <= 0): it has no phase"
-    if np.any(determinant < CONTRACTED):
-        return "friction contracts area more in one step than the reference has digits for"
-    products = np.abs(case.matrices[:, 0, 0] * case.matrices[:, 1, 1])
-    if not case.area_preserving and np.any(products * CONTRACTED > determinant):
-        return "what a step leaves of an area is a difference that the reference has no digits for"
-    return None
-
-
-@check("step", family="motion", needs="a fixed step and two frames", unless=no_map)
+@check("step", family="motion", requires=MAP | {"resolved"})
 def step_defect(case: Case) -> Finding | str:
     """Each step is the scheme's own step, to rounding."""
     # `arithmetic` asks for it too
     return case.once(_step_defect)
 
 
-def too_long(scheme: schemes.Scheme, scene: Scene) -> str | None:
-    """Why an implicit step is so long that neither engine nor reference keep a digit of it, or None."""
-    if not scheme.implicit:
-        return None
-    w = np.sqrt(np.max(scene.system.gershgorin(scene.q.astype(np.longdouble)) / scene.m))
-    turn = float(abs(scene.step) * w)
-    return None if turn < 2.0**53 else f"a step of h w = {turn:.1e} is beyond the digits of a double"
-
-
 def _step_defect(case: Case) -> Finding | str:
     run = case.trajectory
-    if why_not := too_long(case.scheme, case.judged):
-        return why_not
-    if run.every > REPEATED and (no_leap := closed_or_not(case)):
+    if run.every > REPEATED and (no_leap := missing(case, CLOSED)):
         return f"{run.every} steps lie between frames, and {no_leap}"
     bound, told = _allowed(case)
     if not np.any(told):
@@ -106,13 +61,15 @@ def _step_defect(case: Case) -> Finding | str:
     value, most = seen[worst], bound[worst]
     if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
         value, most, why = slow
-    return Finding(value, most, "roundings", why, _sees(case, bound, told))
+    sees, hidden = _sees(case, bound, told)
+    why += f"; as the engine declares: {run.arithmetic}" if str(run.arithmetic) else ""
+    return Finding(value, most, "roundings", why + _blind(case, told) + hidden, sees)
 
 
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     """By how many roundings each frame but the first may be off, and whether that is known (f-1,).
 
-    In the energy norm over all particles for very many steps, or very many joined particles.
+    In the energy norm over all particles for very many steps.
     """
     if case.ahead is not None:
         told = known(case, case.ahead, case.trajectory.every)
@@ -122,7 +79,26 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     return np.where(told, bound, 1), told
 
 
-def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> Limits:
+BLIND = "cannot be judged by single steps here: rounding may be as large as they are"
+
+
+def _blind(case: Case, told: NDArray[np.bool_]) -> str:
+    """Which positions and momenta move, and by no more in any step than rounding may."""
+    ahead, run = case.ahead, case.trajectory
+    if ahead is None:
+        return ""
+    with np.errstate(all="ignore"):
+        moves = np.abs(ahead.end - np.stack([run.q[:-1], run.p[:-1]]))[:, told]
+        seen = np.any(moves > case.roundings * ahead.allowance[:, told], axis=1)
+    names = [f"{'qp'[i]} of particle {j}" for i, j in np.argwhere(~seen & np.any(moves > 0, axis=1))]
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"; {', '.join(names[:MOST_NAMED])}{more} {BLIND}" if names else ""
+
+
+MOST_NAMED = 4
+
+
+def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> tuple[Limits, str]:
     """What the roundings allowed, in each degree of freedom where that is known, would not have hidden."""
     ahead = case.ahead
     if ahead is None:
@@ -134,7 +110,7 @@ def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> Limits:
 
 def first_off(case: Case) -> int | None:
     """The first frame that is not the scheme's own after the frame before; None where none is."""
-    if no_map(case):
+    if missing(case, MAP):
         return None
     bound, told = _allowed(case)
     off = ~(_in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:]) <= bound) & told
@@ -160,7 +136,7 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
         return _off(case.ahead, to_q, to_p)
     q, p = case.next_states
     with np.errstate(all="ignore"):
-        size = case.system.norm.size(np.abs(q - to_q), np.abs(p - to_p))
+        size = case.system.norm.size(q - to_q, p - to_p)
         return np.asarray(size / case.allowance_of_stretches)
 
 
@@ -194,12 +170,8 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
 
 def _amplified(case: Case, steps: int) -> Floats:
     """What the map can make of one rounding a step in so many steps, from each frame but the last (f-1,)."""
-    if case.linear:
-        total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
-        return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
-    with np.errstate(over="ignore", invalid="ignore"):
-        growth = abs(case.trajectory.step) * rates_met(case, case.trajectory.q[:-1], case.next_states[0])
-        return np.where(growth > 0, ((1 + growth) ** steps - 1) / np.where(growth > 0, growth, 1), steps)
+    total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
+    return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
 
 
 def rates_met(case: Case, *states: Reals) -> Floats:
@@ -214,7 +186,7 @@ def fastest(case: Case) -> float:
     return float(rates_met(case, case.trajectory.q)[-1])
 
 
-@check("arith", family="motion", needs="an arithmetic coarser than double precision", unless=no_map)
+@check("arith", family="motion", requires=MAP | {"resolved"})
 def arithmetic(case: Case) -> Finding | str:
     """The size of the step defect is that of the arithmetic the method says it has."""
     named = case.trajectory.arithmetic
@@ -231,7 +203,7 @@ def arithmetic(case: Case) -> Finding | str:
         last = replace(case.ahead, allowance=case.ahead.last)
         alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
-    coarser, fine = (float(np.max(x.system.norm.size(*x.allowance))) for x in (case, finer))
+    coarser, fine = (float(np.max(x.system.norm.most(*x.allowance))) for x in (case, finer))
     # at rest the only rounding is underflow, which is the same in both
     if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return "its coarser parts do not show in these states"

@@ -14,21 +14,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.checks import rounding
+from springcheck.checks.claim import Claim
 from springcheck.physics.arrays import Extended, Force, Reals
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
-if TYPE_CHECKING:
-    from springcheck.checks.case import Case
-
 JOINED = 32
 """Joined particles up to which tangent maps are carried as matrices (2n, 2n)."""
+
+SAMPLES = 16
+"""Tangent vectors of more than these, whose every rounding has a random sign."""
+
+CHANCE = 1e-6
+"""Of so few samples showing less of a degree of freedom's variance than `_widened` allows for."""
 
 NUMBERS = 1 << 20
 """Numbers of states and tangent maps that are kept at a time: 16 MB, and a few times that on the way."""
@@ -54,7 +57,7 @@ BENT = 0.125
 counts."""
 
 
-def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
+def known(case: Claim, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
     """Of which of these ways of so many steps the end, and what rounding does to it, are known (f,)."""
     with np.errstate(all="ignore"):
         told = np.isfinite([ahead.end, ahead.allowance]).all(axis=(0, 1, 3))
@@ -67,7 +70,7 @@ def known(case: Case, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
     return np.asarray(told)
 
 
-def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
+def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     """So many steps from states (f, n), with what their roundings may become."""
     if steps == 1:
         near = None if case.system.is_linear else case.trajectory.q[1:].astype(np.longdouble)
@@ -75,10 +78,14 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
         reach = np.maximum(np.abs([q, p]), np.abs(end))
         turns = np.zeros(len(q), dtype=np.longdouble)
         return Stretch(end=end, allowance=bound, last=bound, reach=reach, turns=turns)
-    size = 2 if case.system.is_separate else 2 * q.shape[1]
-    each = steps * q.shape[1] * (8 if case.system.is_linear else 2 * size)
+    n, many = q.shape[1], _many
+    if case.system.is_separate or n <= JOINED:
+        each = steps * n * (8 if case.system.is_linear else 2 * (2 if case.system.is_separate else 2 * n))
+    else:
+        each = 2 * n * (1 + SAMPLES) + (n * n if callable(case.law.stiffness) else 0)
+        many = _sampled
     rows = max(1, NUMBERS // each)
-    parts = [_many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
+    parts = [many(case, q[i : i + rows], p[i : i + rows], steps) for i in range(0, len(q), rows)]
     whole = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=0 if name == "turns" else 1)
         for name in Stretch.__slots__
@@ -86,7 +93,7 @@ def follow(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     return Stretch(**whole)
 
 
-def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> tuple[Extended, Extended]:
+def _one(case: Claim, q: Extended, p: Extended, near: Extended | None = None) -> tuple[Extended, Extended]:
     """One step, and the allowance of that step, (2, ..., n) each."""
     places: list[Reals] | None = [] if case.placed else None
     end = case.step(q, p, met=places, near=near)
@@ -94,7 +101,7 @@ def _one(case: Case, q: Extended, p: Extended, near: Extended | None = None) -> 
         return np.stack(end), np.stack(rounding.of_step(case, q, p, places, recorded=near is not None))
 
 
-def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
+def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     separate = case.system.is_separate
     on = np.empty((2, steps + 1, *q.shape), dtype=np.longdouble)
     on[:, 0] = q, p
@@ -113,7 +120,7 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
             maps = tangent(case, at_q, at_p)
             maps = maps.reshape(steps, len(q), *maps.shape[1:])
         turns = np.zeros(len(q), dtype=np.longdouble)
-        if case.scheme.implicit and not case.system.is_linear:
+        if case.scheme.has("implicit") and not case.system.is_linear:
             turns = np.max([_turn(case, at) for at in on[0, 1:]], axis=0)
         carried = np.zeros_like(bounds[0])
         power: Extended = np.broadcast_to(np.eye(maps.shape[-1], dtype=np.longdouble), maps.shape[1:])
@@ -126,12 +133,46 @@ def _many(case: Case, q: Extended, p: Extended, steps: int) -> Stretch:
     return Stretch(end=on[:, -1], allowance=allowance, last=each[:, -1], reach=reach, turns=turns)
 
 
+def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
+    """The same where n x n numbers are too many: the sum of |D Phi^(s-1-i)| A(z_i), which has 2 n s terms, is
+    at most the root of their number times that of the sum of their squares (Cauchy-Schwarz).  The latter is
+    the standard deviation of the end where every rounding has a random sign; some such ends tell it.
+    """
+    rng = np.random.default_rng(0)
+    off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble)
+    on, forces = np.stack([q, p]), variational(case.system)
+    reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
+    last = np.zeros_like(on)
+
+    def slope(q: Reals) -> tuple[Extended, bool]:
+        return case.system.slope(q[0])[0][None], True
+
+    with np.errstate(all="ignore"):
+        for _ in range(steps):
+            both = np.concatenate([on[:, None], off], axis=1)
+            off = np.stack(case.step(*both, forces=forces, slope=slope))[:, 1:]
+            on, last = _one(case, *on)
+            off = off + last[:, None] * rng.choice(np.array([-1.0, 1.0]), size=off.shape)
+            reach = np.maximum(reach, np.abs(on))
+            if case.law.has("implicit") and not case.system.is_linear:
+                turns = np.maximum(turns, _turn(case, on[0]))
+        spread = np.sqrt(np.mean(off * off, axis=1) * (2 * q.shape[1] * steps)) * _widened()
+    return Stretch(end=on, allowance=np.maximum(spread, last), last=last, reach=reach, turns=turns)
+
+
+def _widened() -> float:
+    """By how much a standard deviation may exceed that of so few samples: chi-squared."""
+    from scipy.special import gammaincinv
+
+    return float(np.sqrt(SAMPLES / (2 * gammaincinv(SAMPLES / 2, CHANCE))))
+
+
 def _joined(separate: bool) -> Callable[..., Extended]:
     """How what belongs to q and to p becomes one: as pairs of single particles, or as a row of all."""
     return np.stack if separate else np.concatenate
 
 
-def _turn(case: Case, q: Extended) -> Extended:
+def _turn(case: Claim, q: Extended) -> Extended:
     rows = case.system.gershgorin(q) / case.judged.m
     return np.asarray(np.longdouble(case.trajectory.step) ** 2 * np.max(rows, axis=-1))
 
@@ -145,7 +186,7 @@ def _apply(matrix: Extended, x: Extended) -> Extended:
     return np.asarray(found)
 
 
-def tangent(case: Case, q: Extended, p: Extended) -> Extended:
+def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
     """Derivative of one step at states (f, n): (f, n, 2, 2) where nothing is joined, else (f, 2n, 2n)."""
     f, n = q.shape
     separate = case.system.is_separate
@@ -174,7 +215,7 @@ def variational(system: System) -> Callable[[Iterable[Term]], Force]:
         terms = tuple(terms)
         whole = system.force_of(terms)
         # friction is linear in p, and so its own change
-        brakes = system.force_of(term for term in terms if not term.is_potential)
+        brakes = system.force_of(term for term in terms if term.kind == "friction")
 
         def force(q: Reals, p: Reals) -> Reals:
             change = brakes(q[1:], p[1:])

@@ -18,9 +18,9 @@ from typing import Any
 
 import springcheck
 from springcheck import interrupts
-from springcheck.cli import output, slips
+from springcheck.cli import ci, output, slips
 from springcheck.cli.commands import COMMANDS, Command
-from springcheck.errors import SpringcheckError, StoreWarning
+from springcheck.errors import SpringcheckError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.study import Study
 
@@ -44,15 +44,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupts.announce(f"interrupted; {what}")
     try:
         slips.look(options)
+        ci.check_paths(options)
         read = getattr(options, "file", None) or getattr(options, "source", None)
         with _said(), output.readable(read):
             if any(getattr(options, name, None) for name in ("engine", "stepper", "program")):
                 from springcheck import doors
 
-                doors.bring(options)
+                with output.alone():
+                    doors.bring(options)
             if "keeps" not in options:
                 gc.enable()
-            status = command(options)
+            try:
+                status = command(options)
+            except SpringcheckError as error:
+                ci.failed(options, error)
+                raise
             # while a full disk can still be said
             sys.stdout.flush()
             return status
@@ -117,7 +123,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     for one in [one for one in every if one.name in words[:1]] or every:
         parser_of = commands.add_parser(one.name, help=one.about)
         if one.name in words:
-            for names, how in one.arguments:
+            for names, how in (*one.arguments, *(ci.ARGUMENTS if one.name in ci.COMMANDS else ())):
                 parser_of.add_argument(*names, **how)
         if isinstance(one, Study):
             parser_of.set_defaults(command=partial(_study, one), keeps=one.keeps)
@@ -137,13 +143,19 @@ class _Version(argparse.Action):
 def _study(study: Study, options: argparse.Namespace) -> int:
     source = getattr(options, "source", None)
     doubts = output.doubts(source) if source else []
-    with output.progress(study.name, quiet=options.quiet) as progress:
+    with output.alone(), output.progress(study.name, quiet=options.quiet) as progress:
         found = study.perform(options, progress)
     output.warn(str(source), doubts)
+    status = found.status or int(bool(doubts))
+    if options.json or ci.asked(options):
+        document = {**found.document(), **({"not_trusted": doubts} if source else {})}
+        ci.report(options, document, status)
     if options.json:
-        output.document({**found.document(), **({"not_trusted": doubts} if source else {})})
+        output.document(study.name, document)
     elif not options.quiet:
         output.show(study.lines(found, options))
-    elif found.status == 2:
+    elif found.status == 2 and not getattr(found, "broke", {}):
         print("springcheck: nothing was measured; without --quiet the report says why", file=sys.stderr)
-    return found.status or int(bool(doubts))
+    for why in getattr(found, "broke", {}).values():
+        print(f"springcheck: {plain(why)}; mend it, and give the command again", file=sys.stderr)
+    return status

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import interrupts
-from springcheck.cli import output
+from springcheck.cli import ci, output
 from springcheck.errors import SpringcheckError, plain
-from springcheck.studies.study import ENGINE, JSON, QUIET, Argument, argument
+from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument
 from springcheck.studies.team import processes
 
 
@@ -43,7 +43,7 @@ def _inspect(options: Namespace) -> int:
     if options.json:
         document = inspect.document(summary, options)
         output.warn(options.file, doubts)
-        output.document({"not_trusted": doubts, **document})
+        output.document(options.name, {"not_trusted": doubts, **document})
     else:
         lines = inspect.lines(summary, options)
         output.warn(options.file, doubts)
@@ -117,12 +117,14 @@ def _columns(options: Namespace) -> list[str]:
 
 
 def _identify(options: Namespace) -> int:
-    from springcheck import identify
+    from springcheck import identify, schemes
     from springcheck.doors import function
-    from springcheck.identify import text
+    from springcheck.identify.result import identification
+    from springcheck.text.lines import plain as plain_line
 
     if bool(options.files) == (options.integrator is not None):
         raise SpringcheckError("identify needs a FILE, or --stepper FILE.py:FUNCTION, and not both")
+    asked = schemes.scheme(options.scheme).name if options.scheme is not None else None
     answers: Iterable[tuple[str, Any]]
     if options.integrator is not None:
         # what it prints is not ours to show
@@ -148,19 +150,36 @@ def _identify(options: Namespace) -> int:
         found, doubts = answer
         output.warn(file, doubts)
         each = [{"trajectory": label, **one.document()} for label, one in found.items()]
+        unlike = {label: _unlike(one, asked) for label, one in found.items()} if asked else {}
+        for one in each if asked else ():
+            one["unlike"] = unlike[one["trajectory"]]
         known = each[0] if len(each) == 1 else {"identifications": each}
         documents.append({**({"file": file} if many else {}), **known, "not_trusted": doubts})
         if not options.json:
             titles = {label: label for label in found}
             if many:
                 titles = {label: file if label == Path(file).name else f"{file}, {label}" for label in found}
-            output.show([x for label, one in found.items() for x in text.identification(titles[label], one)])
+            output.show([x for label, one in found.items() for x in identification(titles[label], one)])
+            output.show([plain_line(f"{titles[x]}: {y}", "bold red") for x, y in unlike.items() if y])
         fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())
         undecided = any(one.undecided for one in found.values())
-        statuses.append(1 if doubts or not fits else 2 if undecided else 0)
+        statuses.append(1 if doubts or not fits or any(unlike.values()) else 2 if undecided else 0)
+    status = 1 if 1 in statuses else max(statuses)
+    document = {"files": documents} if many else documents[0]
+    ci.report(options, document, status)
     if options.json:
-        output.document({"files": documents} if many else documents[0])
-    return 1 if 1 in statuses else max(statuses)
+        output.document(options.name, document)
+    return status
+
+
+def _unlike(found: Any, asked: str) -> str:
+    """What the states show instead of the scheme that was asked for; "" where they may show that."""
+    from springcheck.schemes import title
+
+    shown = [x for one in (found, *found.candidates) for x in (one.scheme, *one.aliases) if x]
+    if asked in shown or not (shown and found.fits):
+        return ""
+    return f"these states are not {title(asked)}, but {title(found.scheme or shown[0])}"
 
 
 def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]:
@@ -204,11 +223,13 @@ def _judge(options: Namespace) -> int:
         trajectory=options.trajectory,
     )
     output.warn(options.file, doubts)
+    document, status = {**found.document(), "not_trusted": doubts}, found.status or int(bool(doubts))
+    ci.report(options, document, status)
     if options.json:
-        output.document({**found.document(), "not_trusted": doubts})
+        output.document(options.name, document)
     else:
         output.show(found.lines())
-    return found.status or int(bool(doubts))
+    return status
 
 
 def _check(options: Namespace) -> int:
@@ -238,12 +259,18 @@ def _list(options: Namespace) -> int:
 
     found = listing.listing()
     if options.json:
-        output.document(found)
+        output.document(options.name, found)
     else:
         for line in listing.lines(found):
             print(line)
     return 0
 
+
+FORMATS = (
+    "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
+    ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, text tables; texts also gzipped"
+)
+"""What `springcheck.formats` reads, which is not imported for it."""
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
@@ -285,13 +312,14 @@ COMMANDS = (
         ENGINE,
     )),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
-        argument("files", metavar="FILE", nargs="*", help="stores, or any H5MD files with velocities"),
+        argument("files", metavar="FILE", nargs="*", help=f"stores, or files of any program: {FORMATS}"),
         _GROUP,
         argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
         argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
         argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
         _NAMES,
         argument("--step", type=float, metavar="H", help="is this the time step?"),
+        argument("--scheme", metavar="NAME", help="is this the scheme?"),
         argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),
         argument("--workers", type=processes, default=1, metavar="N",
@@ -299,7 +327,7 @@ COMMANDS = (
         JSON,
     )),
     Command("judge", "is a trajectory of any program what its scheme promises", _judge, (
-        argument("file", metavar="FILE", help="a table, NPY, NPZ, extended XYZ, LAMMPS dump, H5MD ..."),
+        argument("file", metavar="FILE", help=f"a store, or a file of any program: {FORMATS}"),
         argument("--scene", required=True, metavar="SCENE", help="the scene that it is of"),
         argument("--scheme", required=True, metavar="NAME", help="the scheme that it should have"),
         _NAMES,

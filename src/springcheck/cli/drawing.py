@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     with interrupts.folder() as made:
         written: list[Path] = []
         for study, found in drawn:
-            written += study.draw(found, made, **chosen)
+            written += study.draw(found, made, look=partial(folder.look, folder=into, path=path), **chosen)
             notes += getattr(found, "notes", ())
         if not written:
             raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")

@@ -10,26 +10,19 @@ from fractions import Fraction
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from springcheck import checks, engines, schemes
+from springcheck.checks.seeds import SEEDED
+from springcheck.cli.words import WORDS, word
 from springcheck.errors import SpringcheckError, nearest
-from springcheck.schemes import SCHEMES, Scheme
+from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
+from springcheck.thermal import THERMOSTATS, Law
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning
-
-STAGES = {
-    "kick": "p = p + {c}F",
-    "pull": "p = p + {c}F of the potential",
-    "drift": "q = q + {c}p/m",
-    "friction": "p = p exp(-{c}c/m)",
-    "implicit-friction": "p = p / (1 + {c}c/m)",
-    "held": "p = p + {c}F, as it was last evaluated",
-    "slow": "p = p + {c}F of the slow springs",
-    "fast": "p = p + {c}F of the fast springs",
-}
-"""What a stage of a splitting does, with its part of the step h; F is the force at the present q and p."""
 
 
 def lines(name: str) -> Iterator[str]:
@@ -38,8 +31,9 @@ def lines(name: str) -> Iterator[str]:
         return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
     if ":" in name:
         return _method(name)
-    if name in SCHEMES:
-        return scheme_lines(SCHEMES[name])
+    known = schemes.known()
+    if name in known:
+        return scheme_lines(known[name])
     # heavier to import, and rarely asked for
     from springcheck.identify.meanings import MEANINGS
 
@@ -47,18 +41,21 @@ def lines(name: str) -> Iterator[str]:
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
+    said = word(name)
+    if said:
+        return iter([f"{said[0]}: {said[1]}"])
     methods = [
         f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
     ]
-    near = nearest(name, (*_CHECKS, *SCHEMES, *methods, *(fault.name for fault in FAULTS), *MEANINGS))
+    near = nearest(name, (*_CHECKS, *known, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *WORDS))
     raise SpringcheckError(
-        f"{name!r} is no check, scheme, method, fault or finding{near}; `springcheck list` names checks and "
-        f"methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; schemes are "
-        f"{', '.join(SCHEMES)}"
+        f"{name!r} is no check, scheme, method, fault, finding or word{near}; `springcheck list` names "
+        f"checks and methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; schemes are "
+        f"{', '.join(known)}; words are {', '.join(WORDS)}"
     )
 
 
-_CHECKS = {check.name: check for check in checks.ALL}
+_CHECKS = {check.name: check for check in (*checks.ALL, *checks.RANDOM, *SEEDED)}
 
 
 def check_lines(check: Any) -> Iterator[str]:
@@ -137,20 +134,53 @@ def _method(name: str) -> Iterator[str]:
 def scheme_lines(scheme: Scheme) -> Iterator[str]:
     """Formula, order, limit and source of a scheme."""
     yield f"{scheme.name}: {scheme.title}"
-    for kind, c in scheme.stages:
+    for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
         part = "h " if c == 1 else f"{c} h "
-        yield f"  {STAGES[kind].format(c=part)}"
+        yield f"  {kind.word.format(c=part)}"
     if scheme.b:
         yield from _tableau(scheme.a, scheme.b)
-    if not scheme.stages and not scheme.b:
-        yield "  the exact flow" if scheme.flow else "  a solver that chooses its own steps; no one-step map"
-    if scheme.stages or scheme.b:
+    if scheme.has("flow"):
+        yield "  the exact flow"
+    elif scheme.has("random"):
+        yield from _thermostat(scheme.name)
+    elif not scheme.has("one-step"):
+        yield "  a solver that chooses its own steps; no one-step map"
+    else:
         bounded = {0.0: "no step", math.inf: "every step"}.get(scheme.limit)
-        area = "symplectic" if scheme.symplectic else "not symplectic"
+        area = "symplectic" if scheme.has("symplectic") else "not symplectic"
+        if scheme.has("symplectic", "friction"):
+            area = "conformally symplectic: a step takes area by exp(-h c/m), without friction it keeps it"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         yield f"Order {scheme.order}; {area}; bounded on a spring: {where}"
     if scheme.source:
         yield _line(f"Source: {scheme.source}")
+
+
+_ACTS = {
+    "kick": "p = p + {c} h F", "held": "p = p + {c} h F, as it was last evaluated",
+    "drift": "q = q + {c} h p/m",
+    "exchange": "p = c p + sqrt((1 - c**2) m kT) xi, c of x = gamma h", "damp": "p = (1 - {c}) p",
+    "undamp": "p = p / (1 + {c})", "noise": "p = p + {c} sqrt(2 x m kT) xi",
+    "jump": "q = q + {c} h sqrt(2 x kT/m) xi", "creep": "q = q + {c} h**2 F/m", "rebuild": "p = m (q' - q)/h",
+    "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
+}  # fmt: skip
+
+
+def _thermostat(name: str) -> Iterator[str]:
+    """Stages of a random scheme, and what its law is on a spring."""
+    scheme = THERMOSTATS[name]
+    for act in scheme.acts:
+        yield f"  {_ACTS[act.kind].format(c='c(x)' if callable(act.part) else act.part)}"
+    if scheme.carried:
+        yield "  the first draw xi of a step is the last of the step before"
+    turn, x = 0.5, 0.1
+    of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)
+    yield (
+        f"At h omega {turn} and gamma h {x}: k<q**2>/kT {of.configurational[0]:.6f}, <p**2>/m kT "
+        f"{of.kinetic[0]:.6f}; of a free particle D m gamma/kT {of.diffusion[0]:.6f}"
+    )
+    if not scheme.synchronised:
+        yield "Its velocities are of another time than its positions"
 
 
 def _tableau(a: Sequence[Sequence[Fraction]], b: Sequence[Fraction]) -> Iterator[str]:

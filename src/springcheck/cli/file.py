@@ -11,9 +11,11 @@ import numpy as np
 
 from springcheck import checks, schemes, store
 from springcheck.errors import IdentificationError, StoreError
+from springcheck.figures.views import units
 from springcheck.formats import States, is_hdf5, read, read_hdf5
+from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -79,6 +81,8 @@ class Judgement:
                 ("check", "verdict", "value", "why"), rows, left=("check", "verdict", "value"), prose="why"
             ),
             *([plain(NOT_JUDGED, "bold yellow")] if self.not_judged else ()),
+            plain(),
+            plain(checks.summary(self.verdicts), ("bold green", "bold red", "bold yellow")[self.status]),
         ]
 
 
@@ -99,10 +103,10 @@ def judge(
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
     judged, run, notes = as_trajectory(path, states, found, known.name)
+    taken = _taken(states, judged, run, found)
     verdicts = [
-        # the run has the scene's times, not the file's
-        replace(v, passed=None, why=TIMES) if v.check == "times" and np.any(states.t != run.t) else v
-        for v in checks.judge(judged, run)
+        replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
+        for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
     ]
     if states.roundoff > 2.0**-53:
         verdicts.append(_shown(judged, run, states))
@@ -110,6 +114,23 @@ def judge(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
         verdicts=tuple(verdicts),
     )  # fmt: skip
+
+
+def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict[str, str]:
+    """Of each check of the record: what was taken from the file in place of the scene, and so not judged."""
+    out: dict[str, str] = {}
+    if np.any(states.t != run.t):
+        off = float(np.max(np.abs(states.t - states.t[0] - run.t)))
+        out["times"] = f"{TIMES}; they are up to {off:.2g} beside them" if off else TIMES
+    if np.any(judged.q != asked.q) or np.any(judged.p != asked.p):
+        size = float(asked.system.norm(judged.q - asked.q, judged.p - asked.p))
+        out["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
+    if (judged.every, judged.steps) != (asked.every, asked.steps):
+        out["grid"] = (
+            f"the file has {count(len(run.t), 'frame')}, {count(run.every, 'step')} apart, and the scene "
+            f"asks for {asked.frames}, {asked.every} apart: what is there was judged"
+        )
+    return out
 
 
 def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
@@ -158,16 +179,13 @@ def states_in(
 
 def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
-    try:
-        own = () if columns else store.summary(path).runs
-    except StoreError:
-        own = ()
+    foreign = bool(columns) or store.is_foreign(path)
     found: dict[str, States] = {}
-    for run in own:
+    for run in () if foreign else store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run
         piece = next(store.windows(path, run.label, run.frames + 1))
         found[run.label] = States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None)
-    if found:
+    if not foreign:
         return found
     if columns or not store.is_h5md(path):
         return read_hdf5(path, columns)
@@ -193,8 +211,16 @@ def as_trajectory(
     notes: list[str] = []
     q = states.q
     other = states.p if states.p is not None else np.asarray(states.v)
+    for name, values in (("positions", q), ("momenta" if states.p is not None else "velocities", other)):
+        good = np.isfinite(values).all(axis=1)
+        if not good.all():
+            raise StoreError(
+                f"{path}: the {name} of row {int(np.argmin(good)) + 1} are not finite numbers; leave out the "
+                "frames from there on, and those before it are judged"
+            )
+    beside = 0.0
     if q.shape[1] == 3 * scene.n:
-        q, other = _along(path, q, other, scene, notes, max(1e-6, 4 * states.roundoff))
+        q, other, beside = _along(path, q, other, scene, notes, max(1e-6, 4 * states.roundoff))
     if q.shape[1] != scene.n:
         raise StoreError(f"{path}: {q.shape[1]} positions a frame, {scene.n} in scene {scene.name}")
     p = other if states.p is not None else other * scene.m
@@ -203,6 +229,14 @@ def as_trajectory(
     if not np.isfinite(states.t).all():
         raise StoreError(f"{path}: row {int(np.argmin(np.isfinite(states.t))) + 1} of t is not finite")
     every = round(float(states.t[1] - states.t[0]) / scene.step)
+    apart, own = float(states.t[1] - states.t[0]), units(scene).t
+    for name, one in files.TIMES.items() if own in files.TIMES else ():
+        factor = files.TIMES[own] / one
+        if factor != 1 and abs(apart - factor * scene.step * scene.every) <= 1e-6 * apart:
+            raise StoreError(
+                f"{path}: the times look like {name}: frames lie {apart:.6g} apart, {factor:g} times as far "
+                f"as in scene {scene.name}, which has {own}; divide them by {factor:g}"
+            )
     t = np.arange(len(q), dtype=np.float64) * max(every, 1) * scene.step
     off = np.abs(states.t - states.t[0] - t)
     allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
@@ -220,25 +254,32 @@ def as_trajectory(
             f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}"
         )
     if size > 0:
-        notes.append("the start was taken as it is written in the file")
+        notes.append(
+            f"the start was taken as it is written in the file, {float(size):.2g} of the amplitude off"
+        )
     if states.roundoff > 2.0**-53:
         notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
     steps = (len(q) - 1) * every
-    if steps < scene.steps:
-        notes.append(f"ends after {steps:,} of the scene's {scene.steps:,} steps")
+    if steps != scene.steps:
+        notes.append(f"ends after {steps:,} steps, the scene after {scene.steps:,}")
+    if every != scene.every:
+        notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
     judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
-        arithmetic=Arithmetic(name="as written", state=states.roundoff),
+        arithmetic=Arithmetic(name=AS_WRITTEN, state=states.roundoff),
+        # a line that is no axis is rounded in each of its coordinates
+        off_axis=beside if beside > 8 * states.roundoff else None,
     )  # fmt: skip
     return judged, run, tuple(notes)
 
 
 def _along(
     path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
-) -> tuple[Floats, Floats]:
-    """Motions in space (f, 3n) along the one line that they keep to (f, n), but for `off` of their size."""
+) -> tuple[Floats, Floats, float]:
+    """Motions in space (f, 3n) along the one line that they keep to (f, n), but for `off` of their size; and
+    by which part of it they are off."""
     r, rates = q.reshape(len(q), -1, 3), other.reshape(len(q), -1, 3)
     moved = (r - r[0]).reshape(-1, 3)
     _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
@@ -256,4 +297,4 @@ def _along(
         line, positions, rest = -line, -positions, -rest
     where = ", ".join(f"{x:.4g}" for x in line)
     notes.append(f"motion along ({where}), at most {beside:.1g} of its size beside it")
-    return positions, rest
+    return positions, rest, beside

@@ -10,7 +10,7 @@ from springcheck import store
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Result, Study
-from springcheck.text.lines import Lines, Table, plain, table
+from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
 
 
@@ -55,7 +55,7 @@ def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory |
     return store.strided(summary.path, options.trajectory, 20 if options.rows is None else options.rows)
 
 
-def _runs(summary: store.Summary) -> Table:
+def _runs(summary: store.Summary) -> TextTable:
     rows = []
     for run in summary.runs:
         known = run.parameters

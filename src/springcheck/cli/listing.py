@@ -15,7 +15,10 @@ def listing() -> dict[str, Any]:
         "scenes": [{"name": name, "title": scenes.load_scene(name).title} for name in scenes.names()],
         "engines": [_engine(name) for name in engines.names()],
         "unusable_engines": engines.unusable(),
-        "checks": [{"name": check.name, "sentence": check.sentence} for check in checks.ALL],
+        "checks": [
+            {"name": check.name, "sentence": check.sentence}
+            for check in dict.fromkeys((*checks.ALL, *checks.RANDOM))
+        ],
     }
 
 
@@ -36,7 +39,7 @@ def _engine(name: str) -> dict[str, Any]:
                 "about": method.about,
                 "default": method.default,
             }
-            for method in found.methods.values()
+            for method in (*found.methods.values(), *found.thermostats.values())
         ],
     }
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError, StoreError, plain
@@ -17,7 +18,10 @@ from springcheck.errors import SpringcheckError, StoreError, plain
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from springcheck.studies.study import Progress
+    from springcheck.studies.arguments import Progress
+
+SCHEMA = 1
+"""Of the JSON documents: raised where a name goes or changes its meaning, and not where one is added."""
 
 
 def show(lines: Sequence[RenderableType]) -> None:
@@ -26,7 +30,9 @@ def show(lines: Sequence[RenderableType]) -> None:
 
     terminal = sys.stdout.isatty()
     # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
-    console = Console(highlight=False, width=None if terminal else 1 << 16)
+    # who wants no colours wants none, whatever else is said; Rich would still write bold
+    colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
+    console = Console(highlight=False, width=None if terminal else 1 << 16, color_system=colours)
     if terminal:
         for line in lines:
             console.print(line, crop=False)
@@ -45,9 +51,9 @@ def folded(line: str) -> str:
     return textwrap.fill(line, shutil.get_terminal_size().columns, break_on_hyphens=False)
 
 
-def document(data: Any) -> None:
-    """Print one JSON document."""
-    print(json.dumps(data, allow_nan=False, indent=2))
+def document(command: str, data: dict[str, Any]) -> None:
+    """Print the one JSON document of a command, which says its schema first."""
+    print(json.dumps({"schema": f"springcheck/{command}/{SCHEMA}", **data}, allow_nan=False, indent=2))
 
 
 def doubts(file: str) -> list[dict[str, str]]:
@@ -68,6 +74,37 @@ def warn(file: str, found: Sequence[dict[str, str]]) -> None:
         first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
         more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
         print(f"springcheck: {plain(f'{file} is not what was written: {first}', 400)}{more}", file=sys.stderr)
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """Keep standard output for what we say: what an engine prints, in Python or C, goes to standard error.
+
+    It gets a stream of its own, which it may close.
+    """
+    sys.stdout.flush()
+    shown = sys.stdout
+    try:
+        kept, out = os.dup(1), os.dup(2)
+    except OSError:
+        yield
+        return
+    stream = open(out, "w", errors="backslashreplace")  # noqa: SIM115
+    try:
+        os.dup2(2, 1)
+        sys.stdout = stream
+        yield
+    finally:
+        sys.stdout = shown
+        with suppress(OSError, ValueError):
+            stream.close()
+        if os.name == "posix":
+            import ctypes
+
+            # what C has printed may still stand in its buffer
+            ctypes.CDLL(None).fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 @contextmanager

@@ -23,6 +23,9 @@ NAMES = {
 """Attributes of the arguments that name something, and how they are called."""
 
 
+LEAST_MEMORY = 1 << 29
+"""Bytes of address space: NumPy, libhdf5 and SciPy take 400 MiB, and each thread of theirs more."""
+
 UNREAD = (
     ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
     ("integrator", "--stepper", ("--mass", "--stiffness", "--friction", "--step", "--trajectory")),
@@ -61,6 +64,7 @@ class Parser(argparse.ArgumentParser):
 def look(options: argparse.Namespace) -> None:
     """SpringcheckError for an argument that names nothing, or that the command would not read."""
     given = vars(options)
+    _has_room()
     for attribute, called in NAMES.items():
         if given.get(attribute) == "":
             raise SpringcheckError(f"{called}: a name is needed, not an empty one")
@@ -78,6 +82,19 @@ def look(options: argparse.Namespace) -> None:
                     raise SpringcheckError(f"{option} is not read beside {called}: leave it out")
     if "rows" in given and given["rows"] is not None and given["trajectory"] is None:
         raise SpringcheckError("--rows is for the numbers of a trajectory: name one with --trajectory")
+
+
+def _has_room() -> None:
+    """SpringcheckError where libraries could not even be loaded: they crash, or try again and again."""
+    try:
+        import resource
+    except ImportError:
+        return
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if most != resource.RLIM_INFINITY and most < LEAST_MEMORY:
+        raise SpringcheckError(
+            f"{most >> 20} MiB of address space (ulimit -v): at least {LEAST_MEMORY >> 20} MiB are needed"
+        )
 
 
 def _is_file(name: str) -> None:

@@ -49,6 +49,17 @@ def load(spec: str) -> Callable[..., Any]:
         found = getattr(found, part)
     if not callable(found):
         raise MethodError(f"{spec!r} is a {type(found).__name__}, not a function")
+    try:
+        signature = inspect.signature(found)
+    except (TypeError, ValueError):
+        # of an extension
+        return found  # type: ignore[no-any-return]
+    try:
+        signature.bind(*range(5))
+    except TypeError:
+        raise MethodError(
+            f"{spec}: {name}{signature} cannot be called as a step: step(q, p, h, force, mass) -> (q, p)"
+        ) from None
     return found  # type: ignore[no-any-return]
 
 
@@ -56,16 +67,21 @@ def _module(name: str) -> ModuleType:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
+        with engines.foreign(name, f"module {name!r} cannot be imported"):
+            return _imported(name)
+    finally:
+        sys.path.remove(here)
+
+
+def _imported(name: str) -> ModuleType:
+    try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         missing = error.name or name
         if missing == name.split(".", maxsplit=1)[0] or name.startswith(f"{missing}."):
+            here = Path.cwd()
             raise MethodError(f"no module {name!r} in {here} or among the installed ones") from error
         raise MethodError(f"module {name!r} needs {missing!r}, which is not installed") from error
-    except (Exception, SystemExit) as error:
-        raise MethodError(f"module {name!r} cannot be imported: {type(error).__name__}: {error}") from error
-    finally:
-        sys.path.remove(here)
 
 
 def file_of(spec: str) -> str:
@@ -96,6 +112,7 @@ def engine(specs: Sequence[str], stated: Callable[[str], str] = lambda name: "")
         version=dict,
         convention=lambda method: "as the function returns them",
         step_seconds=2e-5,
+        any_axis=True,
     )
 
 
@@ -121,7 +138,7 @@ def _identified(function: Callable[..., Any]) -> str:
     except (MethodError, IdentificationError):
         # a mistake in the function is shown as it is, when it runs
         return UNKNOWN.name
-    known = found.fits and found.scheme in schemes.SCHEMES and schemes.SCHEMES[found.scheme].one_step
+    known = found.fits and found.scheme in schemes.SCHEMES and schemes.SCHEMES[found.scheme].has("one-step")
     return found.scheme if known and found.scheme else UNKNOWN.name
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from springcheck.engines.contract import (
@@ -29,6 +29,7 @@ from springcheck.engines.registry import (
     OURS,
     bring,
     engine,
+    foreign,
     from_file,
     is_brought,
     module_name,
@@ -37,13 +38,13 @@ from springcheck.engines.registry import (
     origin,
     unusable,
 )  # fmt: skip
-from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.errors import MethodError, nearest
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 __all__ = [
     "ANY_POTENTIAL", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method",
-    "Need", "Simulation", "Stopped", "absence", "bring", "engine", "from_file", "guarded",
+    "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file", "guarded",
     "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
     "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable",
 ]  # fmt: skip
@@ -77,12 +78,8 @@ def load(name: str) -> Engine:
     reason = absence(name)
     if reason:
         raise MethodError(reason)
-    try:
+    with foreign(name, f"{found.title} cannot be imported"):
         _imported(found.version)
-    except MethodError:
-        raise
-    except Exception as error:
-        raise MethodError(f"{found.title} cannot be imported: {told(error)}") from error
     return found
 
 
@@ -101,19 +98,22 @@ def _imported(version: Callable[[], object]) -> None:
 
 
 def guarded(label: Label, call: Callable[..., T], *arguments: object) -> T:
-    """Call into an engine.  What goes wrong in it comes out as MethodError, with its file and line."""
-    try:
+    """Call into an engine.  Whatever it raises comes out as MethodError, with its file and line.
+
+    So does what it did before, where it ended the program and this is the next one (`interrupts.supervised`).
+    """
+    with foreign(str(label), f"{label} failed", origin(label.engine).package):
         return call(*arguments)
-    except (SpringcheckError, Stopped, MemoryError):
-        raise
-    except Exception as error:
-        raise MethodError(f"{label} failed: {told(error, origin(label.engine).package)}") from error
 
 
-def start(scene: Scene, label: Label) -> Simulation:
-    """The engine of a label at the scene's start.  MethodError, with the reason, where it cannot start."""
-    driver = load(label.engine)
-    found: Simulation = guarded(label, driver.start, scene, method(label), label, scene.step)
+def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
+    """The engine of a label at the scene's start.  MethodError, with the reason, where it cannot start.
+
+    `seed` is that of a random method: a number, or a generator where the method takes one.
+    """
+    driver, run_by = load(label.engine), method(label)
+    made = partial(driver.start, seed=seed) if run_by.generator else driver.start
+    found: Simulation = guarded(label, made, scene, run_by, label, scene.step)
     if not callable(getattr(found, "advance", None)):
         raise MethodError(f"{label} failed: its start returned {type(found).__name__}, which has no advance")
     return found
@@ -147,11 +147,19 @@ def parse(text: str) -> Label:
     head, _, place = text.partition("@")
     name, colon, method = head.partition(":")
     if not colon:
-        raise MethodError(f"method {text!r} is not of the form engine:method[@platform[-precision]]")
+        labels = [f"{one}:{m}" for one in names() for m in engine(one).methods]
+        if not name and place:
+            at = next((f"{x}@{p}" for x in labels for p in engine(x.partition(":")[0]).platforms
+                       if p.lower() == place.lower()), "openmm:verlet@CPU")  # fmt: skip
+            raise MethodError(f"method {text!r}: a platform goes with a method, as {at}")
+        raise MethodError(
+            f"method {text!r} is not of the form engine:method[@platform[-precision]]{nearest(name, labels)}"
+        )
     found = engine(name)
-    if method not in found.methods:
-        known = ", ".join(f"{name}:{m}" for m in found.methods)
-        near = nearest(method, found.methods, f"{name}:")
+    every = {**found.methods, **found.thermostats}
+    if method not in every:
+        known = ", ".join(f"{name}:{m}" for m in every)
+        near = nearest(method, every, f"{name}:")
         raise MethodError(f"unknown method {text!r}{near}; {found.title} has {known}")
     if "@" in text and place not in found.platforms:
         known = ", ".join(found.platforms) or "none"
@@ -162,22 +170,24 @@ def parse(text: str) -> Label:
 
 def method(label: Label) -> Method:
     """The declaration behind a label."""
-    return engine(label.engine).methods[label.method]
+    found = engine(label.engine)
+    return found.methods.get(label.method) or found.thermostats[label.method]
 
 
-def _methods_meant(name: str, glob: str) -> list[str]:
+def _methods_meant(name: str, glob: str, bath: bool) -> list[str]:
     """The methods of an engine that a glob may name: where it says nothing of methods, the default ones."""
-    methods = engine(name).methods
+    methods = engine(name).thermostats if bath else engine(name).methods
     default = [m for m, declared in methods.items() if declared.default]
     all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
     return list(methods) if all_of_them else default
 
 
-def match(patterns: tuple[str, ...]) -> tuple[Label, ...]:
+def match(patterns: tuple[str, ...], *, bath: bool = False) -> tuple[Label, ...]:
     """Labels that glob patterns name, each once, in the order of the engines.
 
     A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before
-    `@` is the glob and the platform is carried over to every engine that has it.  `*` alone names the
+    `@` is the glob and the platform is carried over to every engine that has it.  With a `bath` it names
+    thermostats, and else none of them.  `*` alone names the
     methods that are declared as default, and so does `engine:*` of an engine that has such; every other
     glob names all that it fits.
     """
@@ -190,7 +200,7 @@ def match(patterns: tuple[str, ...]) -> tuple[Label, ...]:
         found = [
             f"{name}:{m}{at}{place}"
             for name in names()
-            for m in _methods_meant(name, head)
+            for m in _methods_meant(name, head, bath)
             if fnmatchcase(f"{name}:{m}", head) and (not at or place in engine(name).platforms)
         ]
         if not found:
@@ -205,12 +215,18 @@ PLURAL = {"particles": "particles", "circuit": "circuits", "rotor": "rotors"}
 def refusal(scene: Scene, label: Label) -> str | None:
     """Why a method cannot serve a scene, or None where it can; imports nothing."""
     what = method(label)
+    if scene.bath and not what.generator:
+        return f"{what.scheme} has no noise, and the scene has a bath; its methods are thermostats"
+    if what.generator and not scene.bath:
+        return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
     if scene.kind not in what.kinds:
         moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))
         others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}
         who = "it" if scene.kind in others else engine(label.engine).title
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
-    unknown = (term for term in scene.terms if not (term.is_potential and ANY_POTENTIAL in what.terms))
+    if scene.places is not None and not engine(label.engine).any_axis:
+        return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
+    unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:
         return f"it has no {' and no '.join(missing)} term"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
@@ -31,7 +33,7 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         # Gershgorin's bound of the squared frequencies
         w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
-    bounded = scheme(scheme_name).symplectic and hw < 2 and all(np.all(t.k >= 0) for t in springs)
+    bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in springs)
     group = graph.lowest_joined(scene.n, scene.terms)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = _energies(scene, group) * (2 + hw) / (2 - hw) if bounded else np.full(scene.n, np.inf)
@@ -52,19 +54,77 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     return np.where(turning[group], rest, 0.0)
 
 
+def rests(scene: Scene, label: Label) -> Floats:
+    """Where each particle is counted from so that every bond has rest length 0, (n,) [L].
+
+    Such a bond pulls along each axis by itself, and noise across the line does not reach it.  MethodError
+    where springs have no common rest.
+    """
+    pairs = [term for term in scene.terms if isinstance(term, Spring)]
+    if not any(np.any(term.rest) for term in pairs):
+        return np.zeros(scene.n)
+    found = scene.system.rest_positions
+    if found is None or any(np.any(lengths(term, found)) for term in pairs):
+        raise MethodError(f"{label}: springs without a common rest bend under noise across the line")
+    return found
+
+
 def _energies(scene: Scene, group: Integers) -> Floats:
     """Energy of every group of joined particles at the start, where its lowest particle stands (n,)."""
     found = np.asarray(np.bincount(group, scene.p**2 / (2 * scene.m), scene.n), np.float64)
     for term in scene.terms:
-        if term.is_potential:
+        if term.kind == "potential":
             rows = term.potential(term.elongation(scene.q), *term.parameters)
             found += np.bincount(group[term.particles[0]], np.broadcast_to(rows, (len(term),)), scene.n)
+    return found
+
+
+def joints(
+    scene: Scene, term: WallSpring | Spring, origins: Floats
+) -> list[tuple[tuple[int, ...], float, Any]]:
+    """Springs as programs have them, which pull alike along every axis: the particle or the two, k [M/T2],
+    and the rest point (x, y, z) [L], or of two particles the rest length [L].
+
+    Raises MethodError where a spring does not act alike along all axes of its particles, or where a bond
+    between particles of several axes has a rest length: such a bond is no spring along each.
+    """
+    at = lengths(term, origins) if isinstance(term, Spring) else term.at - origins[term.i]
+    rows = zip(*(index.tolist() for index in term.particles), term.k.tolist(), at.tolist(), strict=True)
+    if scene.places is None:
+        return [(tuple(i), k, x if term.bodies == 2 else (x, 0.0, 0.0)) for *i, k, x in rows]
+    of, axis = (x.tolist() for x in np.divmod(scene.places, 3))
+    axes = [{a for i, a in zip(of, axis, strict=True) if i == one} for one in range(scene.particles)]
+    found = []
+    begun: dict[tuple[int, ...], dict[int, tuple[float, float]]] = {}
+    for *coordinates, k, x in rows:
+        key, along = tuple(of[j] for j in coordinates), axis[coordinates[0]]
+        each = begun.setdefault(key, {})
+        if along in each:
+            break
+        each[along] = k, x
+        if all(set(each) == axes[i] for i in key):
+            point = tuple(each.get(a, (0.0, 0.0))[1] for a in range(3))
+            if len({k for k, _ in each.values()}) > 1 or (term.bodies == 2 and any(point)):
+                break
+            del begun[key]
+            found.append((key, k, 0.0 if term.bodies == 2 else point))
+    if begun:
+        which = " and ".join(map(str, next(iter(begun))))
+        raise MethodError(
+            f"{scene.name}: a program's spring pulls alike along every axis and rests at one point; that of "
+            f"particle {which} does not"
+        )
     return found
 
 
 def lengths(term: Spring, origins: Floats) -> Floats:
     """Rest lengths of bonds between coordinates that are counted from these origins [L]."""
     return np.asarray(np.abs(term.rest - (origins[term.b] - origins[term.a])))
+
+
+def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
+    """The largest size of what is no coordinate of the scene, of positions (particles or more, 3)."""
+    return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
 
 
 def far(scene: Scene) -> float:

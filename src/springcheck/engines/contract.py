@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from importlib import import_module
 from typing import Any, Protocol
@@ -63,6 +63,12 @@ class Method:
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
     one_friction: bool = False
     """One friction rate serves all particles of a run."""
+    generator: str = ""
+    """Of a random method: what draws its numbers, in words."""
+    scripted: bool = False
+    """Whether its seed may be a generator of one's own, an object with `standard_normal(size)`."""
+    note: str = ""
+    """What the library's authors would want to be said beside a finding, and the thread that asked."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +88,8 @@ class Label:
 class Simulation(Protocol):
     """A started engine.  It moves and does nothing else: the driver records, times and judges.
 
-    An engine in three dimensions may have an attribute `off_axis`, the largest |y| or |z| that it has seen.
+    An engine in three dimensions may have an attribute `off_axis`, the largest size that it has seen of
+    a coordinate that the scene leaves out.
     """
 
     @property
@@ -115,14 +122,17 @@ class Engine:
     title: str
     methods: Mapping[str, Method]
     """By name; see `named`."""
-    start: Callable[[Scene, Method, Label, float], Simulation]
-    """start(scene, method, label, step): the engine at the scene's start.  The step may be negative."""
+    start: Callable[..., Simulation]
+    """start(scene, method, label, step): the engine at the scene's start.  The step may be negative.  Of a
+    random method it takes one more argument by name, its seed."""
     version: Callable[[], Mapping[str, str]]
     """Versions of the library and of what it stands on, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
     """How the library rounds: double precision throughout by default."""
     convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
+    thermostats: Mapping[str, Method] = field(default_factory=dict)
+    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.thermal`."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
     module: str = ""
@@ -140,6 +150,8 @@ class Engine:
     squares_lengths: bool = False
     """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half the range of
     exponents is left."""
+    any_axis: bool = False
+    """Whether it moves particles along y and z as well: it then reads `Scene.where`."""
     internal_steps: Callable[..., Any] | None = None
     """internal_steps(scene, method, most=): what an adaptive solver does on its way, counted."""
 
@@ -165,6 +177,13 @@ def by_default(
 def by_name(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, **more: Any) -> Method:
     """The same for a method that is run by its name alone, never by default."""
     return by_default(name, scheme, about, terms, *needs, default=False, **more)
+
+
+def thermostat(
+    name: str, scheme: str, about: str, generator: str, terms: frozenset[str], **more: Any
+) -> Method:
+    """A random method, with what draws its numbers."""
+    return Method(name=name, scheme=scheme, about=about, terms=terms, generator=generator, **more)
 
 
 def named(*methods: Method) -> dict[str, Method]:

@@ -78,6 +78,7 @@ ENGINE = Engine(
             "implicit-euler",
             "spring and damping of the joint",
             frozenset({"wall-spring", "damping"}),
+            note="as documented for stiff joints; dartsim/dart#846 asks where the energy goes",
         ),
     ),
     start=_World,

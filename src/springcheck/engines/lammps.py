@@ -1,4 +1,4 @@
-"""LAMMPS: atoms on the x axis, tied by `fix spring/self`, by harmonic bonds, or pulled by `fix external`.
+"""LAMMPS: atoms tied by `fix spring/self`, by harmonic bonds, or pulled by `fix external`.
 
 In units lj no constant takes part.  A wall is an atom that no fix moves.  A run is set up once and goes on by
 `pre no`, which builds no lists anew and computes no force twice; r-RESPA must be set up for every call.
@@ -27,18 +27,22 @@ from springcheck.engines.contract import (
     Stopped,
     by_name,
     named,
+    thermostat,
 )
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.thermal.catalogue import GJ
 
 INNER = 8
 """Steps of the fast springs in one of r-RESPA, as its scheme has them."""
 
 ATTENTIVE = 5000
 """Steps in one call, which hears no Ctrl-C: some milliseconds."""
+
+_DRAWS = "LAMMPS, Marsaglia"
 
 MPI = "libmpi.so.12"
 
@@ -83,26 +87,32 @@ def version() -> dict[str, str]:
 class _Run:
     """LAMMPS in motion."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float, seed: int = 0) -> None:
         self.force_calls = 0
         self.off_axis = 0.0
         self._m = scene.m
         self._lammps = _library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
         ours = method.name == "external"
-        self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
+        if method.generator:
+            self._origins = bonds.rests(scene, label)
+        else:
+            self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
         self._each = {"external": 0, "respa": INNER}.get(method.name, 1)
         x = self._build(scene, method.name)
         if ours:
             self._pull(scene)
-        for line in ("fix move mobile nve", f"timestep {step!r}", "thermo_modify lost ignore"):
+        moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
+        for line in (*moved, f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
             self._go_on = "run {} post no"
             self._lammps.command(f"run_style respa 2 {INNER} bond 1")
-        x[: scene.n, 0] = scene.q - self._origins
-        self._array("v")[: scene.n, 0] = scene.p / scene.m
+        self._where, self._elsewhere = scene.where, scene.elsewhere
+        x.reshape(-1)[self._where] = scene.q - self._origins
+        self._array("v").reshape(-1)[self._where] = scene.p / scene.m
         self._lammps.command("run 0 post no")
+        self._on_a_line = not method.generator
         self._x, self._v = self._array("x"), self._array("v")
 
     def _array(self, name: str) -> Any:
@@ -110,10 +120,10 @@ class _Run:
 
     def _build(self, scene: Scene, method: str) -> Floats:
         """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their positions."""
-        command, n = self._lammps.command, scene.n
+        command, n = self._lammps.command, scene.particles
         bonded, held = _shared_out(scene, method)
-        springs = list(_bonds(bonded, self._origins))
-        layers = _layered([t for t in held if isinstance(t, WallSpring)], self._origins)
+        springs = list(_bonds(scene, bonded, self._origins))
+        layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
         for line in SETTINGS.strip().splitlines():
@@ -125,8 +135,9 @@ class _Run:
         command(f"group mobile id 1:{n}")
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
         mass, x = self._array("rmass"), self._array("x")
-        mass[:n], mass[n:] = scene.m, 1.0
-        x[n:, 0] = anchors
+        mass[n:] = 1.0
+        mass[np.arange(n) if scene.places is None else scene.places // 3] = scene.m
+        x[n:] = np.reshape(anchors, (-1, 3))
         if springs:
             command("bond_style harmonic")
         for number, (a, b, k, rest, _) in enumerate(springs, 1):
@@ -137,30 +148,30 @@ class _Run:
             stiffness = self._array(f"d_k{number}")
             stiffness[:] = 0.0
             for i, (k, at) in layer.items():
-                stiffness[i], x[i, 0] = k, at
+                stiffness[i], x[i] = k, at
             command(f"variable k{number} atom d_k{number}")
             # it takes atoms to be at rest where they are now
             command(f"fix spring{number} mobile spring/self v_k{number}")
         for number, (a, b, k, rest, _) in enumerate(
-            _bonds([t for t in held if isinstance(t, Spring)], self._origins)
+            _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
         ):
             command(f"fix bond{number} all restrain bond {a + 1} {b + 1} {0.5 * k!r} {0.5 * k!r} {rest!r}")
         return np.asarray(x)
 
     def _pull(self, scene: Scene) -> None:
-        n, force = scene.n, scene.system.force
-        still = np.zeros(n)
+        where, force = scene.where, scene.system.force
+        still = np.zeros(scene.n)
 
         def pull(_: Any, step: int, atoms: int, tags: Any, x: Floats, f: Floats) -> None:
             self.force_calls += 1
-            f[:n, 0] = force(x[:n, 0], still)
+            f.reshape(-1)[where] = force(x.reshape(-1)[where], still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
         self._lammps.set_fix_external_callback("pull", pull, None)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
-        command, n = self._lammps.command, q.shape[1]
-        x, v = self._x[:n, 0], self._v[:n, 0]
+        command, where = self._lammps.command, self._where
+        x, v = self._x.reshape(-1), self._v.reshape(-1)
         whole, rest = divmod(every, ATTENTIVE)
         calls = [self._go_on.format(steps) for steps in (*[ATTENTIVE] * whole, rest) if steps]
         with np.errstate(over="ignore", invalid="ignore"):
@@ -170,10 +181,27 @@ class _Run:
                         command(call)
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
-                q[row] = x + self._origins
-                p[row] = v * self._m
-        self.off_axis = max(self.off_axis, float(np.max(np.abs(self._x[:, 1:]))))
+                q[row] = x[where] + self._origins
+                p[row] = v[where] * self._m
+        if self._on_a_line:
+            self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
         self.force_calls += every * len(q) * self._each
+
+
+def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
+    """The fixes that move atoms with noise; in units lj the Boltzmann constant is 1."""
+    assert scene.bath is not None
+    given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r} {seed}"
+    if method.name == "langevin":
+        return ["fix move mobile nve", f"fix bath mobile langevin {given}"]
+    _, number, *half = method.scheme.split("-")
+    more = ""
+    if number == "vii":
+        # it takes the decay and sets the step by it: the one that belongs to the scene's step
+        x = np.asarray(scene.bath.friction * scene.step)
+        more = f" {float(GJ['vii'](x))!r}"
+    velocity = "vhalf" if half else "vfull"
+    return [f"fix move mobile gjf {given} vel {velocity} method {list(GJ).index(number) + 1}{more}"]
 
 
 def _shared_out(scene: Scene, method: str) -> tuple[list[Term], list[Term]]:
@@ -182,35 +210,35 @@ def _shared_out(scene: Scene, method: str) -> tuple[list[Term], list[Term]]:
         return [t for t in scene.terms if t.fast], [t for t in scene.terms if not t.fast]
     if method == "external":
         return [], []
-    return (list(scene.terms), []) if method == "bond" else ([], list(scene.terms))
+    return (list(scene.terms), []) if method != "spring-self" else ([], list(scene.terms))
 
 
-def _bonds(tied: list[Term], origins: Floats) -> Iterator[tuple[int, int, float, float, float | None]]:
+def _bonds(
+    scene: Scene, tied: list[Term], origins: Floats
+) -> Iterator[tuple[int, int, float, float, tuple[float, ...] | None]]:
     """Bonds as their ends, k, rest length, and where an end that is an anchor of its own stands."""
-    anchors = len(origins)
+    anchors = scene.particles
     for term in tied:
         if isinstance(term, WallSpring):
-            for i, k, at in zip(
-                term.i.tolist(), term.k.tolist(), (term.at - origins[term.i]).tolist(), strict=True
-            ):
+            for (i,), k, at in bonds.joints(scene, term, origins):
                 yield anchors, i, k, 0.0, at
                 anchors += 1
         elif isinstance(term, Spring):
-            rest = bonds.lengths(term, origins).tolist()
-            for a, b, k, length in zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), rest, strict=True):
+            for (a, b), k, length in bonds.joints(scene, term, origins):
                 yield a, b, k, length, None
 
 
-def _layered(terms: list[WallSpring], origins: Floats) -> list[dict[int, tuple[float, float]]]:
+def _layered(
+    scene: Scene, terms: list[WallSpring], origins: Floats
+) -> list[dict[int, tuple[float, tuple[float, ...]]]]:
     """Springs to walls as k and rest point by particle, one of each particle in a layer."""
-    layers: list[dict[int, tuple[float, float]]] = []
+    layers: list[dict[int, tuple[float, tuple[float, ...]]]] = []
     for term in terms:
-        at = term.at - origins[term.i]
-        for i, k, x in zip(term.i.tolist(), term.k.tolist(), at.tolist(), strict=True):
+        for (i,), k, at in bonds.joints(scene, term, origins):
             free = next((layer for layer in layers if i not in layer), None)
             if free is None:
                 layers.append(free := {})
-            free[i] = (k, x)
+            free[i] = (k, at)
     return layers
 
 
@@ -229,8 +257,22 @@ ENGINE = Engine(
             SPRINGS, Need.FAST_SPRINGS,
         ),
     ),
+    thermostats=named(
+        thermostat(
+            "langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic", _DRAWS, SPRINGS
+        ),
+        *(
+            thermostat(
+                f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity", _DRAWS,
+                SPRINGS, default=i == 1,
+            )
+            for i, number in enumerate(GJ, 1)
+            for half, said in (("", "on-site"), ("-half", "half-step"))
+        ),
+    ),
     start=_Run,
     version=version,
     step_seconds=1e-5,
+    any_axis=True,
     squares_lengths=True,
 )  # fmt: skip

@@ -173,8 +173,10 @@ ENGINE = Engine(
     extra="mujoco",
     methods=named(
         by_name("joint-spring", "semi-implicit-euler", "joint stiffness, integrator Euler", SPRINGS),
-        by_name("joint-spring-implicit", "semi-implicit-euler", "joint stiffness, implicit", SPRINGS),
-        by_name("joint-spring-implicitfast", "semi-implicit-euler", "joint stiffness, implicitfast", SPRINGS),
+        by_name("joint-spring-implicit", "semi-implicit-euler", "joint stiffness, implicit", SPRINGS,
+            note="differs from Euler by velocity-dependent forces only"),
+        by_name("joint-spring-implicitfast", "semi-implicit-euler", "joint stiffness, implicitfast", SPRINGS,
+            note="differs from Euler by velocity-dependent forces only"),
         by_name("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
         by_name("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
         by_name(
@@ -194,8 +196,8 @@ ENGINE = Engine(
         by_name("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
         by_name("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),
         by_name(
-            "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE
-        ),
+            "motor-frame-skip-5", "force-held-5", "force by a motor, held for 5 substeps of h/5", EVERY_FORCE,
+            note="documented: a control is held for the whole call; mujoco#1891"),
     ),
     start=_Steps,
     version=version_of("mujoco"),

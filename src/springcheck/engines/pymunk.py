@@ -77,7 +77,13 @@ ENGINE = Engine(
     distribution="pymunk",
     extra="pymunk",
     methods=named(
-        by_name("force", "explicit-euler", "Body.force, set before each step", EVERY_FORCE),
+        by_name(
+            "force",
+            "explicit-euler",
+            "Body.force, set before each step",
+            EVERY_FORCE,
+            note="a force set before a step acts after the positions have moved",
+        ),
         by_name(
             "damped-spring",
             "semi-implicit-euler-drift-kick",

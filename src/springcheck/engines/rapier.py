@@ -70,7 +70,13 @@ ENGINE = Engine(
     distribution="rapier3d",
     extra="rapier",
     methods=named(
-        by_name("force", "force-held-4", "RigidBody.add_force before each step of 4 substeps", EVERY_FORCE),
+        by_name(
+            "force",
+            "force-held-4",
+            "RigidBody.add_force before each step of 4 substeps",
+            EVERY_FORCE,
+            note="documented: a force is held over the substeps",
+        ),
         by_name(
             "spring-joint",
             "implicit-euler-4",

@@ -100,7 +100,8 @@ ENGINE = Engine(
     extra="rebound",
     methods=named(
         by_name("leapfrog", "position-verlet", "additional_forces, integrator leapfrog", EVERY_POTENTIAL),
-        by_name("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0", EVERY_POTENTIAL),
+        by_name("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0", EVERY_POTENTIAL,
+            note="without gravity WHFast is a drift-kick-drift"),
         by_name(
             "ias15", "rebound-ias15", "additional_forces, integrator IAS15, Aarseth's step", EVERY_POTENTIAL,
             adaptive=True,

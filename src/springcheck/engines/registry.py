@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from hashlib import sha256
@@ -12,10 +14,11 @@ from pathlib import Path
 from types import ModuleType
 
 import springcheck
-from springcheck import schemes
-from springcheck.engines.contract import Engine, Method
+from springcheck import interrupts, schemes
+from springcheck.engines.contract import Engine, Method, Stopped
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
+from springcheck.thermal import THERMOSTATS
 
 GROUP = "springcheck.engines"
 """The group of entry points by which the engines of other packages are found."""
@@ -97,11 +100,34 @@ def _look(name: str) -> _Found | None:
 def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
     """The engine that `load` imports, or why there is none, whatever the code of others raises."""
     try:
-        return _checked(load(), name)
+        with foreign(place, f"{place} cannot be loaded"):
+            return _checked(load(), name)
     except SpringcheckError as error:
         return str(error)
-    except (Exception, SystemExit) as error:
-        return f"{place} cannot be loaded: {told(error)}"
+
+
+@contextmanager
+def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
+    """Code of others, known by this name, runs in here: whatever it raises is a MethodError "`what`: why".
+
+    So is what it did before, where it ended the program and this is the next one (`interrupts.supervised`).
+    """
+    before = interrupts.ended_by(name)
+    if before:
+        raise MethodError(f"{what}: {before}")
+    process = os.getpid()
+    interrupts.calling(name)
+    try:
+        yield
+    except (SpringcheckError, Stopped, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise MethodError(f"{what}: {told(error, file)}") from error
+    finally:
+        if os.getpid() != process:
+            # the copy that a fork in there has made is not the program
+            os._exit(1)
+        interrupts.calling("")
 
 
 def _checked(found: object, name: str = "") -> Engine:
@@ -119,11 +145,15 @@ def _checked(found: object, name: str = "") -> Engine:
         raise MethodError("it has no methods")
     for scheme in found.schemes:
         schemes.bring(scheme)
-    for key, one in found.methods.items():
+    for key, one in (*found.methods.items(), *found.thermostats.items()):
         if not isinstance(one, Method) or one.name != key:
             raise MethodError(f"its method {key!r} must be a springcheck.engines.Method of this name")
+        if one.generator:
+            if one.scheme not in THERMOSTATS:
+                raise MethodError(f"the scheme {one.scheme!r} of its thermostat {key!r} is not known")
+            continue
         scheme = schemes.scheme(one.scheme)
-        if one.adaptive and scheme.one_step:
+        if one.adaptive and scheme.has("one-step"):
             raise MethodError(f"its method {key!r} is adaptive, but {scheme.title} has a fixed step")
     return found
 
@@ -219,8 +249,6 @@ def module_of(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise MethodError(f"{path} is not a Python file: its name must end in .py")
     module = importlib.util.module_from_spec(spec)
-    try:
+    with foreign(str(path), f"{path} cannot be imported", str(path)):
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        raise MethodError(f"{path} cannot be imported: {told(error, path)}") from error
     return module

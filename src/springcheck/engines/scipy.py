@@ -115,4 +115,5 @@ ENGINE = Engine(
     start=_Solver,
     version=version_of("scipy"),
     step_seconds=1e-4,
+    any_axis=True,
 )

@@ -15,7 +15,7 @@ from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 
-FEWEST, LONG = 3, 8
+FEWEST_MASSES, LONG = 3, 8
 """Particles from which a scene has modes worth drawing, and from which its wave is drawn as an image."""
 
 MODES = 3
@@ -37,7 +37,7 @@ BLOCKS = 100
 def pictures(runs: Runs, exact: Exact) -> dict[str, Figure]:
     """The figures of a chain by name, none where a scene is no linear chain of at least three."""
     scene, system = runs.scene, runs.scene.system
-    if scene.n < FEWEST or system.is_separate or not system.has_modes:
+    if scene.n < FEWEST_MASSES or system.is_separate or not system.has_modes:
         return {}
     out = {"modes": _modes(runs, exact)}
     if scene.n >= LONG and exact.known:

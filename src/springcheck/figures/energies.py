@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,6 +26,9 @@ DECADES = 100.0
 
 LEAST = 1e-4
 """Of the initial energy, what the logarithmic scale goes down to."""
+
+CHANGED, MOST_FINDINGS = 0.05, 3
+"""Logarithm of an energy over that of the start from which it has changed; schemes that a title names."""
 
 FLOOR = 2.0**-53
 """Relative differences below this are none: they stand on the lower edge."""
@@ -73,9 +76,27 @@ def energy(runs: Runs, exact: Exact) -> Figure:
     lower.set_ylabel(f"|energy - {'exact' if damped else 'initial'}| / {of}")
     lower.set_xlabel(with_unit("time t", t_unit))
     lower.ticklabel_format(axis="x", useOffset=False)
-    overlay.heading(figure, f"{scene.title}: energy")
+    said = [] if scene.system.is_damped else _findings(runs, found)
+    overlay.heading(figure, f"{scene.title}: energy" + "".join(f"; {one}" for one in said[:MOST_FINDINGS]))
     runs.legend(figure, truth=true is not None)
     return figure
+
+
+def _findings(runs: Runs, found: Mapping[str, Floats]) -> list[str]:
+    """Which schemes gain or lose energy in every step alike, and how much."""
+    said = []
+    for group in runs.groups:
+        x = found[group.members[0].label]
+        steps = (len(x) - 1) * group.members[0].every
+        middle = len(x) // 2
+        if group.failed or middle < 2 or not (np.isfinite(x[-1]) and min(x[0], x[middle], x[-1]) > 0):
+            continue
+        rate, half = (np.log(x[j] / x[0]) / j for j in (len(x) - 1, middle))
+        # what only wavers does not change alike in both halves
+        if abs(rate) * (len(x) - 1) > CHANGED and abs(half - rate) < abs(rate) / 4:
+            each = 100 * abs(np.expm1(np.log(x[-1] / x[0]) / steps))
+            said.append(f"{group.title} {'gains' if rate > 0 else 'loses'} {each:.2g} % a step")
+    return said
 
 
 def _scale(axes: Axes, found: Sequence[Floats], true: Floats | None) -> Frame:
@@ -110,7 +131,7 @@ def _decades(axes: Axes, runs: Runs, pick: Callable[[Trajectory], Floats]) -> No
         y = found[run.label]
         end = _beyond(y, high)
         last = len(y) if end is None else end + 1
-        return dt * run.t[1:last], np.clip(y[1:last], low, high * overlay.FAR)
+        return dt * run.t[1:last], np.clip(y[1:last], low, high * overlay.FAR_OFF)
 
     runs.draw(axes, shown)
     axes.set_yscale("log")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 from springcheck.errors import StoreError
@@ -18,18 +19,27 @@ def folder_of(path: Path) -> Path:
     return Path("figures", path.stem)
 
 
-def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
-    """Put figures of a store into a folder; StoreError where that would replace any other file."""
+def look(names: Iterable[str], folder: Path, path: Path) -> None:
+    """StoreError where figures of a store under these names would replace any other file in a folder."""
     mine = str(path.absolute())
     known = _known(folder)
-    content = {one.name: one.read_bytes() for one in drawn}
-    for name, figure in content.items():
+    for name in names:
         target = folder / name
         whose, *old = known.get(name, [mine])
         if target.is_symlink() or (target.exists() and _sha256(target.read_bytes()) not in old):
             raise StoreError(f"{target} is no figure of ours as it was drawn: move it away")
         if target.exists() and whose != mine:
             raise StoreError(f"{target} shows {whose}: name another folder with -o")
+
+
+def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
+    """Put figures of a store into a folder; StoreError where that would replace any other file."""
+    look([one.name for one in drawn], folder, path)
+    mine = str(path.absolute())
+    known = _known(folder)
+    content = {one.name: one.read_bytes() for one in drawn}
+    for name, figure in content.items():
+        _, *old = known.get(name, [mine])
         # the last one too: whoever is killed in between may find it in its place
         known[name] = [mine, *old[-1:], _sha256(figure)]
     try:

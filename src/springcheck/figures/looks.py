@@ -91,6 +91,12 @@ LOOKS = {
     "force-held-10": Look(_OLIVE, DASH_DOT),
     "force-held-rk4": Look(_OLIVE, DOTTED),
 }
+FAILED = "#DD0033"
+"""Of whatever is wrong, in figures and page."""
+
+FAILED_ON_SCREEN = (FAILED, "#FF5C7A", 0)
+"""The same on white and on black, and the number of its line."""
+
 _REST = tuple(Look(c, line) for line in (TWO_DOTS, SPARSE) for c in (_OLIVE, _WINE, _SKY, _PINK, _RED, _BLUE))
 
 MARKS = {
@@ -106,14 +112,20 @@ MARKS = {
     "box2d": ("h", "\u2b21"),
     "rapier": ("X", "\u2716"),
     "drake": ("P", "\u271a"),
+    "fault": ("H", "\u2b22"),
 }
 """Of each engine: the mark on a line, and the character that stands for it in a legend."""
-_OTHER_MARKS = (("H", "\u2b22"), ("d", "\u2b26"))
+_OTHER_MARKS = (("8", "\u2b23"), ("d", "\u29eb"))
 
 
 def look(scheme: str) -> Look:
     """Colour and line of a scheme, of any name, the same in every figure."""
     return LOOKS.get(scheme) or _REST[zlib.crc32(scheme.encode()) % len(_REST)]
+
+
+def failed(j: int) -> Look:
+    """Colour and line of the j-th run that a verdict rejects: red, whatever its scheme."""
+    return Look(FAILED, LINES[j % len(LINES)])
 
 
 def mark(engine: str) -> tuple[str, str]:

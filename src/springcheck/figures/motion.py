@@ -16,7 +16,7 @@ Motion = tuple[Floats, Floats, Floats]
 
 SMOOTH = 1500
 """Points of a smooth line."""
-FEWEST, MOST_NUMBERS = 16, 1 << 21
+FEWEST_POINTS, MOST_NUMBERS = 16, 1 << 21
 """Points of a line of very many particles, and positions of all of them."""
 SPLIT, CLOSE = 64, 20
 """Parts of the distance of its points, and distances from its start within which there are more."""
@@ -34,7 +34,7 @@ def smooth(scene: Scene, first: float, last: float) -> Motion | None:
         return None
     begin, end = (round(x / abs(scene.step)) for x in (first, last))
     # whole parts of steps, or whole steps; closer where a stiff motion may decay
-    points = max(FEWEST, min(SMOOTH, MOST_NUMBERS // scene.n))
+    points = max(FEWEST_POINTS, min(SMOOTH, MOST_NUMBERS // scene.n))
     finer = SPLIT * max(1, -(-points // max(1, end - begin)))
     even = np.linspace(begin * finer, end * finer, points + 1)
     close = begin * finer + np.geomspace(1, CLOSE * max(1, even[1] - even[0]), min(CLOSE * 10, points))

@@ -1,9 +1,12 @@
-"""Runs laid over each other: a line a scheme, marks of its engines, one legend, what explodes clipped."""
+"""Runs laid over each other: a line a motion, marks of its engines, one legend, what explodes clipped.
+
+Right engines of one scheme move alike and share a line; one that failed has its own, in red and on top.
+"""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,14 +36,17 @@ picture, and one that does not grow."""
 GROWS = 1.3
 """Ratio of the second half's reach to the first half's from which a run grows."""
 
-FAR = 1e6
+FAR_OFF = 1e6
 """Half widths of a picture that a line is drawn beyond it: far enough to leave it in its direction."""
 
 ROUNDINGS = 1e-9
 """Relative difference of values below which a picture shows them as equal."""
 
-MARKS = 11
-"""Of each run on a picture."""
+MOST_MARKS, MARKS, FEWEST_MARKS = 11, 66, 4
+"""Of a run, on a picture, and of each run however many there are."""
+
+GOLDEN = 0.618
+"""Multiples of it, modulo 1, stand far from one another, however many: there runs have their marks."""
 
 MOST_LEAVING = 4
 """Schemes that are named where they leave a picture."""
@@ -48,30 +54,50 @@ MOST_LEAVING = 4
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Runs of one scheme: they lie on one another, so they share a line."""
+    """Runs of one scheme that lie on one another, so that they share a line; or one that failed."""
 
     scheme: str
     members: tuple[Trajectory, ...]
+    look: looks.Look
+    failed: bool = False
 
     @property
     def title(self) -> str:
-        """Of its scheme."""
-        return looks.title(self.scheme)
+        """Of its scheme, or of the run that is wrong."""
+        return f"FAILED: {self.members[0].label}" if self.failed else looks.title(self.scheme)
+
+    @property
+    def legend(self) -> str:
+        """Its title, and whose marks are on its line."""
+        if self.failed:
+            mark = looks.mark(looks.engine(self.members[0].label))[1]
+            return f"{self.title}\n{mark} {textwrap.fill('is not ' + looks.title(self.scheme), 30)}"
+        return f"{self.title}\n{looks.members([run.label for run in self.members])}"
 
 
 Pick = Callable[[Trajectory], tuple[Floats, Floats]]
 
 
 class Runs:
-    """Trajectories of a scene by their schemes; what has but its start is left out."""
+    """Trajectories of a scene by their motions; what has but its start is left out.
 
-    def __init__(self, scene: Scene, runs: Mapping[str, Trajectory]) -> None:
+    `failed`: labels of those that some verdict rejects.
+    """
+
+    def __init__(self, scene: Scene, runs: Mapping[str, Trajectory], failed: Collection[str] = ()) -> None:
         self.scene = scene
         found: dict[str, list[Trajectory]] = {}
-        for run in runs.values():
-            if len(run.t) > 1:
+        wrong: list[Trajectory] = []
+        for label, run in runs.items():
+            if len(run.t) > 1 and label in failed:
+                wrong.append(run)
+            elif len(run.t) > 1:
                 found.setdefault(run.scheme, []).append(run)
-        self.groups = [Group(name, tuple(members)) for name, members in found.items()]
+        self.groups = [Group(name, tuple(members), looks.look(name)) for name, members in found.items()]
+        # drawn last: on top of all that is right
+        self.groups += [
+            Group(run.scheme, (run,), looks.failed(j), failed=True) for j, run in enumerate(wrong)
+        ]
         self.every = [run for group in self.groups for run in group.members]
 
     @property
@@ -86,21 +112,24 @@ class Runs:
         return looks.prefixed(last, units(self.scene).t)
 
     def draw(self, axes: Axes, pick: Pick, *, joined: bool = True, faint: bool = False) -> None:
-        """The first run of each scheme as a line (`joined`) or dots, and marks of every engine.
+        """The first run of each motion as a line (`joined`) or dots, and marks of every engine.
 
         `faint`: lines between the dots that are seen to be none of the motion.
         """
+        drawn, most = 0, min(MOST_MARKS, max(FEWEST_MARKS, MARKS // len(self.every)))
         for group in self.groups:
-            look = looks.look(group.scheme)
+            color, high = group.look.color, int(group.failed)
             for j, run in enumerate(group.members):
                 x, y = pick(run)
+                line: dict[str, Any] = {"color": color, "label": group.title, "zorder": 2 + 1.2 * high}
                 if j == 0 and joined:
-                    axes.plot(x, y, color=look.color, linestyle=look.linestyle, label=group.title, zorder=2)
+                    axes.plot(x, y, linestyle=group.look.linestyle, linewidth=1.3 + 0.7 * high, **line)
                 elif j == 0:
-                    axes.plot(x, y, ".", color=look.color, markersize=3, label=group.title, zorder=2)
+                    axes.plot(x, y, ".", markersize=3 + 2 * high, **line)
                     if faint:
-                        axes.plot(x, y, color=look.color, linewidth=0.7, alpha=0.4, zorder=1.5)
-                _marks(axes, x, y, look.color, j, run.label)
+                        axes.plot(x, y, color=color, linewidth=0.7, alpha=0.4, zorder=1.5)
+                _marks(axes, x, y, group, drawn * GOLDEN % 1, run.label, most)
+                drawn += 1
 
     def note(self, axes: Axes, when: Callable[[Trajectory], int | None]) -> None:
         """Say above a picture which schemes leave it for good, and when: at which frame, None where never."""
@@ -121,13 +150,16 @@ class Runs:
     def legend(self, figure: Figure, *extra: Line2D, truth: bool = False) -> None:
         """One entry for each scheme, with the marks of its engines; first the `truth`, and `extra` lines."""
         first = [Line2D([], [], **{name: TRUTH[name] for name in ("color", "linewidth", "label")})]
-        labels = {x.scheme: [run.label for run in x.members] for x in self.groups}
-        scheme_legend(figure, labels, *(first if truth else []), *extra)
+        entries = [(group.look, group.legend) for group in self.groups]
+        # what is wrong comes first
+        entries.sort(key=lambda entry: not entry[1].startswith("FAILED"))
+        _legend(figure, entries, *(first if truth else []), *extra)
 
 
-def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> None:
-    apart = max(1, len(x) // MARKS)
-    first = (j * apart * 2) // 5 % max(1, apart)
+def _marks(axes: Axes, x: Floats, y: Floats, group: Group, share: float, label: str, most: int) -> None:
+    """Marks of an engine, at the `most`; each run's a share of their distance behind those of the first."""
+    apart = max(1, len(x) // most)
+    first = round(share * apart) % apart
     axes.plot(
         x[first::apart],
         y[first::apart],
@@ -135,22 +167,26 @@ def _marks(axes: Axes, x: Floats, y: Floats, color: str, j: int, label: str) -> 
         marker=looks.mark(looks.engine(label))[0],
         markersize=4.2,
         markerfacecolor="white",
-        markeredgecolor=color,
+        markeredgecolor=group.look.color,
         markeredgewidth=0.9,
         label=label,
-        zorder=3,
+        zorder=3 + group.failed,
     )
 
 
 def scheme_legend(figure: Figure, methods: Mapping[str, Sequence[str]], *extra: Line2D) -> None:
     """One entry for each scheme, with the marks of the engines of its methods; `extra` lines first."""
-    handles = list(extra)
-    for scheme, labels in methods.items():
-        look = looks.look(scheme)
-        label = f"{looks.title(scheme)}\n{looks.members(labels)}"
-        handles.append(Line2D([], [], color=look.color, linestyle=look.linestyle, label=label))
+    entries = [
+        (looks.look(scheme), f"{looks.title(scheme)}\n{looks.members(labels)}")
+        for scheme, labels in methods.items()
+    ]
+    _legend(figure, entries, *extra)
+
+
+def _legend(figure: Figure, entries: Sequence[tuple[looks.Look, str]], *extra: Line2D) -> None:
+    lines = [Line2D([], [], color=x.color, linestyle=x.linestyle, label=label) for x, label in entries]
     figure.legend(
-        handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
+        handles=[*extra, *lines], loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
     )
 
 
@@ -183,7 +219,7 @@ class Frame:
     def within(self, values: Floats) -> Floats:
         """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
         end = self.leaves(values)
-        near = np.clip(values, self.centre - FAR * self.half, self.centre + FAR * self.half)
+        near = np.clip(values, self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half)
         return near if end is None else np.where(np.arange(len(near)) <= end, near, np.nan)
 
 
@@ -236,7 +272,7 @@ def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
     u, v = (
         (np.asarray(one, np.longdouble) - its.centre) / its.half for one, its in ((x, a), (y, b))
     )  # fmt: skip
-    scale = np.maximum(1, np.maximum(np.abs(u), np.abs(v)) / FAR)
+    scale = np.maximum(1, np.maximum(np.abs(u), np.abs(v)) / FAR_OFF)
     return tuple(np.asarray(w / scale * its.half + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
 
 

@@ -33,8 +33,10 @@ SEPARATRIX = Line2D([], [], color="#666666", linewidth=0.9, linestyle=(0, (2, 2)
 _BEGIN = Line2D([], [], color="k", linestyle="none", marker="+", markersize=9, label="start")
 
 
-def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Figure:
-    """Momentum over position: a panel for each view."""
+def phase_portraits(
+    runs: Runs, shown: Sequence[View], truth: Motion | None, *, what: str = "phase portrait"
+) -> Figure:
+    """Momentum over position, or what else a view shows: a panel for each."""
     width, height = ((7.8, 0), (5.2, 0)) if len(shown) == 1 else ((4.9, 0), (3.4, 0.4))
     figure, grid, _ = overlay.panels(len(shown), 2, width, height)
     crossed = []
@@ -42,9 +44,11 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None) -> 
         crossed.append(_phase_portrait(axes, runs, view, truth))
         if len(shown) > 1:
             axes.set_title(view.title, fontsize=9, loc="left")
-        elif runs.scene.units == "reduced" and not view.turn:
+        if view.what == "path":
+            axes.set_aspect("equal", adjustable="box")
+        elif len(shown) == 1 and runs.scene.units == "reduced" and not view.turn:
             _equal(axes)
-    overlay.heading(figure, _title(runs.scene, "phase portrait", shown))
+    overlay.heading(figure, _title(runs.scene, what, shown))
     runs.legend(figure, *([SEPARATRIX] if any(crossed) else []), _BEGIN, truth=truth is not None)
     return figure
 

@@ -65,7 +65,6 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
         shown = "\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n"))
         if shown != text.get_text():
             text.set_text(shown)
-    safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -76,13 +75,18 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             for text in texts:
                 text.set_parse_math(False)
             drawn = _drawn(figure)
-        for ending, content in drawn.items():
-            path = folder / f"{safe}.{ending}"
-            files.put_bytes(content, path)
-            written.append(path)
+        for one in file_names(name):
+            files.put_bytes(drawn[one.rpartition(".")[2]], folder / one)
+            written.append(folder / one)
     except OSError as error:
         raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error
     return written
+
+
+def file_names(name: str) -> list[str]:
+    """The files that a figure of this name is saved as."""
+    safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
+    return [f"{safe}.{ending}" for ending in ("png", "svg")]
 
 
 def _drawn(figure: Figure) -> dict[str, bytes]:

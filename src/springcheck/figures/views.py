@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -127,6 +127,28 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
 
 
+def paths(scene: Scene) -> list[View]:
+    """The path of the first particle in each plane of axes along which it moves: one axis over the other."""
+    if scene.places is None:
+        return []
+    of_axis = {"xyz"[p % 3]: j for j, p in enumerate(scene.places.tolist()) if p < 3}
+    unit = units(scene).q
+
+    def view(x: str, y: str) -> View:
+        i, j = of_axis[x], of_axis[y]
+
+        def pick(q: Reals, p: Reals) -> State:
+            return np.asarray(q[:, i], np.float64), np.asarray(q[:, j], np.float64)
+
+        return View(
+            title=f"plane of {x} and {y}", what="path", x_name=f"position {x}", y_name=f"position {y}",
+            x_unit=unit, y_unit=unit, pick=pick,
+        )  # fmt: skip
+
+    found = [view(x, y) for x, y in ("xy", "yz", "xz") if x in of_axis and y in of_axis]
+    return [replace(one, title="") for one in found] if len(found) == 1 else found
+
+
 def _is_pair(scene: Scene) -> bool:
     """Whether two particles hold on to each other and to nothing else."""
     return scene.n == 2 and bool(scene.terms) and all(term.bodies == 2 for term in scene.terms)
@@ -152,7 +174,7 @@ def _single(scene: Scene, i: int) -> View:
         return np.asarray(part.system.energy(q, np.zeros_like(q)), np.float64)
 
     return View(
-        title=f"particle {i}" if scene.n > 1 else "",
+        title=f"particle {i}" if scene.places is None and scene.n > 1 else _place(scene, i),
         what="angle" if turn else x_name.split()[0],
         x_name="angle" if turn else x_name,
         y_name=y_name,
@@ -165,8 +187,16 @@ def _single(scene: Scene, i: int) -> View:
     )
 
 
+def _place(scene: Scene, i: int) -> str:
+    """Whose coordinate it is where particles move in space, "" where they do not."""
+    if scene.places is None:
+        return ""
+    particle, axis = divmod(int(scene.places[i]), 3)
+    return "xyz"[axis] if scene.particles == 1 else f"particle {particle}, {'xyz'[axis]}"
+
+
 def _only_cosine(part: Scene) -> bool:
-    held = [term for term in part.terms if term.is_potential]
+    held = [term for term in part.terms if term.kind == "potential"]
     return len(held) == 1 and isinstance(held[0], Cosine) and len(held[0]) == 1
 
 

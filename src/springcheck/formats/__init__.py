@@ -1,67 +1,229 @@
-"""Trajectories of others, told by what is in them, not by their names; the store opens those in HDF5."""
+"""Trajectories of others, told by what is in them, not by their names; the store opens those in HDF5.
+
+What our own code reads (texts, NPY, NPZ) is bounded as it is read; what a library reads is read by a process
+of its own (see `springcheck.store.apart`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import gzip
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+
+import numpy as np
 
 from springcheck import store
 from springcheck.errors import StoreError
+from springcheck.formats import libraries, molecular, numbers, tables
 from springcheck.formats.columns import ALONE, States, kind
-from springcheck.formats.molecular import read_ase, read_dcd, read_gro, read_lammps, read_trr, read_xtc
-from springcheck.formats.numbers import read_npy, read_npz, states_of
-from springcheck.formats.tables import read_table
+from springcheck.formats.numbers import states_of
+from springcheck.store import apart
 
-__all__ = ["States", "is_hdf5", "read", "read_hdf5"]
+__all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "read", "read_hdf5"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
+BEGINNING = 1 << 12
+"""Bytes of a file by which its format is recognised."""
 
 
-def _head(path: Path) -> bytes:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A format: how it is recognised by the beginning of a file, and read."""
+
+    name: str
+    recognise: Callable[[bytes, Path], bool]
+    read: Callable[[Path, list[str], float | None], States]
+    """Of a path, the names of columns, and the time step."""
+    library: bool = False
+    """Read by the code of others."""
+    text: bool = False
+    """Read line by line, gzipped or not."""
+
+
+def _starts(*with_: bytes) -> Callable[[bytes, Path], bool]:
+    return lambda head, path: head.startswith(with_)
+
+
+def _lines(head: bytes) -> tuple[bytes, bytes, bytes]:
+    first, second, third, *_ = [*head.split(b"\n", 3), b"", b"", b""]
+    return first, second, third
+
+
+FORMATS: tuple[Format, ...] = (
+    Format(
+        name="NPY",
+        recognise=_starts(b"\x93NUMPY"),
+        read=lambda path, columns, step: numbers.read_npy(path, columns),
+    ),
+    Format(
+        name=".xlsx",
+        recognise=lambda head, path: (
+            head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head or b"xl/" in head)
+        ),
+        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_excel"),
+        library=True,
+    ),
+    Format(
+        name="NPZ",
+        recognise=_starts(b"PK\x03\x04"),
+        read=lambda path, columns, step: numbers.read_npz(path, columns),
+    ),
+    Format(
+        name="Parquet",
+        recognise=_starts(b"PAR1"),
+        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_parquet"),
+        library=True,
+    ),
+    Format(
+        name="Feather",
+        recognise=_starts(b"ARROW1", b"FEA1"),
+        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_feather"),
+        library=True,
+    ),
+    Format(
+        name="MATLAB .mat",
+        recognise=_starts(b"MATLAB 5.0"),
+        read=lambda path, columns, step: libraries.read_mat(path, columns),
+        library=True,
+    ),
+    Format(
+        name="JSON",
+        recognise=lambda head, path: re.match(rb"\s*(\{|\[\s*\{)", head) is not None,
+        read=lambda path, columns, step: libraries.read_json(path, columns),
+        library=True,
+    ),
+    Format(
+        name="LAMMPS dump",
+        recognise=_starts(b"ITEM: "),
+        read=lambda path, columns, step: molecular.read_lammps(path, step),
+        text=True,
+    ),
+    Format(
+        name="LAMMPS log",
+        recognise=lambda head, path: re.search(rb"^LAMMPS \(", head, re.MULTILINE) is not None,
+        read=molecular.read_log,
+        text=True,
+    ),
+    Format(
+        name="DCD",
+        recognise=lambda head, path: head[4:8] == b"CORD",
+        read=lambda path, columns, step: libraries.read_dcd(path),
+        library=True,
+    ),
+    Format(
+        name="GROMACS .xtc",
+        recognise=_starts(b"\x00\x00\x07\xcb", b"\x00\x00\x07\xe7"),
+        read=lambda path, columns, step: libraries.read_xtc(path),
+        library=True,
+    ),
+    Format(
+        name=".trr",
+        recognise=_starts(b"\x00\x00\x07\xc9"),
+        read=lambda path, columns, step: libraries.read_trr(path),
+        library=True,
+    ),
+    Format(
+        name=".gro",
+        recognise=lambda head, path: ".gro" in path.suffixes,
+        read=lambda path, columns, step: molecular.read_gro(path, step),
+        text=True,
+    ),
+    Format(
+        name="Amber NetCDF",
+        recognise=_starts(b"CDF\x01", b"CDF\x02"),
+        read=lambda path, columns, step: libraries.read_amber(path),
+        library=True,
+    ),
+    Format(
+        name="ASE .traj",
+        recognise=_starts(b"- of Ulm"),
+        read=lambda path, columns, step: libraries.read_ase(path, step),
+        library=True,
+    ),
+    Format(
+        name="extended .xyz",
+        recognise=lambda head, path: _lines(head)[0].strip().isdigit() and b"Properties=" in _lines(head)[1],
+        read=lambda path, columns, step: libraries.read_ase(path, step),
+        library=True,
+    ),
+    Format(
+        name=".xyz",
+        recognise=lambda head, path: molecular.is_xyz(_lines(head)[0], _lines(head)[2]),
+        read=lambda path, columns, step: molecular.read_xyz(path, step),
+        text=True,
+    ),
+    Format(
+        name="text tables",
+        recognise=lambda head, path: True,
+        read=lambda path, columns, step: tables.read_table(path, columns),
+        text=True,
+    ),
+)
+"""In the order in which they are tried; text tables are what nothing else is."""
+
+BY_NAME = {one.name: one for one in FORMATS}
+KNOWN = f"read are HDF5, {', '.join(BY_NAME)}, texts gzipped too"
+
+
+def _beginning(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(8)
+            return file.read(BEGINNING)
     except OSError as error:
         raise StoreError(f"{path}: {error.strerror or error}") from error
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 does."""
-    return _head(path) == HDF5
+    """Whether a file begins as HDF5 does, perhaps after a block of another program's, as MATLAB's do."""
+    head = _beginning(path)
+    return any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))
 
 
 def read(
     path: Path, columns: Sequence[str] = (), step: float | None = None, *, alone: bool = False
 ) -> States:
-    """The states of a file that is no HDF5; `columns` names what has no names, as t, q, v.
+    """The states of a file that is no HDF5, of one of the `FORMATS`; `columns` names what has no names, as
+    t, q, v.
 
-    Text tables, NPY, NPZ, extended XYZ, ASE's .traj, LAMMPS dumps, DCD, GROMACS .gro, .trr and .xtc.
     `step` is the time step of files that count steps alone.  Raises StoreError, in one line, where it cannot
     be read, or lacks times, positions or, unless these may be `alone`, velocities.
     """
-    return _moving(path, _read(path, columns, step), alone=alone)
+    return _moving(path, _read(path, list(columns), step), alone=alone)
 
 
-def _read(path: Path, columns: Sequence[str], step: float | None) -> States:
-    head = _head(path)
+def _read(path: Path, columns: list[str], step: float | None) -> States:
+    head = _beginning(path)
     if not head:
         raise StoreError(f"{path}: is empty")
     try:
-        if head.startswith(b"\x93NUMPY"):
-            return read_npy(path, columns)
-        if head.startswith(b"PK\x03\x04"):
-            return read_npz(path, columns)
-        if head.startswith(b"ITEM: "):
-            return read_lammps(path, step)
-        if head.startswith((b"\x00\x00\x07\xcb", b"\x00\x00\x07\xe7")) or head[4:8] == b"CORD":
-            return read_dcd(path) if head[4:8] == b"CORD" else read_xtc(path, step)
-        if head.startswith(b"\x00\x00\x07\xc9"):
-            return read_trr(path, step)
-        if head.startswith(b"- of Ulm") or _is_extended_xyz(path):
-            return read_ase(path, step)
-        return read_gro(path, step) if path.suffix == ".gro" else read_table(path, columns)
-    except UnicodeDecodeError as error:
-        raise StoreError(f"{path}: is of no format that is known here") from error
+        zipped = head.startswith(b"\x1f\x8b")
+        if zipped:
+            with gzip.open(path) as file:
+                head = file.read(BEGINNING)
+        found = next(one for one in FORMATS if one.recognise(head, path) and (one.text or not zipped))
+        if not found.library:
+            return found.read(path, columns, step)
+        return _apart(found, path, columns, step)
+    except (UnicodeDecodeError, gzip.BadGzipFile, EOFError) as error:
+        raise StoreError(f"{path}: is of no format that is known here; {KNOWN}") from error
+
+
+def _apart(found: Format, path: Path, columns: list[str], step: float | None) -> States:
+    """What a library reads."""
+    given = (json.dumps(columns), "" if step is None else repr(step))
+    try:
+        said = apart.read(__name__, found.name, path, *given)
+    except apart.EndedError as error:
+        raise StoreError(f"{path}: is damaged, or no {found.name} file: reading it {error}") from error
+    if said.startswith(apart.REFUSED):
+        raise StoreError(said.removeprefix(apart.REFUSED).decode("utf-8", "backslashreplace"))
+    with np.load(BytesIO(said), allow_pickle=False) as arrays:
+        known = {name: arrays.get(name) for name in ("p", "v", "mass")}
+        return States(t=arrays["t"], q=arrays["q"], roundoff=float(arrays["roundoff"]), **known)
 
 
 def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -> dict[str, States]:
@@ -79,13 +241,13 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -
         }
         names = [x.replace("=/", "=").removeprefix("/") for x in columns]
         return {path.name: _moving(path, states_of(path, flat, names), alone=alone)}
-    groups = store.read_arrays(path, lambda place: kind(place.rpartition("/")[2]) is not None)
+    groups = store.read_arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None)
     made: dict[str, States] = {}
     said = StoreError(
         f"{path} has no /particles as H5MD has, and no datasets of times, positions and velocities by their "
         "names; give these, as --columns t=clock,q=run/x,v=run/dx"
     )
-    for name, arrays in groups.items():
+    for name, arrays in _by_trajectory(groups).items():
         try:
             made[name or path.name] = _moving(path, states_of(path, arrays), alone=alone)
         except StoreError as error:
@@ -95,13 +257,22 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -
     return made
 
 
+def _name_of(place: str) -> str:
+    """A dataset's place; Octave has each in a group of its name, as ``t/value``."""
+    return place.removesuffix("/value")
+
+
+def _by_trajectory(groups: dict[str, dict[str, object]]) -> dict[str, dict[str, object]]:
+    """Arrays by the group that they belong to, and by their names in it."""
+    found: dict[str, dict[str, object]] = {}
+    for group, arrays in groups.items():
+        for name, values in arrays.items():
+            whose, _, called = _name_of(f"{group}/{name}".strip("/")).rpartition("/")
+            found.setdefault(whose, {})[called] = values
+    return found
+
+
 def _moving(path: Path, found: States, *, alone: bool) -> States:
     if found.p is None and found.v is None and not alone:
         raise StoreError(f"{path}: holds no momenta or velocities; {ALONE}")
     return found
-
-
-def _is_extended_xyz(path: Path) -> bool:
-    with path.open("rb") as file:
-        first, second = file.readline(200), file.readline(2000)
-    return first.strip().isdigit() and b"Properties=" in second

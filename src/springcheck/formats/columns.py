@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
-from springcheck.errors import StoreError
-from springcheck.physics.arrays import Floats
+from springcheck.errors import StoreError, plain
 
+Floats: TypeAlias = npt.NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, Floats]
 """Columns (f,) or (f, n) by name."""
 
@@ -26,6 +27,9 @@ NAMES: dict[Kind, str] = {
     "m": r"m|mass|masses",
 }
 
+
+LONGEST_NAME = 200
+"""Characters of a column's name; patterns take the square of it."""
 
 ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
 """What is said of a file that could not tell schemes apart, which share one recurrence of the positions."""
@@ -47,9 +51,11 @@ class States:
 
 def kind(name: str) -> Kind | None:
     """What a column of this name holds: units in brackets, numbers and case do not count."""
-    plain = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
-    plain = re.sub(r"[\s_.]*\d*$", "", plain)
-    found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, plain)]
+    if len(name) > LONGEST_NAME:
+        return None
+    bare = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
+    bare = re.sub(r"[\s_.]*\d*$", "", bare)
+    found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None
 
 
@@ -88,13 +94,17 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
 def listed(names: Iterable[str]) -> str:
     """Names between commas, the first eight of them."""
     names = list(names)
-    return ", ".join(names[:8]) + (" ..." if len(names) > 8 else "") if names else "none"
+    return (
+        ", ".join(plain(name, 40) for name in names[:8]) + (" ..." if len(names) > 8 else "")
+        if names
+        else "none"
+    )
 
 
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:
     """The columns of a table (f, c) under names; StoreError where the numbers of the two differ."""
     if len(names) != values.shape[1]:
-        raise StoreError(f"{path}: {values.shape[1]} columns and {len(names)} names: {', '.join(names)}")
+        raise StoreError(f"{path}: {values.shape[1]} columns and {len(names)} names: {listed(names)}")
     out: dict[str, Floats] = {}
     for i, name in enumerate(names):
         # columns may share a name, as the q of several particles do

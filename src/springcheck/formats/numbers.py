@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
@@ -12,15 +13,29 @@ import numpy as np
 
 from springcheck.errors import StoreError, nearest
 from springcheck.formats.columns import States, kind, listed, named, split
+from springcheck.formats.lines import MOST_NUMBERS
+
+LARGEST = 16 * MOST_NUMBERS
+"""Bytes of all arrays of a file, unpacked."""
 
 
 def _load(path: Path) -> Any:
+    most = LARGEST
     try:
-        # NumPy leaves a damaged file open; this one is in memory
-        found = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
-        return dict(found) if hasattr(found, "files") else found
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as packed:
+                found = sum(member.file_size for member in packed.infolist())
+        else:
+            found = path.stat().st_size
+        if found <= most:
+            # NumPy leaves a damaged file open; this one is in memory
+            loaded = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
+            return dict(loaded) if hasattr(loaded, "files") else loaded
     except Exception as error:
         raise StoreError(f"{path}: NumPy cannot read it: {' '.join(str(error).split())[:200]}") from error
+    raise StoreError(
+        f"{path}: {found / 1e6:.0f} MB of arrays, {most / 1e6:.0f} can be read: keep fewer frames"
+    )
 
 
 def _roundoff(arrays: Sequence[Any]) -> float:
@@ -36,6 +51,7 @@ def read_npz(path: Path, names: Sequence[str] = ()) -> States:
 def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) -> States:
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
+    Where MATLAB and Octave have written them, times are (1, f) or (f, 1), and rows may be columns.
     `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``.
     """
     arrays = _chosen(path, arrays, names)
@@ -44,7 +60,11 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
         for name, a in arrays.items()
         if np.issubdtype(a.dtype, np.floating) or np.issubdtype(a.dtype, np.integer)
     }
+    numbers = {name: _turned(a) if kind(name) == "t" else a for name, a in numbers.items()}
     rows = next((len(a) for name, a in numbers.items() if kind(name) == "t" and a.ndim == 1), 0)
+    numbers = {
+        name: a.T if a.ndim == 2 and len(a) != rows == a.shape[1] else a for name, a in numbers.items()
+    }
     columns = {
         name: np.asarray(a, np.float64).reshape(rows, -1)
         for name, a in numbers.items()
@@ -53,6 +73,11 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     masses = [np.atleast_1d(np.asarray(a, np.float64)) for name, a in numbers.items() if kind(name) == "m"]
     states = split(path, columns, _roundoff([numbers[name] for name in columns]))
     return replace(states, mass=masses[0].ravel()) if masses else states
+
+
+def _turned(a: Any) -> Any:
+    """A row or column of numbers as an array of one dimension."""
+    return a.ravel() if a.ndim == 2 and 1 in a.shape else a
 
 
 def _chosen(path: Path, arrays: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:

@@ -3,54 +3,67 @@
 from __future__ import annotations
 
 import re
+from array import array
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import States, kind, named, split
+from springcheck.formats.columns import Floats, States, kind, named, split
+from springcheck.formats.lines import Lines, number
 
-LARGEST = 1 << 30
-"""Bytes of a text file that are read at once."""
+SHOWN = 1000
+"""Rows whose digits are looked at."""
 
 
 def read_table(path: Path, names: Sequence[str]) -> States:
     """The states of a text table; the last line before the numbers names the columns."""
-    if path.stat().st_size > LARGEST:
-        raise StoreError(f"{path}: is larger than {LARGEST >> 30} GiB of text; store it in HDF5 or NPZ")
     header: list[str] = []
-    rows: list[list[str]] = []
-    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
-        cells = _cells(line)
-        if not cells or (line.lstrip().startswith("#") and rows):
-            continue
-        if all(_is_number(cell) for cell in cells):
-            if rows and len(cells) != len(rows[0]):
-                raise StoreError(
-                    f"{path}, line {number}: {len(cells)} numbers where there were {len(rows[0])}"
-                )
-            rows.append(cells)
-        elif rows:
-            wrong = next(cell for cell in cells if not _is_number(cell))
-            raise StoreError(f"{path}, line {number}: {wrong[:40]!r} is no number")
-        else:
-            header = cells
-    if not rows:
+    first: list[list[str]] = []
+    numbers = array("d")
+    width = 0
+    with Lines(path) as lines:
+        for line in lines:
+            cells = _cells(line)
+            if not cells or (width and line.lstrip().startswith("#")):
+                continue
+            row = _numbers(cells)
+            if row is None:
+                if width:
+                    wrong = next(cell for cell in cells if _numbers([cell]) is None)
+                    raise lines.wrong(f"{wrong[:40]!r} is no number")
+                header = cells
+                continue
+            width = width or len(row)
+            if len(row) != width:
+                raise lines.wrong(f"{len(row)} numbers where there were {width}")
+            lines.count(width)
+            numbers.extend(row)
+            if len(first) < SHOWN:
+                first.append(cells)
+    if not width:
         raise StoreError(f"{path}: holds no row of numbers")
-    if not names and len(header) == len(rows[0]) - 1 and _are_counted(rows):
+    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, list(names), header)
+
+
+def of_rows(
+    path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str]
+) -> States:
+    """The states in the rows of a table, whose first ones are also given as they are written."""
+    width = values.shape[1]
+    if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
         header = ["", *header]
-    chosen = list(names) or header
+    chosen = names or header
     if not chosen:
-        raise StoreError(f"{path}: its {len(rows[0])} columns have no names; give them, as --columns t,q,v")
-    values = np.array([[float(cell) for cell in row] for row in rows])
-    states = [i for i, name in enumerate(chosen[: len(rows[0])]) if kind(name) in ("q", "p", "v")]
-    return split(path, named(path, values, chosen), roundoff(rows, states))
+        raise StoreError(f"{path}: its {width} columns have no names; give them, as --columns t,q,v")
+    states = [i for i, name in enumerate(chosen[:width]) if kind(name) in ("q", "p", "v")]
+    return split(path, named(path, values, chosen), roundoff(first, states))
 
 
 def _cells(line: str) -> list[str]:
-    text = line.strip(" \r\n").lstrip("#").strip(" ")
-    if re.search(r"[;\t]", text):
+    text = line.strip(" ").lstrip("#").strip(" ")
+    if ";" in text or "\t" in text:
         # there a comma stands for a decimal point
         parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", x.strip()) for x in re.split(r"[;\t]", text)]
     else:
@@ -61,18 +74,17 @@ def _cells(line: str) -> list[str]:
     return parts
 
 
-def _are_counted(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether the first column numbers the rows, as tables do that are written with their index."""
-    first = float(rows[0][0])
-    return first in (0, 1) and all(float(row[0]) == first + i for i, row in enumerate(rows))
-
-
-def _is_number(cell: str) -> bool:
+def _numbers(cells: Iterable[str]) -> list[float] | None:
+    """The numbers of a row; None where one of its cells is none."""
     try:
-        float(cell)
+        return [number(cell) for cell in cells]
     except ValueError:
-        return False
-    return True
+        return None
+
+
+def _are_counted(column: Floats) -> bool:
+    """Whether the first column numbers the rows, as tables do that are written with their index."""
+    return column[0] in (0, 1) and np.array_equal(column, column[0] + np.arange(len(column)))
 
 
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
@@ -82,7 +94,7 @@ def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
     """
     found = 2.0**-53
     for i in columns:
-        cells = {row[i] for row in rows[:1000]}
+        cells = {row[i] for row in rows[:SHOWN]}
         digits = max(map(_digits, cells))
         if len(cells) > 1 and 0 < digits < 16:
             found = max(found, 0.5 * 10.0 ** (1 - digits))

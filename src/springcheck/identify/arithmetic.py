@@ -12,9 +12,8 @@ from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
-from springcheck.identify.maps import Table, power, table
-from springcheck.identify.match import Match
-from springcheck.identify.orbit import powers
+from springcheck.identify.hypothesis import Match
+from springcheck.identify.maps import MapTable, power, powers, table, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
 
@@ -91,7 +90,7 @@ def _recentred(found: Map, matches: list[Match], signed: Floats, unit: Floats) -
     return np.asarray(signed - shift[:, None, None] * away)
 
 
-def _numbers(matches: list[Match], kind: type[Any]) -> tuple[Table, Integers, Any]:
+def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
     """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
     which = np.array([families.index(FAMILIES[match.family]) for match in matches])
@@ -222,7 +221,7 @@ def _defects(
         other = missed(record.slips)
         late = _largest(np.abs(other), 2.0**-52 * size)
         follows = late < 0.7 * ulp
-        signed = np.where((late < ulp)[:, None, None], other, signed)
+        signed = np.where(follows[:, None, None], other, signed)
         missing = np.abs(signed)
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
@@ -246,8 +245,10 @@ def _defects(
         coarse_file = _largest(missing, half + 2.0**-24 * size * most) <= 1
         # velocities are differences of positions in some schemes alone, and their roundings are irregular
         differs = _largest(missing, half + 2.0**-24 * (size + difference) * most) <= 1
-        for i in np.flatnonzero(differs & ~coarse_file).tolist():
-            coarse_file[i] = matches[i].scheme in coarse.STOERMER and coarse.irregular(signed[i])
+        # what shows roundings of single precision has none that hide
+        coarse_file &= not record.deep
+        for i in np.flatnonzero(differs & ~coarse_file & (not record.deep)).tolist():
+            coarse_file[i] = _differences(matches[i]) and coarse.irregular(signed[i])
     share = _largest(missing, np.repeat(lengths[None, :-1, None], 2, axis=2))
     out = []
     for i, match in enumerate(matches):
@@ -292,7 +293,7 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     Rounding of a position enters the leapfrog's velocity in every step, and the position itself through it:
     it walks at random, with the root of the steps and their power of 3/2.
     """
-    if match.scheme not in coarse.STOERMER:
+    if not _differences(match):
         return False
     steps = np.sqrt(match.stride)
     if np.any(missing[:, 0] > 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]):
@@ -303,6 +304,15 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     least, most = REBUILT
     share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
     return least <= share <= most
+
+
+def _differences(match: Match) -> bool:
+    """Whether the velocity may be a difference of positions: their mean difference, as Stoermer's are, or
+    that of the step, where the position is moved by the new velocity."""
+    if match.scheme in coarse.STOERMER:
+        return True
+    (q, v), (x, u) = unit(FAMILIES[match.family], np.array([match.a]), np.array([match.g]))[0]
+    return bool(abs(q - x - 1) < G_ROUNDING and abs(v - u) < G_ROUNDING)
 
 
 def _largest(missing: Floats, unit: Floats) -> Floats:

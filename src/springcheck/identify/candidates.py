@@ -13,21 +13,14 @@ import numpy as np
 from springcheck.identify import arithmetic
 from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES
+from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG
 from springcheck.identify.record import Record
 from springcheck.identify.result import Candidate, Explanation, Identification
-from springcheck.identify.search import (
-    SINGLE_ROOM,
-    Joint,
-    aliases,
-    coincident,
-    disagreements,
-    frictionless,
-    numbers,
-)
+from springcheck.identify.search import SINGLE_ROOM, coincident, disagreements, numbers
 from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import ELSEWHERE, SCHEMES
 from springcheck.text.wording import either
 
 T = TypeVar("T")
@@ -158,7 +151,7 @@ def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple
 def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
     """Other names of a scheme's map, and what has it on a spring of another stiffness."""
     if scheme not in SCHEMES:
-        return ()
+        return ELSEWHERE[scheme].also if scheme in ELSEWHERE else ()
     leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
     still = [] if damped else [f"{name} without friction" for name in frictionless(scheme)]
     same = (

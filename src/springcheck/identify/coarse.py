@@ -15,8 +15,8 @@ from scipy.special import chdtri
 
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
+from springcheck.identify.hypothesis import Match
 from springcheck.identify.maps import power, unit
-from springcheck.identify.match import Match
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.schemes import SCHEMES, magnitude_step
@@ -201,7 +201,10 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
 def white(found: Map, match: Match, signed: Floats) -> bool:
     """Whether what single frames miss (f - 1, 2) is irregular but for the bias of cutting off."""
     biased = cut_off(found, match)
-    return irregular(signed, np.concatenate([biased, np.ones((len(biased), 1))], axis=1))
+    biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
+    # of a motion that dies or grows every frame counts by its size as well
+    weight = found.weight[:, None] / np.max(found.weight)
+    return irregular(signed, biased) and irregular(weight * signed, weight * biased)
 
 
 def cut_off(found: Map, match: Match) -> Floats:

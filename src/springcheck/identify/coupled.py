@@ -20,13 +20,17 @@ ALIKE = 1e-5
 """Relative difference of eigenvalues below which two modes may be turned into each other."""
 
 
-def _normal_equations(columns: Extended, right: Extended) -> Extended:
+def least_squares(columns: Extended, right: Extended) -> Extended:
+    """Solution x of columns x = right by normal equations in extended precision."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1)
+    columns = columns / size
     gram = columns.T @ columns
     inverse = np.linalg.pinv(gram.astype(np.float64), rcond=1e-15, hermitian=True).astype(np.longdouble)
     x = inverse @ (columns.T @ right)
     for _ in range(4):
         x = x + inverse @ (columns.T @ (right - columns @ x))
-    return np.asarray(x)
+    return np.asarray(x / size[:, None])
 
 
 def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, float] | None:
@@ -43,7 +47,7 @@ def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, flo
         return None
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
-    x = _normal_equations(columns, scaled[1:])
+    x = least_squares(columns, scaled[1:])
     left = (scaled[1:] - columns @ x).astype(np.float64)
     return x[:-1].T, size, float(np.sqrt(np.mean(left**2)))
 

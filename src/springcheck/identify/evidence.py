@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.match import Match
-from springcheck.identify.record import Record
-from springcheck.identify.search import search
-from springcheck.identify.starts import Terms
+from springcheck.identify.compare import compare
+from springcheck.identify.fit import Map
+from springcheck.identify.hypothesis import FEW, Match, Terms, distinct
+from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import ELSEWHERE, SCHEMES
 
 FALLS = 12.0
 """Factor by which an explanation must bring the misfit down."""
@@ -54,14 +53,15 @@ class Evidence:
 
 def title(scheme: str) -> str:
     """A scheme's name in a sentence, its first letter large."""
-    name = SCHEMES[scheme].title if scheme in SCHEMES else scheme
+    known = SCHEMES.get(scheme) or ELSEWHERE.get(scheme)
+    name = known.title if known else scheme
     return name[0].upper() + name[1:]
 
 
 def matched(found: Map, terms: Terms) -> list[Match]:
     """The schemes of few steps that fit a map, the plainest first."""
-    joints = [x for x in search([found], [terms], range(1, 5)) if x.accepted]
-    return [x.parts[0] for x in sorted(joints, key=lambda x: x.plainness)]
+    joints = compare([found], [terms], distinct(damped=False), FEW[:4])
+    return [x.parts[0] for x in joints]
 
 
 def distance(found: Map, m: Match) -> float:

@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.coarse import irregular
+from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched, title
 from springcheck.identify.fit import Map, fit
+from springcheck.identify.hypothesis import FEW, Terms, distinct
 from springcheck.identify.interrupted import few_bad_frames
+from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
-from springcheck.identify.search import FEW, distinct, search
-from springcheck.identify.starts import Terms
-from springcheck.identify.wrong import misfit, wrong_map
+from springcheck.identify.unknown import memory, misfit
+from springcheck.identify.wrong import wrong_map
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.schemes import rotation
 
@@ -38,13 +40,13 @@ def explain(
         record=record, j=j, found=maps[worst], terms=terms[worst],
         stiffness=None if stated is None else float(stated[j]),
     )  # fmt: skip
-    out: list[Explanation] = []
+    out: list[Explanation] = turned(record, moving)
     off = np.max(np.abs(evidence.misses), axis=1) / evidence.unit
     rough, loud = float(np.median(off)), float(np.max(off))
-    if evidence.found.drifts:
+    if evidence.found.drifts and not out:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (few_bad_frames, _solver, _neighbours(maps), _shape):
+        for look in (misplaced, memory, few_bad_frames, _solver, _neighbours(maps), _shape):
             out += look(evidence)
             if out:
                 break
@@ -63,8 +65,8 @@ def _solver(e: Evidence) -> list[Explanation]:
     residual = float(np.max(e.found.residual))
     # one step to a frame refutes most, and is found soon
     for strides in (range(1, 2), FEW):
-        joints = search([e.found], [e.terms], strides, far=True)
-        joints += search([e.found], [e.terms], strides, distinct(damped=True), far=True)
+        joints = nearest([e.found], [e.terms], distinct(damped=False), strides)
+        joints += nearest([e.found], [e.terms], distinct(damped=True), strides)
         distances = {x: distance(e.found, x.parts[0]) for x in joints}
         near = min((x for x in joints if x.scheme == "exact"), key=lambda x: distances[x], default=None)
         if near is None or distances[near] > 0.05:
@@ -130,9 +132,9 @@ def _hats(x: Floats, count: int) -> Floats:
     return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
 
 
-def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[Floats]:
-    """q, v and q times the sine and cosine in time that explain most of what is missing (f, 2)."""
-    n, frames, pull = np.arange(len(q)), len(q), weight * q
+def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats, carrier: Floats) -> list[Floats]:
+    """q, v and a carrier times the sine and cosine in time that explain most of what is missing (f, 2)."""
+    n, frames, pull = np.arange(len(q)), len(q), weight * carrier
     across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
     wanted = missing * weight[:, None]
     wanted = wanted - across @ (across.T @ wanted)
@@ -146,7 +148,7 @@ def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[
         cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
         ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
         cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
-        det = np.maximum(cc * ss - cs * cs, 1e-9 * cc * ss + 1e-300)
+        det = np.maximum(cc * ss - cs * cs, 1e-9 * total * total + 1e-300)
         x, y = c[:2], s[:2]
         return float(w[np.argmax(np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0))])
 
@@ -164,7 +166,7 @@ def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats) -> list[
         ]
         waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
         frequency = best(w, waves, double)
-    return [q, v, q * np.cos(frequency * n), q * np.sin(frequency * n)]
+    return [q, v, carrier * np.cos(frequency * n), carrier * np.sin(frequency * n)]
 
 
 def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
@@ -203,7 +205,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "parity": [*_alternating(e).T],
         "quadratic": [*linear, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
-        "oscillation": _oscillation(q, v, missing, weight[:, 0]),
+        "oscillation": _oscillation(q, v, missing, weight[:, 0], q),
         "anharmonic": [
             *linear,
             np.ones_like(q),
@@ -214,10 +216,11 @@ def _shape(e: Evidence) -> list[Explanation]:
         "stiffness in time": [v, *(q[:, None] * _hats(t, count)).T],
         "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
+        "drive": _oscillation(q, v, missing, weight[:, 0], np.ones_like(q)),
     }
     # what a few pairs miss follows any law of as many numbers: a frequency that was looked for is more,
     # the map's own constant is none
-    numbers = {"oscillation": 7, "parity": 4}
+    numbers = {"oscillation": 7, "drive": 7, "parity": 4}
     square = np.sum((weight * missing) ** 2, axis=1)
     counted = float(np.sum(square) ** 2 / np.sum(square**2)) if np.any(square) else 0.0
     left = {
@@ -262,7 +265,7 @@ KIND = {
     "quadratic": "is anharmonic", "cubic": "is anharmonic", "anharmonic": "is anharmonic",
     "position": "is anharmonic", "parity": "alternates from step to step", "oscillation": "changes in time",
     "stiffness in time": "changes in time", "friction in time": "changes in time",
-    "map in time": "changes in time",
+    "map in time": "changes in time", "drive": "is driven",
 }  # fmt: skip
 """What the force depends on in each group of columns."""
 
@@ -270,7 +273,7 @@ KIND = {
 STATE = ("quadratic", "anharmonic", "position", "velocity")
 """Groups of functions of the state that follow most functions of time where states hardly come back."""
 
-TIME = ("oscillation", "stiffness in time", "friction in time", "map in time")
+TIME = ("oscillation", "stiffness in time", "friction in time", "map in time", "drive")
 """Groups of functions of time, which the state follows there as well."""
 
 FEW_TURNS = 2.0
@@ -348,10 +351,12 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         "oscillation": "The stiffness changes in time, up and down, which",
         "friction in time": "The friction changes in time, which",
         "map in time": "The step or the stiffness changes in time, which",
+        "drive": "A force from outside drives the motion, up and down in time, which",
     }
     remedies = {
         "constant": "look for a drift that is not the velocity's, and then for what else is left",
         "stiffness in time": "look for a parameter or a clock that moves during the run",
+        "drive": "leave the external force out, or judge a part of the trajectory without it",
         "oscillation": "look for a parameter or a clock that moves during the run",
         "friction in time": "look for a thermostat or a damping that is switched during the run",
         "map in time": "look for a step that is adapted, or give a part of the trajectory",

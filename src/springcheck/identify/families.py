@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.schemes import SCHEMES, Scheme, roundings
+from springcheck.schemes import ELSEWHERE, SCHEMES, Scheme, roundings
 
 Stage: TypeAlias = tuple[str, Fraction | str]
 """kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`
@@ -45,7 +45,7 @@ class Family:
     name: str
     scheme: str
     stages: tuple[Stage, ...] = ()
-    stability: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] = ((), ())
+    stability: tuple[tuple[Fraction | str, ...], tuple[Fraction | str, ...]] = ((), ())
     """Numerator and denominator, from the constant up, of the stability function R(h L)."""
     damped: bool = False
     laws: tuple[str, ...] = ()
@@ -55,7 +55,7 @@ class Family:
     path: int = 0
     limit: float = np.inf
     formula: str = ""
-    """A fault's map that stages do not give, by its name in `maps.FORMULAS`."""
+    """A map that stages do not give: of a fault by its name in `maps.FORMULAS`, or of a scheme."""
     cause: str = ""
     remedy: str = ""
     """What is wrong, and what to do, where the family is a fault."""
@@ -107,8 +107,8 @@ def _of(scheme: Scheme, *, damped: bool) -> Family:
     own = any(kind == "friction" for kind, _ in stages)
     if damped and not own:
         stages = tuple(("explicit" if kind == "kick" else kind, c) for kind, c in stages)
-    implicit = damped and scheme.implicit
-    law = EXPONENTIAL if own else IMPLICIT if implicit else "" if scheme.flow else EXPLICIT
+    implicit = damped and scheme.has("implicit")
+    law = EXPONENTIAL if own else IMPLICIT if implicit else "" if scheme.has("flow") else EXPLICIT
     return Family(
         name=scheme.name + (", damped" if damped else ""),
         scheme=scheme.name,
@@ -117,13 +117,30 @@ def _of(scheme: Scheme, *, damped: bool) -> Family:
         damped=damped,
         laws=((law,) if law else ("friction",)) if damped else (),
         place="",
-        flow=scheme.flow,
-        path=1 if scheme.flow else roundings(scheme),
+        flow=scheme.has("flow"),
+        path=1 if scheme.has("flow") else roundings(scheme),
         limit=scheme.limit,
     )
 
 
-UNDAMPED = tuple(_of(s, damped=False) for s in SCHEMES.values() if (s.one_step and not s.mixes) or s.flow)
+_ON_A_SPRING = tuple(
+    s for s in SCHEMES.values() if (s.has("one-step") and not s.has("mixes")) or s.has("flow")
+)
+
+
+def _is_written_out(scheme: Scheme) -> bool:
+    """Whether stages or a stability function give its map, with friction too; else it is stepped."""
+    solved = any(x for i, row in enumerate(scheme.a[:-1]) for x in row[i:])
+    return not solved and all(kind.evaluates or kind.drifts or kind.decay for kind in scheme.kinds)
+
+
+def _stepped(scheme: Scheme) -> Family:
+    return Family(
+        name=scheme.name, scheme=scheme.name, formula=scheme.name, path=roundings(scheme), limit=scheme.limit
+    )
+
+
+UNDAMPED = tuple(_of(s, damped=False) if _is_written_out(s) else _stepped(s) for s in _ON_A_SPRING)
 DECAY = (IMPLICIT, EXPONENTIAL)
 SCALED = (EXPONENTIAL, IMPLICIT, "a factor 1 - gamma h")
 
@@ -160,7 +177,7 @@ EULER, EULER_LATE, VERLET, POSITION = (
 )  # fmt: skip
 
 DAMPED = (
-    *(_of(s, damped=True) for s in SCHEMES.values() if (s.one_step and not s.mixes) or s.flow),
+    *(_of(s, damped=True) for s in _ON_A_SPRING if _is_written_out(s)),
     _placed(EULER, "after the kick", DECAY, KICK, DECAYS, DRIFT),
     _placed(EULER_LATE, "after the kick", DECAY, DRIFT, KICK, DECAYS),
     _placed(EULER_LATE, "before the drift", DECAY, DECAYS, DRIFT, KICK),
@@ -207,6 +224,7 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
     ("RK4 whose second stage takes a full step", ((0,), (1,), (0, "1/2"), (0, 0, 1)), RK4_WEIGHTS),
     ("RK4 whose third stage takes a full step", ((0,), ("1/2",), (0, 1), (0, 0, 1)), RK4_WEIGHTS),
     ("RK4 whose fourth stage takes half a step", ((0,), ("1/2",), (0, "1/2"), (0, 0, "1/2")), RK4_WEIGHTS),
+    ("RK4 whose first slope is left out of the sum", RK4_ROWS, (0, "1/3", "1/3", "1/6")),
     ("RK4 with equal weights of its four stages", RK4_ROWS, ("1/4", "1/4", "1/4", "1/4")),
     ("RK4 with weights 1/6 of all four stages", RK4_ROWS, ("1/6", "1/6", "1/6", "1/6")),
     ("RK4 with weights 1, 2, 2, 1 divided by 8", RK4_ROWS, ("1/8", "1/4", "1/4", "1/8")),
@@ -266,7 +284,17 @@ FAULTS = (
 
 HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
 
-FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS)}
+KNOWN_ELSEWHERE = tuple(
+    Family(
+        name=one.name, scheme=one.name, stages=one.stages,
+        path=8 * max(len(one.over) + len(one.under), len(one.stages)),
+        stability=(one.over, one.under) if one.over else ((), ()),
+    )
+    for one in ELSEWHERE.values()
+)  # fmt: skip
+"""Schemes that are named where none of the catalogue fits."""
+
+FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS, *KNOWN_ELSEWHERE)}
 
 
 def substeps(share: float, error: float) -> tuple[range, bool]:

@@ -15,6 +15,7 @@ from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 MOST_FRAMES = 20_000
@@ -32,7 +33,7 @@ TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class States:
+class FileStates:
     """Recorded states: t (f,), q and p or v (f, n), mass (n,) or None; `notes` on what was left out."""
 
     label: str
@@ -48,19 +49,18 @@ class States:
 
 def read(
     path: Path, label: str | None = None, columns: Sequence[str] = (), step: float | None = None
-) -> list[States]:
+) -> list[FileStates]:
     """The trajectories of a file, or the one of this label; `columns` and `step` as in `formats.read`.
 
     Raises StoreError where the file cannot be read, or has no such trajectory.
     """
     if path.is_file() and not formats.is_hdf5(path) and not label:
         return [of_arrays(path.name, formats.read(path, columns, step, alone=True))]
-    try:
-        own = () if columns else store.summary(path).runs
-    except StoreError:
-        own = ()
+    # an unfinished store has its journal beside it and no file yet
+    foreign = bool(columns) or (path.is_file() and store.is_foreign(path))
+    own = () if foreign else store.summary(path).runs
     names = [run.label for run in own]
-    if own:
+    if not foreign:
         found = list(_ours(path, own, label))
     elif columns or not store.is_h5md(path):
         plain = formats.read_hdf5(path, columns, alone=True)
@@ -69,12 +69,13 @@ def read(
     else:
         found = list(_foreign(path, label))
     if not found:
-        names = names or list(store.read_foreign(path, 2, alone=True))
-        raise StoreError(f"{path}: holds no trajectory {label!r}; it has {', '.join(names)}")
+        names = names if names or not foreign else list(store.read_foreign(path, alone=True))
+        asked = f" {label!r}; it has {', '.join(names)}" if names else " to identify"
+        raise StoreError(f"{path}: holds no trajectory{asked}")
     return found
 
 
-def of_arrays(name: str, found: formats.States) -> States:
+def of_arrays(name: str, found: formats.States) -> FileStates:
     """A trajectory that stands in arrays of a file."""
     kept = slice(MOST_FRAMES)
     speed = next((x for x in (found.p, found.v) if x is not None), np.zeros_like(found.q))
@@ -83,7 +84,7 @@ def of_arrays(name: str, found: formats.States) -> States:
     p, v, mass = found.p, found.v, found.mass
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))
-    return States(
+    return FileStates(
         label=name,
         t=found.t[kept],
         q=found.q[kept][:, chosen],
@@ -94,7 +95,7 @@ def of_arrays(name: str, found: formats.States) -> States:
     )
 
 
-def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[States]:
+def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[FileStates]:
     m = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)").m
     for run in runs:
         if wanted in (None, run.label):
@@ -102,7 +103,7 @@ def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator
             kept = len(piece.t)
             notes = [f"the first {kept} of {run.frames} frames were looked at"] if kept < run.frames else []
             chosen, remarks = _chosen(piece.q, piece.p, notes)
-            yield States(
+            yield FileStates(
                 label=run.label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None,
                 mass=m[chosen], notes=remarks, adaptive=_adaptive(run),
             )  # fmt: skip
@@ -114,10 +115,10 @@ def _adaptive(run: store.Run) -> str:
     except MethodError:
         # of an engine that is not here
         return ""
-    return "" if scheme.one_step or scheme.flow else scheme.title
+    return "" if scheme.has("one-step") or scheme.has("flow") else scheme.title
 
 
-def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
+def _foreign(path: Path, wanted: str | None) -> Iterator[FileStates]:
     for name, group in store.read_foreign(path, MOST_FRAMES + 1, alone=True).items():
         if wanted not in (None, name):
             continue
@@ -131,7 +132,7 @@ def _foreign(path: Path, wanted: str | None) -> Iterator[States]:
         if group.v is not None:
             v = group.v.reshape(q.shape) * _velocity_factor(group.units, notes)
         chosen, remarks = _chosen(q, np.zeros_like(q) if v is None else v, notes)
-        yield States(
+        yield FileStates(
             label=name, t=group.t, q=q[:, chosen], p=None, v=None if v is None else v[:, chosen],
             mass=None if mass is None else mass[chosen], notes=remarks,
         )  # fmt: skip
@@ -175,6 +176,15 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
         return ""
 
 
+def shown(scene: Scene, run: Trajectory, about: int) -> str:
+    """What the states of a trajectory around a frame really are; "" where its scene is not of springs."""
+    if not scene.system.is_linear:
+        return ""
+    springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= MOST_OSCILLATORS else None
+    alone = springs is not None and not np.any(springs - np.diag(np.diag(springs)))
+    return sentence(run, scene.m, np.diag(springs) if springs is not None and alone else None, about=about)
+
+
 def identify_file(
     path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
 ) -> dict[str, Identification]:
@@ -200,7 +210,7 @@ def identify_file(
 
 
 def identify_states(
-    states: States,
+    states: FileStates,
     *,
     mass: float | None = None,
     stiffness: float | None = None,

@@ -1,69 +1,100 @@
-"""The map between recorded states, by least squares, and how well the states determine it."""
+"""The map between recorded states: generalised least squares under the observation model.
+
+States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is what the form of the file leaves uncertain,
+p is what the arithmetic rounds in a step.  What a map leaves over, r[n] = z[n+1] - B z[n] - c, then has the
+covariance V = A S A^T + P of a banded matrix, for each recorded error stands in two of them.  B and c
+minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and Least Squares, 1976, chapter 9).  Where
+the file has all digits V is diagonal and neighbours are all that counts; where it has few, V^-1 adds up what
+the whole orbit shows.  One fit serves both, and what lies between.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.orbit import orbit, repeats
-from springcheck.identify.record import Record
+from springcheck.identify.noise import Noise
+from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.schemes import rotation
 from springcheck.schemes.linear import Rotation
 
-ROUNDING = 2.0**-53
+CONSTANT_SHOWS = 50.0
+"""Gain of chi-squared that shows a constant part in double precision, whose residuals are no Gaussian noise:
+5 standard errors leave one in 700 files with an equilibrium that is none."""
 
-DEAD = 2.0**-40
-"""Distance from an equilibrium, as a share of its own from 0, below which a motion has died down to it."""
+CONSTANT_LIKELY = 10.0
+"""The same in a coarse file, where a constant that is left out is wrong and one too many costs little."""
 
-SHOWN, SUSPECTED = 50.0, 10.0
-"""Chi-squared that shows a constant part, and that one may make in a coarse file: it must stay far below what
-a right scheme may miss."""
+FLOOR = 1 / 8
+"""A number near zero is written finer than its neighbours by any power of ten; it counts as no finer than
+this share of the other component's quantum, so that no single number decides a fit."""
 
-SHORT = 8
-"""Distance of an arc from the equilibrium, in its own size, from which its size is that distance."""
+LEAST_LEFT = 1 / 16
+"""Of the rounding of a state, what one step leaves over at least in the mean square: numbers that happen to
+be exact leave less, and say no more."""
 
 LEAST_NOISE = 1e-30
-"""Share of the largest noise that a pair counts with at least: a motion that grows by 1e20 shows its
-equilibrium in its first frames alone."""
+"""Share of the largest noise that a pair counts with at least."""
 
-FEWEST_PAIRS = 3
-"""More pairs than these are needed before a constant part is looked for: as many unknowns has a row then."""
+CERTAIN = 14.0
+"""Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds the chance of a
+mistake."""
+
+KURTOSIS = 0.8
+"""Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
+
+ERRORS = 5.0
+"""Standard errors that chance does not exceed: 6e-7."""
+
+UNKNOWN = 1e6
+"""Share of a state that may change between two frames of which nothing is known."""
+
+MOST_ROUNDS = 12
+"""Gauss-Newton's steps at most; three reach rounding in double precision, five in the coarsest text."""
+
+SETTLED = 1e-3
+"""Gain of chi-squared that another step must promise, in units of what each number leaves over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Map:
     """The map z -> B z of one oscillator's states z = ((q - centre)/size_q, v T/size_v), of size 1 each.
 
-    `covariance` (4, 4) belongs to the entries B11, B12, B21, B22; `residual` (2,) is the root mean square
-    of what B leaves over of each component.
+    `covariance` (4, 4) belongs to the entries B11, B12, B21, B22.
     """
 
     entries: Extended
     covariance: Floats
-    residual: Floats
     size: Extended
     centre: Extended
     z: Extended
     weight: Floats
-    """Weight (f - 1,) of each pair of states."""
+    """Weight (f - 1,) of each pair of states, by which weighted states have a mean square of 2."""
+    residual: Floats
+    """Root mean square (2,) of what the map leaves over of each component, weighted."""
+    noise: Noise
+    chi2: float
+    """What is left over, in squares of what the observation model expects."""
+    freedom: int
     conditioned: bool
-    """Whether the states span the plane beyond their noise."""
-    whole: bool = False
-    """Whether entries and covariance are those of the orbit of all states, not of pairs."""
+    """Whether the states span the plane beyond what the map leaves over."""
+    spans: bool
+    """Whether they span it beyond the rounding of their numbers."""
+    once: bool | None
+    """Whether the states were rounded once, as they were written, and never in the motion; None where that
+    does not show, or where they have all digits."""
     drifts: bool = False
     """Whether the constant part is no equilibrium: the position gets a constant in every step."""
     slips: Extended | None = None
-    """Relative excess (f - 1,) of each step over the mean, where the steps show it."""
+    """Relative excess (f - 1,) of each step over the mean, where the steps follow the clock's."""
     found: dict[Any, Any] = field(default_factory=dict, init=False)
-    """What was already looked for with this map: searches ask for the same several times."""
-    once: bool | None = None
-    """Whether the states were rounded once, as they were written, and never in the motion; None where that
-    does not show."""
+    """What was already worked out of this map."""
 
     @property
     def unscaled(self) -> Extended:
@@ -71,12 +102,24 @@ class Map:
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
 
     @property
+    def whole(self) -> bool:
+        """Whether the entries are known from one orbit of all states, not from pairs."""
+        return self.once is True or (self.once is None and not self.noise.diagonal and self.within)
+
+    @property
     def turn(self) -> Rotation:
         """How the map turns."""
-        if "turn" not in self.found:
-            self.found["turn"] = rotation(self.entries[None])
-        out: Rotation = self.found["turn"]
-        return out
+        return rotation(self.entries[None])
+
+    @property
+    def clean(self) -> bool:
+        """Whether what is left over may be rounding: no more than ten times what is expected."""
+        return self.chi2 <= 100 * self.freedom
+
+    @property
+    def within(self) -> bool:
+        """Whether what is left over is what the observation model expects."""
+        return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
     def misses(self, other: Map | None = None) -> Floats:
         """What the map leaves over in each pair of its states, or of those of another fit, (f - 1, 2)."""
@@ -84,22 +127,6 @@ class Map:
         if other is not None:
             z = (other.z * other.size + other.centre - self.centre) / self.size
         return np.asarray(z[1:] - z[:-1] @ self.entries.T, np.float64)
-
-
-def least_squares(columns: Extended, right: Extended) -> Extended:
-    """Solution x of columns x = right by normal equations in extended precision, refined twice.
-
-    With columns of size 1 the condition of the normal equations is far below 1/eps of extended precision
-    unless the states are degenerate, which is found out apart.
-    """
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    size = np.where(size > 0, size, 1)
-    columns = columns / size
-    inverse = np.linalg.pinv((columns.T @ columns).astype(np.float64)).astype(np.longdouble)
-    x = inverse @ (columns.T @ right)
-    for _ in range(3):
-        x = x + inverse @ (columns.T @ (right - columns @ x))
-    return np.asarray(x / size[:, None])
 
 
 def _sizes(z: Extended) -> Extended:
@@ -114,224 +141,236 @@ def _sizes(z: Extended) -> Extended:
     return np.asarray(size * np.sqrt((square @ size**-2).mean() / 2))
 
 
+@dataclass(slots=True)
+class _Solution:
+    """A minimum: unknowns, their covariance, what is left over of it, and its noise."""
+
+    entries: Extended
+    centre: Extended
+    slope: Extended
+    inverse: Floats
+    chi2: float
+    noise: Noise
+
+    @property
+    def cost(self) -> float:
+        """Minus twice the log of the likelihood, but for a constant."""
+        return self.chi2 + self.noise.log_det
+
+
+def _minimum(
+    z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int, slips: Extended | None
+) -> _Solution:
+    """Gauss-Newton for the map, a constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
+    what the clock's slips do to a step."""
+    unknowns = _Unknowns(z, process, centred, slips)
+    state = unknowns.start(start)
+    best: _Solution | None = None
+    noise = Noise(np.eye(2), 0 * sigma, process) if not np.any(sigma) else None
+    for _ in range(MOST_ROUNDS):
+        now = noise or Noise(state[0].astype(np.float64), sigma, process)
+        r = unknowns.left(*state)
+        weighted = now.solve(r[:, :, None])
+        chi2 = float(np.sum(r * weighted[:, :, 0]))
+        if best is not None and not chi2 + now.log_det < best.cost:
+            break
+        seen = (z - state[1]).astype(np.float64)
+        if noise is None and chi2 < 100 * r.size:
+            seen = seen - now.errors(weighted[:, :, 0])
+        columns = unknowns.columns(seen, state[0])
+        flat = columns.reshape(r.size, -1)
+        square = flat.T @ now.solve(columns).reshape(flat.shape)
+        size = np.sqrt(np.maximum(np.diag(square), 1e-300))
+        inverse = np.linalg.pinv(square / size[:, None] / size, rcond=1e-14, hermitian=True)
+        inverse = inverse / size[:, None] / size
+        gradient = flat.T @ weighted.reshape(-1)
+        best = _Solution(*state, inverse, chi2, now)
+        change = inverse @ gradient
+        if gradient @ change <= SETTLED * max(1.0, chi2 / r.size):
+            break
+        state = unknowns.changed(*state, change)
+    assert best is not None
+    return best
+
+
+class _Unknowns:
+    """What is fitted: entries, a constant part, and what the clock's slips do."""
+
+    def __init__(self, z: Extended, process: Floats, centred: int, slips: Extended | None) -> None:
+        self.z, self.process, self.pairs, self.centred = z, process, len(process), centred
+        self.own = slice(4, 4 + centred)
+        # of size 1, as everything else
+        self.slips = None if slips is None else slips / np.max(np.abs(slips))
+
+    def start(self, of: _Solution | None) -> tuple[Extended, Extended, Extended]:
+        slope = np.zeros((2, 2), np.longdouble)
+        if not self.centred:
+            entries = np.eye(2, dtype=np.longdouble) if of is None else of.entries
+            return entries, np.zeros(2, np.longdouble), slope
+        if of is not None and np.any(of.centre):
+            return of.entries, of.centre, slope
+        # any constant is linear in the states; the equilibrium follows from it
+        z = self.z.astype(np.float64)
+        weight = 1 / self.process[:, None]
+        columns = np.concatenate([z[:-1], np.ones((self.pairs, 1))], axis=1) * weight
+        size = np.sqrt(np.sum(columns**2, axis=0))
+        size = np.where(size > 0, size, 1)
+        x = np.linalg.lstsq(columns / size, z[1:] * weight, rcond=None)[0] / size[:, None]
+        gap = np.eye(2) - x[:2].T
+        centre = np.linalg.pinv(gap[:, : self.centred]) @ x[2]
+        at = np.concatenate([centre, np.zeros(2 - self.centred)])
+        return x[:2].T.astype(np.longdouble), at.astype(np.longdouble), slope
+
+    def left(self, entries: Extended, centre: Extended, slope: Extended) -> Floats:
+        state = self.z - centre
+        r = state[1:] - state[:-1] @ entries.T
+        if self.slips is not None:
+            r = r - self.slips[:, None] * (state[:-1] @ slope.T)
+        return np.asarray(r, np.float64)
+
+    def columns(self, seen: Floats, entries: Extended) -> Floats:
+        out = np.zeros((self.pairs, 2, 4 + self.centred + (4 if self.slips is not None else 0)))
+        out[:, 0, :2] = out[:, 1, 2:4] = seen[:-1]
+        out[:, :, self.own] = (np.eye(2) - entries.astype(np.float64))[None, :, : self.centred]
+        if self.slips is not None:
+            out[:, 0, -4:-2] = out[:, 1, -2:] = self.slips.astype(np.float64)[:, None] * seen[:-1]
+        return out
+
+    def changed(
+        self, entries: Extended, centre: Extended, slope: Extended, change: Floats
+    ) -> tuple[Extended, Extended, Extended]:
+        if self.slips is not None:
+            slope = slope + change[-4:].reshape(2, 2)
+        moved = np.concatenate([change[self.own], np.zeros(2 - self.centred)])
+        return entries + change[:4].reshape(2, 2), centre + moved, slope
+
+
 def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, constant: bool = False) -> Map:
     """The map of oscillator j, from the pairs that are `kept` (f - 1,), or from all.
 
-    A constant part is taken in where it shows, or in any case (`constant`): an equilibrium away from 0,
-    whose velocity is 0, or else a constant that is added to the position in every step (`drifts`).  Where
-    the steps are the differences of rounded times, the map's change with the step is fitted along with it
-    (`slips`).
+    A constant part is taken in where it shows, or in any case (`constant`): an equilibrium away from 0, whose
+    velocity is 0, or else a constant that is added to the position in every step (`drifts`).
 
-    Rounding is relative to a state's distance from the equilibrium and to that of the equilibrium from 0,
-    or to what the file resolves: pairs count by the inverse of it, so that a motion over many powers of ten
-    is not judged by its largest states alone.
+    Raises IdentificationError where the states allow no fit.
     """
-    z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1)
-    size, whole = _sizes(z - np.mean(z, axis=0)), _sizes(z)
-    size = np.minimum(size, whole) if np.all(whole < 2 * size) else size
-    chosen = np.ones(len(z) - 1, dtype=bool) if kept is None else kept
-    pairs = int(np.count_nonzero(chosen))
-    first = _preliminary(z / size, chosen)
-    # a short arc about 0 is as large as its distance from there
-    short = record.fine and not np.any(first) and bool(np.any(whole > SHORT * size))
-    size = whole if short else size
-    z = z / size
-    quanta = record.quanta(j) / size.astype(np.float64)
-    # at rest beside 0 the numbers' rounding is all that is left, and the same in every step
-    away = np.sqrt(np.sum((z[:-1].astype(np.float64) - first) ** 2, axis=1))
-    dead = away < DEAD * float(np.sqrt(np.sum(first**2)))
-    if np.count_nonzero(chosen & ~dead) > 3 * FEWEST_PAIRS:
-        chosen = chosen & ~dead
-        pairs = int(np.count_nonzero(chosen))
-    weight = _pair_weights(z, quanta, first) * chosen
-    w = weight[:, None].astype(np.longdouble)
-    before, after = w * z[:-1], w * z[1:]
-    slips, part = _following(record, before, w, after)
-    after = after - part
-    x = least_squares(before, after)
-    left = after - before @ x
-    centre = np.zeros(2, dtype=np.longdouble)
-    floor = np.full(2, np.sum((4 * ROUNDING * before) ** 2), np.float64)
+    z: Extended = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.longdouble)
+    about, whole = _sizes(z - np.mean(z, axis=0)), _sizes(z)
+    size = np.minimum(about, whole) if np.all(whole < 2 * about) else about
+    z = np.asarray(z / size, np.longdouble)
+    sigma = record.sigma(j) / size.astype(np.float64)
+    row = np.max(sigma, axis=1, keepdims=True)
+    sigma = np.maximum(sigma, FLOOR * np.where(row > 0, row, np.median(row)))
+    length = _lengths(z, np.zeros(2))
+    # what happens in other pairs than those that are kept is unknown
+    unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
+    process = ROUNDING * length * unknown
+    slips = None
+    # neighbours alone first: a map that is far off makes nothing of the orbit
+    pairs = process if record.fine else np.hypot(process, np.max(sigma[1:], axis=1))
+    best, centred, slips = _constant_part(z, 0 * sigma, pairs, None, record, constant)
+    if centred:
+        # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
+        length = _lengths(z, best.centre)
+        process = ROUNDING * length * unknown
+    if record.fine and centred:
+        best = _minimum(z, 0 * sigma, process, best, centred, slips)
     if not record.fine:
-        # few pairs may fit better than their numbers were written
-        earlier, later = (np.sum((weight[:, None] * y) ** 2, axis=0) / 12 for y in (quanta[:-1], quanta[1:]))
-        floor += later + (x.T.astype(np.float64) ** 2) @ earlier
-    drifts = False
-
-    def better(old: Extended, new: Extended, gain: float) -> bool:
-        """Whether one number more removes so much of chi-squared; by chance it removes 1."""
-        noise = np.maximum(np.sum(new**2, axis=0) / max(pairs - 3, 1), floor / pairs)
-        return bool(np.any(np.sum(old**2, axis=0) - np.sum(new**2, axis=0) > gain * noise))
-
-    if (constant or np.any(np.sum(left**2, axis=0) > floor)) and pairs > FEWEST_PAIRS:
-        y = least_squares(np.concatenate([before, w], axis=1), after)
-        free = after - np.concatenate([before, w], axis=1) @ y
-        if constant or better(left, free, SHOWN if record.fine else SUSPECTED):
-            noise = np.sqrt(np.maximum(np.sum(free**2, axis=0), floor))
-            entries, at, resting = _about_rest(before, after, w, y, noise)
-            # at rest the roundings are the same in every step, and add up to a constant of their own
-            off = y[2] - (np.eye(2) - y[:2].T) @ at
-            room = 64 * ROUNDING * float(np.max(np.abs(z)))
-            drifts = better(resting, free, SHOWN) and float(np.max(np.abs(off))) > room
-            if drifts:
-                back = np.linalg.pinv((np.eye(2) - y[:2].T).astype(np.float64)).astype(np.longdouble)
-                at = back @ y[2]
-                for _ in range(3):
-                    at = at + back @ (y[2] - at + y[:2].T @ at)
-                entries, resting = y[:2], free
-            x, left, centre = entries, resting, at
-    z = z - centre
-    rss = np.sum(left**2, axis=0)
-    # beside an equilibrium that is fitted as well, states count by how they differ
-    shift = np.sum(w**2 * z[:-1], axis=0) / np.sum(w**2) if np.any(centre != 0) else 0 * centre
-    spread = (w * (z[:-1] - shift)).astype(np.float64)
-    gram = spread.T @ spread
-    least = ROUNDING / 2 * float(np.sqrt(np.sum(before**2) / pairs))
-    variance = np.maximum(rss.astype(np.float64) / max(pairs - 2, 1), least**2)
-    smallest = float(np.linalg.eigvalsh(gram / pairs)[0])
-    conditioned = smallest > 100 * float(np.max(variance)) and smallest > (64 * ROUNDING) ** 2
-    inverse = np.asarray(np.linalg.pinv(gram), dtype=np.float64)
-    covariance: Floats = np.kron(np.diag(variance), inverse).astype(np.float64)
-    found = Map(
-        entries=x.T,
-        covariance=covariance,
-        residual=np.sqrt(rss.astype(np.float64) / pairs),
-        size=size,
-        centre=centre * size,
-        z=z,
-        weight=weight,
-        conditioned=conditioned,
-        drifts=drifts,
-        slips=slips,
-    )
-    if record.fine or not conditioned or drifts or kept is not None:
-        return found
-    return _seen_through_storage(found, quanta, inverse, z[:-1] - shift, text=record.text)
+        best, centred, _ = _constant_part(z, sigma, process, best, record, constant)
+    once: bool | None = None
+    pairs_kept = len(process) if kept is None else int(np.count_nonzero(kept))
+    freedom = 2 * pairs_kept - 4 - centred - (4 if slips is not None else 0)
+    if not record.fine:
+        other = _fed_back(z, sigma, process, best, centred, freedom)
+        odds = (other.cost - best.cost) / 2
+        expected = freedom + ERRORS * math.sqrt(KURTOSIS * freedom + 1)
+        once = True if odds > CERTAIN and best.chi2 <= expected else False if odds < -CERTAIN else None
+        if best.chi2 > expected:
+            best = other
+    scale = max(best.chi2 / max(freedom, 1), LEAST_LEFT if record.fine else 1.0)
+    covariance = best.inverse[:4, :4] * scale
+    if not record.fine:
+        covariance = covariance * repeats(z)
+    state = z - best.centre
+    share = length.astype(np.longdouble)[:, None] ** -2
+    shift = np.sum(share * state[:-1], axis=0) / np.sum(share) if centred else 0 * best.centre
+    spread = (state[:-1] - shift).astype(np.float64) / length[:, None]
+    weight = np.sqrt(2 * len(spread) / np.sum(spread**2)) / length
+    spread = (state[:-1] - shift).astype(np.float64) * weight[:, None]
+    smallest = float(np.linalg.eigvalsh(spread.T @ spread / len(spread))[0])
+    left = (state[1:] - state[:-1] @ best.entries.T).astype(np.float64) * weight[:, None]
+    left = left if kept is None else left[kept]
+    residual = np.sqrt(np.mean(left**2, axis=0))
+    rounded = float(np.max(np.mean((sigma[1:] ** 2 + sigma[:-1] ** 2) * weight[:, None] ** 2, axis=0)))
+    spans = smallest > 100 * rounded and smallest > (64 * ROUNDING) ** 2
+    return Map(
+        weight=weight, residual=residual, spans=spans,
+        entries=best.entries, covariance=covariance, size=size, centre=best.centre * size, z=state,
+        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2, slips=slips,
+        conditioned=spans and smallest > 100 * float(np.max(residual)) ** 2,
+    )  # fmt: skip
 
 
-def _following(
-    record: Record, before: Extended, w: Extended, after: Extended
-) -> tuple[Extended | None, Extended]:
-    """The record's slips, where steps follow them, and what these do to the weighted states (f - 1, 2)."""
-    pairs = int(np.count_nonzero(w))
-    if record.slips is not None and pairs > 3 * FEWEST_PAIRS:
-        plain = np.concatenate([before, w], axis=1)
-        x = least_squares(plain, after)
-        rest = np.linalg.pinv((np.eye(2) - x[:2].T).astype(np.float64)) @ x[2]
-        wide = np.concatenate([plain, record.slips[:, None] * 1e12 * (before - w * rest)], axis=1)
-        y = least_squares(wide, after)
-        lost, left = (float(np.sum((after - columns @ u) ** 2)) for columns, u in ((plain, x), (wide, y)))
-        floor = float(np.sum((4 * ROUNDING * before) ** 2))
-        # a clock is known, so that even errors within the rounding of a step show whether steps follow it
-        if lost - left > 100 * max(left / pairs, floor / pairs / 256):
-            return record.slips, wide[:, 3:] @ y[3:]
-    return None, np.zeros_like(after)
-
-
-def _preliminary(z: Extended, chosen: NDArray[np.bool_]) -> Floats:
-    """The equilibrium (2,) as pairs show it that count by their size, 0 where they show none."""
-    before, after = z[:-1][chosen].astype(np.float64), z[1:][chosen].astype(np.float64)
-    if len(before) <= FEWEST_PAIRS:
-        return np.zeros(2)
-    # of a motion that grows the first frames show it, however small they are beside the last
-    weight = np.sqrt(np.sum(before**2 + after**2, axis=1, keepdims=True))
-    weight = 1 / np.maximum(weight, LEAST_NOISE * np.max(weight))
-    before, after = weight * before, weight * after
-    wide = np.concatenate([before, weight], axis=1)
-    y, x = (np.linalg.lstsq(columns, after, rcond=None)[0] for columns in (wide, before))
-    one, other = (float(np.sum((after - c @ b) ** 2)) for c, b in ((wide, y), (before, x)))
-    floor = float(np.sum((8 * ROUNDING * before) ** 2))
-    if other <= floor or other - one <= 50 * max(one, floor) / len(before):
-        return np.zeros(2)
-    return np.asarray(np.linalg.pinv(np.eye(2) - y[:2].T) @ y[2])
-
-
-def _pair_weights(z: Extended, quanta: Floats, rest: Floats) -> Floats:
-    """Weights (f - 1,) of the pairs, whose weighted states have a mean square of 2."""
-    states = z.astype(np.float64)
-    length = np.sqrt(np.sum((states - rest) ** 2, axis=1)) + np.sqrt(np.sum(rest**2))
-    noise = np.sqrt((ROUNDING * length) ** 2 + np.sum(quanta**2, axis=1) / 12)
-    # of both states of a pair: a start that is 0, or near it, is finer than what follows from it
-    noise, length = (np.maximum(x[:-1], x[1:]) for x in (noise, length))
-    # a start of few digits, or 0, is exact, but what follows from it is not: it may not outweigh the rest
-    moving = length > 0
-    shares = np.sort(noise[moving] / length[moving])
-    lowest = float(np.interp(0.1 * (len(shares) - 1), np.arange(len(shares)), shares)) if len(shares) else 0.0
-    noise = np.maximum(noise, lowest / 3 * length)
-    weight = 1 / np.maximum(noise, LEAST_NOISE * np.max(noise))
-    about = states[:-1] - rest
-    size = float(np.sum((weight[:, None] * about) ** 2))
-    if not size:
+def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
+    """Sizes (f - 1,) that the rounding of each pair is relative to."""
+    away = np.sqrt(np.sum((z - centre).astype(np.float64) ** 2, axis=1))
+    if not np.any(away[:-1]):
         raise IdentificationError("a coordinate rests but for the last frame: give the part before")
-    return np.asarray(weight * np.sqrt(2 * len(about) / size))
+    # a start of few digits, or 0, is exact, but what follows from it is not
+    length = np.maximum(away[1:], away[:-1]) + float(np.sqrt(np.sum(centre.astype(np.float64) ** 2)))
+    return np.asarray(np.maximum(length, LEAST_NOISE * np.max(length)))
 
 
-def _about_rest(
-    before: Extended, after: Extended, w: Extended, y: Extended, noise: Extended
-) -> tuple[Extended, Extended, Extended]:
-    """The map (transposed), equilibrium and residuals where the velocity of the equilibrium is 0: five
-    unknowns, found from y, the three of each row by itself, whose rows have this `noise` (2,)."""
-    n = len(before)
-    x = y[:2]
-    gap = np.eye(2) - x.T
-    scale = float(np.sum(gap[:, 0] ** 2))
-    at = np.array([gap[:, 0] @ y[2] / scale if scale else 0.0, 0.0], dtype=np.longdouble)
-    for _ in range(3):
-        columns = np.zeros((2, n, 5), dtype=np.longdouble)
-        columns[0, :, :2] = columns[1, :, 2:4] = before - w * at
-        columns[:, :, 4] = w[:, 0] * gap[:, :1]
-        # the old equilibrium's own part, which the last column corrects
-        right = (after - w * at).T
-        u = least_squares(
-            (columns / noise[:, None, None]).reshape(-1, 5), (right / noise[:, None]).reshape(-1, 1)
-        )[:, 0]
-        x = np.stack([u[:2], u[2:4]], axis=1)
-        gap = np.eye(2) - x.T
-        at = at + np.array([u[4], 0], dtype=np.longdouble)
-    left = after - w * at - (before - w * at) @ x
-    return x, at, np.asarray(left)
+def _constant_part(
+    z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
+) -> tuple[_Solution, int, Extended | None]:
+    """The plainest of no constant, an equilibrium and any constant that explains the states, and the clock's
+    slips where steps follow them."""
+    numbers, slips, centred = 2 * len(process), None, 0
+    least = LEAST_LEFT if record.fine else 1.0
+
+    def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
+        """Whether unknowns more remove so much of chi-squared; by chance each removes 1."""
+        return old.cost - new.cost > least_gain * max(new.chi2 / max(numbers - 6, 1), least)
+
+    best = _minimum(z, sigma, process, start, 0, None)
+    if record.slips is not None and numbers > 20:
+        wide = _minimum(z, sigma, process, best, 1, None)
+        sliding = _minimum(z, sigma, process, wide, 1, record.slips)
+        if gains(wide, sliding, 2 * CONSTANT_SHOWS):
+            slips = record.slips
+            best = _minimum(z, sigma, process, best, 0, slips)
+    unknown = 4 if slips is None else 8
+    plain = best.chi2 <= (numbers - unknown) * least
+    if numbers <= unknown + 2 or (plain and not constant):
+        return best, centred, slips
+    wide = _minimum(z, sigma, process, best, 1, slips)
+    if constant or gains(best, wide, CONSTANT_SHOWS if record.fine else CONSTANT_LIKELY):
+        best, centred = wide, 1
+    if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
+        widest = _minimum(z, sigma, process, best, 2, slips)
+        # at rest the roundings are the same in every step, and add up to a constant of their own
+        shift = (np.eye(2) - widest.entries) @ (widest.centre - best.centre)
+        if gains(best, widest, CONSTANT_SHOWS) and np.max(np.abs(shift)) > 64 * ROUNDING * np.max(np.abs(z)):
+            best, centred = widest, 2
+    return best, centred, slips
 
 
-def _seen_through_storage(
-    found: Map, quanta: Floats, inverse: Floats, before: Extended, *, text: bool
-) -> Map:
-    """The map with what its states' storage, to within `quanta` (f, 2), says of it.
-
-    Where all states are one orbit, rounded once, that orbit knows the map best.  Text does not show
-    whether the arithmetic was coarser than it, so there it is enough that an orbit explains it.
-    """
-    storage = _storage_covariance(before, found.entries, quanta, found.weight, inverse)
-    pairs = replace(found, covariance=(found.covariance + storage) * repeats(found.z))
-    whole = orbit(found.z, quanta, found.entries, constant=bool(np.any(found.centre != 0)))
-    if whole is None:
-        return pairs
-    if not (whole.within if text else whole.once):
-        return replace(pairs, once=whole.once)
-    return replace(
-        found,
-        entries=whole.entries,
-        covariance=whole.covariance,
-        z=found.z - whole.centre,
-        centre=found.centre + whole.centre * found.size,
-        whole=True,
-        once=whole.once,
-    )
+def _fed_back(
+    z: Extended, sigma: Floats, process: Floats, start: _Solution, centred: int, freedom: int
+) -> _Solution:
+    """States that were rounded in every step as well, and not only as they were written: by as much as what
+    is left over asks for."""
+    level = float(np.median(np.max(sigma[1:], axis=1) / process))
+    found = start
+    for _ in range(4):
+        found = _minimum(z, sigma / 2, level * process, found, centred, None)
+        share = found.chi2 / freedom
+        if 0.9 < share < 1.1:
+            break
+        level *= math.sqrt(max(share, 0.1))
+    return found
 
 
-def _storage_covariance(
-    before: Extended, entries: Extended, quanta: Floats, weight: Floats, inverse: Floats
-) -> Floats:
-    """Covariance (4, 4) of the entries from the rounding of each recorded number, uniform within a quantum.
-
-    A rounded state stands in two pairs, once as the later and once as the earlier one; the two
-    influences partly cancel, so they are summed before they are squared.
-    """
-    b = entries.astype(np.float64)
-    later, earlier = np.zeros((2, len(quanta), 2))
-    later[1:] = earlier[:-1] = weight[:, None] ** 2 * before.astype(np.float64)
-    # influence[m, j, i, a]: of the error of component j of state m on entry (i, a)
-    influence = np.eye(2)[None, :, :, None] * later[:, None, None, :]
-    influence = influence - b.T[None, :, :, None] * earlier[:, None, None, :]
-    influence = (influence @ inverse).reshape(len(quanta), 2, 4)
-    weighted = (influence * (quanta / np.sqrt(12.0))[:, :, None]).reshape(-1, 4)
-    return np.asarray(weighted.T @ weighted)
+def repeats(z: Extended) -> float:
+    """How often each state comes back: roundings that repeat with the motion do not average away."""
+    return len(z) / len(np.unique(z.astype(np.float64) @ [1, 1j]))

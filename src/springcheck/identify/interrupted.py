@@ -7,8 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.identify.compare import compare
 from springcheck.identify.evidence import FALLS, Evidence, matched, title
+from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map, fit
+from springcheck.identify.hypothesis import distinct
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
 
@@ -59,7 +62,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if float(np.max(size[bad])) < min(2 * float(np.min(size[kept])), middle / LARGER):
         # an error of one size shows where a motion that grows or dies is smallest
         return []
-    whose = f" of {title(fitting[0].scheme)}" if fitting else ""
+    whose = f" of {title(fitting[0].scheme)}" if fitting else _damped(found, e)
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
     ranks = np.argsort(np.argsort(size))[bad]
@@ -79,7 +82,17 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic or changes in time"
         )
-    return [Explanation(cause=cause, remedy=remedy, misfit=after / before)]
+    return [Explanation(cause=cause, remedy=remedy, misfit=after / before, local=True)]
+
+
+def _damped(found: Map, e: Evidence) -> str:
+    """The scheme with friction that fits the rest of a motion, in a sentence; "" where none does."""
+    joints = compare([found], [e.terms], distinct(damped=True), range(1, 2))
+    if not joints:
+        return ""
+    best = FAMILIES[min(joints, key=lambda x: x.plainness).family]
+    law = " ".join(x for x in ("with", best.laws[0], best.place) if x)
+    return f" of {title(best.scheme)} {law}"
 
 
 def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
@@ -114,7 +127,8 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
             power = b @ power
         if first == 0:
             return (
-                f"The motion is one{whose}, but frame 0 does not belong to it",
+                f"The motion is one{whose}, but frame 0 does not belong to it: a wrong start, or a scheme "
+                "with memory, whose force or velocity is that of the step before",
                 "look at how the start is set and recorded, or leave frame 0 out",
             )
         off = (to - b @ from_).astype(np.float64)

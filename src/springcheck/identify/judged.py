@@ -8,8 +8,8 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify import coupled
-from springcheck.identify.fit import ROUNDING, Map, fit
-from springcheck.identify.record import SIZES, Record
+from springcheck.identify.fit import Map, fit
+from springcheck.identify.record import ROUNDING, SIZES, Record
 from springcheck.identify.search import COARSE
 
 
@@ -34,6 +34,10 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
                 return modes, good, [kept[i] for i in good], [*notes, *notes_of]
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
     lost = [j for j in maps if j not in good]
+    rough = [j for j in lost if maps[j].spans and not (maps[j].conditioned and maps[j].clean)]
+    if not good and rough:
+        # the states span the plane, and what one map leaves over is larger than rounding: that has a cause
+        return record, rough[:1], [maps[rough[0]]], notes
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:
             j = lost[0] if lost else free[0]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from springcheck.identify.families import EULER, FAMILIES, POSITION, VERLET, Family, Stage
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
-from springcheck.schemes import number, rotation
+from springcheck.schemes import SCHEMES, Scheme, matrix, number, rotation
 
 KINDS: dict[str, tuple[float, float, float]] = {
     "kick": (0, 0, 0),
@@ -75,7 +75,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class MapTable:
     """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
 
     families: tuple[Family, ...]
@@ -154,7 +154,7 @@ class Table:
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
                 at = n == i if np.ndim(n) else slice(None)
-                out[:, :, at] = FORMULAS[self.families[i].formula](a[at])
+                out[:, :, at] = _formula(self.families[i].formula)(a[at])
             return out
         over, under, inside = (x[..., n] for x in self.rational[a.dtype])
         return _rational(over, under, a, g * inside)
@@ -195,15 +195,15 @@ class Table:
 
 
 @cache
-def table(families: tuple[Family, ...]) -> Table:
+def table(families: tuple[Family, ...]) -> MapTable:
     """The families' coefficients."""
     degree = max(len(part) for family in families for part in (*family.stability, (1,)))
 
-    def coefficients(row: tuple[Fraction, ...]) -> list[np.longdouble]:
+    def coefficients(row: tuple[Fraction | str, ...]) -> list[np.longdouble]:
         values = [np.longdouble(number(x, np.longdouble)) for x in row]
         return values + [np.longdouble(0)] * (degree - len(row))
 
-    one = (Fraction(1),)
+    one: tuple[Fraction | str, ...] = (Fraction(1),)
     parts = [
         np.array([coefficients(family.stability[i] or one) for family in families], np.longdouble).T
         for i in (0, 1)
@@ -216,11 +216,12 @@ def table(families: tuple[Family, ...]) -> Table:
         "rational": [bool(family.stability[0]) for family in families],
     }
     slots = _slots(families)
-    return Table(
+    under = max([2, *(len(family.stability[1]) for family in families)])
+    return MapTable(
         families=families,
         slots=tuple({x: tuple(row.astype(x)) for x in WIDTHS} for row in slots),
         flags=slots != 0,
-        rational={x: tuple(y.astype(x) for y in (parts[0], parts[1][:2], inside)) for x in WIDTHS},
+        rational={x: tuple(y.astype(x) for y in (parts[0], parts[1][:under], inside)) for x in WIDTHS},
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
         held=np.array(kinds["held"]),
@@ -305,6 +306,15 @@ def power(matrices: Reals, strides: Floats) -> Reals:
     return np.asarray(out * (root**s * np.where(np.mod(s, 2) == 0, 1, sign))[:, None, None])
 
 
+def powers(entries: Extended, frames: int) -> Extended:
+    """entries (2, 2) to the powers 0 to frames - 1, (frames, 2, 2), by doubling."""
+    out, last = np.eye(2, dtype=np.longdouble)[None], entries
+    while len(out) < frames:
+        out = np.concatenate([out, out @ last])
+        last = last @ last
+    return np.asarray(out[:frames])
+
+
 def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
     q11, q12 = 1 - drift * first * a, drift + 0 * a
     return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
@@ -339,3 +349,13 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
     },
 }
 """Maps of faults, (2, 2, c), that stages do not give."""
+
+
+def _formula(name: str) -> Callable[[Reals], Reals]:
+    """That of a fault, or of a scheme that is stepped."""
+    return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
+
+
+def _stepped(scheme: Scheme, a: Reals) -> Reals:
+    found = matrix(scheme, h=1.0, m=np.ones(1), k=np.asarray(a, np.longdouble))
+    return np.moveaxis(found, 0, -1).astype(a.dtype)

@@ -70,7 +70,7 @@ _KNOWN = (
     Meaning(
         name="held-force",
         title="one force held over several substeps",
-        formula="q' = q + h v - s (h**2 F/m), v' = v - h F/m with one F; s tells the number of substeps",
+        formula="q' = q + h v + s (h**2 F/m), v' = v + h F/m with one F; s tells the number of substeps",
         sees="frame skip: a control loop that sets the force once for several steps of the engine",
         misses="a force held over a whole step of a scheme that calls it once anyway",
     ),

@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.errors import IdentificationError
+from springcheck.identify.compare import compare
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.maps import table, unit
+from springcheck.identify.guesses import roots_of
+from springcheck.identify.hypothesis import Joint, Terms
+from springcheck.identify.maps import unit
 from springcheck.identify.record import Record
-from springcheck.identify.result import Identification
-from springcheck.identify.search import Joint, coincident, numbers, search
-from springcheck.identify.solve import solved
-from springcheck.identify.starts import Terms
+from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.search import SAME_MAP, coincident, numbers
 from springcheck.text.wording import count, either
 
 APART = 10.0
@@ -30,8 +31,11 @@ FEWEST_OF_TEXT, DIGITS_OF_TEXT = 12, 40.0
 others for certain: some 24 frames of 3 digits.  A map, its equilibrium and a start have seven unknowns, and
 roundings of few digits are large beside a short motion."""
 
-SAME = 1e-12
-"""Distance of the entries of two steps that are the same, in double precision."""
+CERTAIN_STEPS = 12
+"""Steps to a frame above which coarse numbers name no scheme: their errors are small, and many lie near."""
+
+MOST_PARTS, MARK = 4, 1e-9
+"""Largest n, and how near a friction must come to h k/(n m) to be that."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -80,6 +84,43 @@ def of_few(record: Record, found: Identification) -> Identification:
     )  # fmt: skip
 
 
+def beside_unknown(found: Identification) -> Identification:
+    """What was found in coarse numbers at a number of steps that nobody stated: what lies between two schemes
+    fits as well, and above `CERTAIN_STEPS` names none."""
+    if not found.fits or found.stride == 1 or found.scheme == "exact":
+        return found
+    statement = f"{found.statement}; or a scheme that is not known here"
+    out = replace(found, statement=statement, notes=(*found.notes, "what would tell: the step, stated"))
+    if found.scheme is None or (found.stride or 0) <= CERTAIN_STEPS:
+        return out
+    return replace(out, verdict="not told apart", scheme=None, aliases=())
+
+
+def of_unasked_friction(found: Identification) -> Identification:
+    """What was found, where the friction is that of a scheme written down wrongly: h k/(n m), n whole."""
+    if not found.fits or not found.friction or not found.step:
+        return found
+    for one in found.candidates:
+        for w, rate in zip(one.omega, one.friction, strict=True):
+            share = rate / (w * w * one.step) if w else 0.0
+            n = round(1 / share) if share > 1 / MOST_PARTS / 2 else round(share)
+            if not (share and 1 <= n <= MOST_PARTS and abs(share * n - 1) < MARK):
+                continue
+            part = "h k/m" if n == 1 else f"h k/({n} m)"
+            cause = (
+                f"{one.scheme} with a friction c/m = {rate:.6g} that was not stated and is {part}: the mark "
+                "of a scheme that is written down wrongly, or of an implicit one, and of no damper"
+            )
+            wrong = Explanation(
+                cause=cause, remedy="compare the factors 1/2 of the step with the scheme's", misfit=0.0
+            )
+            return replace(
+                found, verdict="none", scheme=None, aliases=(), candidates=(), statement=cause, fits=False,
+                explanations=(wrong,),
+            )  # fmt: skip
+    return found
+
+
 def hidden_friction(record: Record, found: Map) -> float:
     """Largest rate c/m [1/T] that the map's determinant leaves room for: five standard errors of it."""
     gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
@@ -94,7 +135,7 @@ def same_maps(record: Record, moving: list[int], maps: list[Map], joint: Joint) 
     if not names or joint.stride != 1:
         return []
     terms = [Terms(mass_unknown=record.momenta, jitter=record.jitter) for _ in maps]
-    found = [x for x in search(maps, terms, range(1, 2), tuple(FAMILIES[x] for x in names)) if x.accepted]
+    found = compare(maps, terms, tuple(FAMILIES[x] for x in names), range(1, 2))
     out = []
     for x in found[:1]:
         omega, stiffness, friction = numbers(record, moving, x)
@@ -137,15 +178,11 @@ def _identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
     if one.stride != other.stride:
         return False
     both = FAMILIES[one.family], FAMILIES[other.family]
-    for a, b in zip(one.parts, other.parts, strict=True):
-        wanted = np.asarray(unit(both[0], np.array([a.a]), np.array([a.g])), np.float64)
-        start = np.array([b.a]), np.array([b.g])
-        _, _, off = solved(
-            table(both[1:]), np.zeros(1, np.int64), *start, wanted, free_scale=free_scale, turns=6
-        )
-        if not off[0] < SAME:
-            return False
-    return True
+    wanted = np.concatenate(
+        [unit(both[0], np.array([x.a]), np.array([x.g])).astype(np.float64) for x in one.parts]
+    )
+    roots = roots_of(both[1:], wanted, SAME_MAP, free_scale=free_scale)[1]
+    return len(set(roots.tolist())) == len(wanted)
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:

@@ -10,12 +10,11 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, held_over, said_of
 from springcheck.identify.evidence import title
 from springcheck.identify.families import FAMILIES, HELD, Family
-from springcheck.identify.fit import ROUNDING
-from springcheck.identify.match import Match
-from springcheck.identify.record import SIZES, Record
+from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
+from springcheck.identify.record import ROUNDING, SIZES, Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.identify.search import FEW, SINGLE_ROOM, Joint, distinct, numbers
+from springcheck.identify.search import SINGLE_ROOM, numbers
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 

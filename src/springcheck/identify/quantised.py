@@ -16,10 +16,10 @@ import numpy as np
 from springcheck.identify.coarse import over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
+from springcheck.identify.guesses import least_squares
+from springcheck.identify.hypothesis import Match
 from springcheck.identify.maps import KINDS
-from springcheck.identify.match import Match
 from springcheck.identify.record import Record
-from springcheck.identify.solve import least_squares
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, number
 
@@ -78,7 +78,7 @@ def reproduced(
     family = FAMILIES[match.family]
     if record.mass is None or found.slips is not None or family.held or family.flow:
         return False
-    if family.scheme not in SCHEMES or SCHEMES[family.scheme].implicit:
+    if family.scheme not in SCHEMES or SCHEMES[family.scheme].has("implicit"):
         return False
     mass, h = float(record.mass[j]), float(record.interval) / match.stride
     # about the equilibrium; velocities as lengths

@@ -8,46 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
+from springcheck.identify.clock import FEWEST_STATES, clock_of
+from springcheck.identify.storage import BINARY, Storage, storage
 from springcheck.physics.arrays import Extended, Floats
 
 ROUNDING = 2.0**-53
 
-FEWEST = 5
-"""Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
-
 LEAST = 2.0**-102
 """Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
 
+DEEP = 2.0**-30
+"""Rounding of a file, as a share of the largest number, below which it shows that of single precision."""
+
 SIZES = 1e-75, 1e75
 """Sizes of numbers whose fourth powers are numbers of double precision still."""
-
-ADDED_UP = 64
-"""Roundings of a clock that adds up its steps from frame to frame, half of one for each."""
-
-SAMPLE = 500
-"""Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Storage:
-    """How numbers were written down: `name` ("double", "single", "text, 6 digits"), and how finely."""
-
-    name: str = "double"
-    digits: int = 0
-    """Significant decimal digits; 0 where the numbers are not decimal text of that kind."""
-    decimals: int | None = None
-    """Digits after the point, where that is what is constant."""
-
-    def quantum(self, x: Floats) -> Floats:
-        """Distance of neighbouring numbers around x that the storage can hold."""
-        if self.decimals is not None:
-            return np.full(x.shape, 10.0**-self.decimals)
-        if self.digits:
-            size = np.where(x == 0, 1.0, np.abs(x))
-            return np.where(x == 0, 0.0, 10.0 ** (np.floor(np.log10(size)) - self.digits + 1))
-        if self.name == "single":
-            return np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
-        return np.asarray(np.spacing(np.abs(x)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,81 +59,25 @@ class Record:
         """Distance of neighbouring numbers around each state (f, 2) of an oscillator, on (q, v interval)."""
         return np.stack([self.q_quantum[:, j], self.v_quantum[:, j] * abs(float(self.interval))], axis=1)
 
+    def sigma(self, j: int) -> Floats:
+        """Standard uncertainty (f, 2) of the states (q, v interval) of an oscillator, as they were written;
+        0 in double precision, whose rounding is that of the arithmetic."""
+        coarse = [self.q_storage.name != "double", self.v_storage.name != "double"]
+        return np.asarray(self.quanta(j) * coarse / np.sqrt(12.0))
+
+    @property
+    def deep(self) -> bool:
+        """Whether all numbers show roundings of single precision: `fine`, or text of that many digits."""
+        pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
+        return self.fine or all(
+            bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY
+            for (x, quantum), x_storage in zip(pairs, (self.q_storage, self.v_storage), strict=True)
+        )
+
     @property
     def text(self) -> bool:
         """Whether some numbers were written as decimal text of few digits."""
         return any(x.name.startswith("text") for x in (self.q_storage, self.v_storage))
-
-
-def storage(x: Floats) -> Storage:
-    """How x was written down, from the numbers themselves."""
-    values = np.ravel(x)
-    values = values[values != 0]
-    if len(np.unique(np.abs(values))) < FEWEST - 1:
-        return Storage()
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = values.astype(np.float32).astype(np.float64)
-    # a unit conversion in double precision leaves the numbers within an ulp of single ones
-    single = bool(np.all(np.abs(rounded - values) <= 2.0**-51 * np.abs(values)))
-    sample = [float(y) for y in values[np.linspace(0, len(values) - 1, min(len(values), SAMPLE)).astype(int)]]
-
-    def same(text: str, y: float) -> bool:
-        return bool(np.float32(text) == np.float32(y)) if single else float(text) == y
-
-    most = 7 if single else 9
-    digits = next((d for d in range(1, most + 1) if all(same(f"{y:.{d - 1}e}", y) for y in sample)), 0)
-    decimals = next((d for d in range(most) if all(same(f"{y:.{d}f}", y) for y in sample)), None)
-    found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
-    if decimals is not None:
-        found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
-    # text that is finer than the numbers around it says nothing: every number has such a decimal form
-    values = np.array(sample)
-    binary = Storage(name="single" if single else "double").quantum(values)
-    found = [text for text in found if np.all(text.quantum(values) >= 2 * binary)]
-    if found:
-        # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
-        # neighbours below it ten times as close as those above
-        below = values * (1 - 2.0**-40)
-        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
-    return Storage(name="single") if single else Storage()
-
-
-def _interval(t: Floats) -> tuple[np.longdouble, float, float, Extended | None]:
-    """The interval of times t (f,), its relative uncertainty, the rounding of t in intervals, and the
-    relative excess of each interval where double precision shows it."""
-    wide = t.astype(np.longdouble)
-    interval = (wide[-1] - wide[0]) / (len(t) - 1)
-    if interval == 0:
-        raise IdentificationError("all times are equal: the interval between the states is unknown")
-    off = np.abs(np.diff(wide) - interval)
-    worst = int(np.argmax(off))
-    even = float(np.max(np.spacing(np.abs(t))))
-    # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal, and those of a
-    # float32 clock are not text: the finest of the grids that the times lie on explains them
-    single = bool(np.all(t.astype(np.float32) == t))
-    grids = [even]
-    grids += [float(np.max(np.spacing(np.abs(t).astype(np.float32))))] if single else []
-    grids.append(float(np.max(storage(t).quantum(t))))
-    # two rounded times make a difference, and a clock that adds its step up rounds once more each time
-    quantum = next((x for x in grids if off[worst] <= 4 * x), None)
-    quantum = even if quantum is None and off[worst] <= ADDED_UP * even else quantum
-    if quantum is None:
-        raise IdentificationError(
-            f"the states are not at a constant interval: frames {worst} and {worst + 1} are "
-            f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
-            "give a part of the trajectory with one interval"
-        )
-    jitter = quantum / abs(float(wide[-1] - wide[0])) + 2.0**-53
-    slips = None
-    if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
-        slips = np.asarray(np.diff(wide) / interval - 1)
-    elif quantum != even:
-        # a program's step is a short decimal, and a coarse clock leaves room for it
-        near = (float(f"{float(interval):.{digits}g}") for digits in range(1, 8))
-        interval = np.longdouble(
-            next((x for x in near if abs(x / float(interval) - 1) <= jitter), float(interval))
-        )
-    return interval, jitter, quantum / abs(float(interval)), slips
 
 
 def _states(x: ArrayLike, name: str, frames: int) -> Floats:
@@ -181,7 +99,7 @@ def _alive(positions: Floats, moving: Floats) -> int:
     """
     alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
     last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
-    return last + 1 if last + 1 >= FEWEST else len(positions)
+    return last + 1 if last + 1 >= FEWEST_STATES else len(positions)
 
 
 def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -> Floats | None:
@@ -210,9 +128,9 @@ def read(
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
-    if len(times) < FEWEST:
+    if len(times) < FEWEST_STATES:
         raise IdentificationError(
-            f"{len(times)} states are too few to read a map from; give {FEWEST} or more"
+            f"{len(times)} states are too few to read a map from; give {FEWEST_STATES} or more"
         )
     if p is None and v is None:
         raise IdentificationError(
@@ -226,7 +144,8 @@ def read(
                 f"positions have shape {positions.shape}, momenta or velocities {x.shape}: they must agree"
             )
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        interval, jitter, clock, slips = _interval(times)
+        clock = clock_of(times)
+        interval = clock.interval
         sizes = {
             "times": abs(float(interval)),
             "positions": float(np.max(np.abs(positions), initial=0.0)),
@@ -251,7 +170,7 @@ def read(
     if v is None and masses is not None:
         unit = masses.astype(np.longdouble)
     # the start is what a program was given; only what it computed shows how it computes
-    computed = slice(1 if len(times) > FEWEST else 0, None)
+    computed = slice(1 if len(times) > FEWEST_STATES else 0, None)
     q_storage, v_storage = storage(positions[computed]), storage(moving[computed])
     if v is None and masses is not None and v_storage.name == "double":
         # momenta made as m v from single-precision velocities are single only after the division
@@ -264,9 +183,9 @@ def read(
     kept = slice(None if finely else _alive(positions, moving))
     return Record(
         interval=interval,
-        jitter=jitter,
-        clock=clock,
-        slips=None if slips is None or not finely else slips,
+        jitter=clock.jitter,
+        clock=clock.quantum,
+        slips=clock.slips if finely else None,
         q=positions[kept].astype(np.longdouble),
         v=moving[kept].astype(np.longdouble) / unit,
         q_quantum=q_storage.quantum(positions[kept]),
@@ -285,6 +204,10 @@ def stated_stride(record: Record, step: float | None, notes: list[str]) -> int |
     of_size("step", step)
     ratio = float(record.interval / np.longdouble(step))
     stride = round(ratio)
+    if 4 * stride * (record.jitter + ROUNDING) >= 0.5:
+        raise IdentificationError(
+            f"--step {step:g}: {ratio:.3g} of them to a frame are more than the times can tell from one more"
+        )
     if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
         notes.append(
             f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"

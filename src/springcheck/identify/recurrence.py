@@ -15,23 +15,19 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.coarse import irregular
-from springcheck.identify.curves import curves, folded, is_folded, keys
+from springcheck.identify.compare import of_positions, recurrence_of
+from springcheck.identify.coupled import least_squares
 from springcheck.identify.families import Family
-from springcheck.identify.fit import ROUNDING, least_squares
-from springcheck.identify.maps import Table, table, unit
-from springcheck.identify.match import Match, most
-from springcheck.identify.record import Record
-from springcheck.identify.search import distinct
-from springcheck.physics.arrays import Extended, Floats, Integers, Reals
+from springcheck.identify.hypothesis import Match, distinct
+from springcheck.identify.maps import unit
+from springcheck.identify.record import ROUNDING, Record
+from springcheck.physics.arrays import Extended, Floats, Reals
 
 FEWEST_FRAMES = 9
 """Five unknowns of an orbit, and as many frames again that they have to explain."""
 
 UNUSUAL = 2.5
 """Roundings of a frame in units of those that are usual, 4 + 2 sqrt(steps), if they are irregular."""
-
-FLOW_WAYS = 8
-"""Turns, and half turns back, between two frames that the exact flow is looked for at."""
 
 ERRORS = 5.0
 """Standard errors within which a number is no other."""
@@ -236,118 +232,12 @@ def classes() -> tuple[tuple[Family, ...], ...]:
 def _shape(family: Family) -> Reals:
     """alpha and beta at three steps."""
     a = np.array([0.3, 0.7, 1.1])
-    return np.stack(_numbers(unit(family, a, np.zeros(3))))
-
-
-def _numbers(m: Reals) -> tuple[Reals, Reals]:
-    """alpha and beta of maps (c, 2, 2)."""
-    # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation
-    one, other, product = 1 - m[:, 0, 0], 1 - m[:, 1, 1], m[:, 0, 1] * m[:, 1, 0]
-    alpha = one * other - product
-    return alpha, one + other - alpha
+    return np.stack(recurrence_of(unit(family, a, np.zeros(3))))
 
 
 def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
     """Families (one of each class without friction; any with it) whose recurrence this may be, each number of
     steps and of unseen turns."""
-    every = table(families)
-    which, s, turns, a, g = _starts(found, every, strides)
-    if not len(which):
-        return []
-    damped = every.damped
-    free = [0, 1] if damped else [0]
-    weight = np.linalg.cholesky(np.linalg.inv(found.covariance)).T
-    observed = np.array([found.alpha, found.beta])
-    values = np.stack([a, g], axis=1).astype(np.longdouble)
-    one = np.ones(1, dtype=np.longdouble)
-
-    def frames(x: Extended) -> Extended:
-        n = len(which)
-        out = every.frame(which, x[:, 0], x[:, 1], np.zeros(n, np.longdouble), s, np.repeat(one, n))
-        return np.stack(_numbers(out.T.reshape(-1, 2, 2)), axis=1)
-
-    with np.errstate(all="ignore"):
-        for _ in range(12):
-            now = frames(values)
-            columns = []
-            for i in free:
-                shift = np.zeros_like(values)
-                shift[:, i] = 1e-7 * np.abs(values[:, 0]) if i == 0 else 1e-8
-                columns.append((frames(values + shift) - now) / shift[:, [i]])
-            slopes = np.stack(columns, axis=2)
-            white = (weight @ slopes).astype(np.float64)
-            miss = ((observed - now) @ weight.T).astype(np.float64)
-            inverse = np.linalg.pinv(np.nan_to_num(white))
-            change = (inverse @ np.nan_to_num(miss)[:, :, None])[:, :, 0]
-            limit = 0.5 * np.abs(values[:, 0]).astype(np.float64)
-            change[:, 0] = np.clip(change[:, 0], -limit, limit)
-            values[:, free] += change
-        chi2 = np.sum((((observed - frames(values)) @ weight.T).astype(np.float64)) ** 2, axis=1)
-    errors = np.sqrt(np.sum(inverse**2, axis=2))
-    freedom = 2 - len(free)
-    good = chi2 <= (most(1) if freedom else 1e-4)
-    good &= (values[:, 1] > 0) | (not damped)
-    return [
-        Match(
-            family=families[which[i]].name, stride=int(s[i]), turns=int(turns[i]), a=float(values[i, 0]),
-            a_error=float(errors[i, 0]), g=float(values[i, 1]),
-            g_error=float(errors[i, 1]) if damped else 0.0, log_mass=0.0, mass_error=0.0,
-            chi2=float(chi2[i]), freedom=max(freedom, 1), predicted=(),
-        )
-        for i in np.flatnonzero(good)
-    ]  # fmt: skip
-
-
-def _starts(
-    found: Recurrence, every: Table, strides: range
-) -> tuple[Integers, Floats, Floats, Floats, Floats]:
-    """Guesses (c,) of family, steps, unseen turns, a and g, which have the phase and the change of areas."""
-    s, side, turns = _ways(strides)
-    phase = (side * found.phase + 2 * np.pi * turns) / s
-    keep = (phase > 0) & (phase <= np.pi)
-    s, turns, phase = s[keep], turns[keep], phase[keep]
-    parts = []
-    for k, family in enumerate(every.families):
-        if family.flow:
-            _, sides, whole = _ways(range(FLOW_WAYS, FLOW_WAYS + 1))
-            angle = sides * found.phase + 2 * np.pi * whole
-            g = np.full(len(angle), -found.log_det if family.damped else 0.0)
-            good = (g > 0) | (not family.damped)
-            n = int(np.count_nonzero(good))
-            parts.append((np.full(n, k), np.ones(n), whole[good], (angle**2 + g**2 / 4)[good], g[good]))
-        elif family.held:
-            # a kick of the whole force moves the velocity, and the share g of it the position
-            root = np.exp(found.log_det / (2 * s))
-            a = (1 - root) ** 2 + 4 * root * np.sin(phase / 2) ** 2
-            parts.append((np.full(len(s), k), s, turns, a, 1 + (1 - root**2) / a))
-        elif is_folded(family):
-            log_det = found.log_det / s
-            _, index, a, g = folded((family,), log_det, 2 * np.exp(log_det / 2) * np.cos(phase))
-            good = (a > 0) & (g > 0)
-            index, a, g = index[good], a[good], g[good]
-            parts.append((np.full(len(a), k), s[index], turns[index], a, g))
-        else:
-            curve = curves(keys((family,))[0])
-            at, index = np.nonzero((phase > curve.low) & (phase < curve.high))
-            x, loss = curve.at(at, phase[index])
-            off = loss - found.log_det / s[index]
-            g = off if family.damped else np.zeros(len(x))
-            # the area of a frame is known, and that of a scheme without friction beside it
-            room = 0.02 * np.abs(loss) * s[index] + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
-            good = (g > 0) if family.damped else np.abs(loss * s[index] - found.log_det) <= room
-            parts.append(
-                (
-                    np.full(np.count_nonzero(good), k), s[index][good], turns[index][good],
-                    (np.square(x) + np.square(off / 2) * family.damped)[good], g[good],
-                )
-            )  # fmt: skip
-    which, s, turns, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
-    return which, s, turns, a, g
-
-
-def _ways(strides: range) -> tuple[Floats, Floats, Floats]:
-    """Steps, side and unseen turns: without velocities a turn to the left and one to the right look alike."""
-    each = [np.arange(r + 1) for r in strides]
-    s = np.repeat(np.array(strides, np.float64), [len(x) for x in each])
-    i = np.concatenate(each)
-    return s, np.where(i % 2, -1.0, 1.0), ((i + 1) // 2).astype(np.float64)
+    return of_positions(
+        (found.alpha, found.beta), found.covariance, found.phase, found.log_det, families, strides
+    )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
     candidates_of,
@@ -20,32 +21,39 @@ from springcheck.identify.candidates import (
     said_of,
     stated_stiffness,
 )
-from springcheck.identify.coarse import over_single
+from springcheck.identify.compare import compare, nearest
 from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, HELD
+from springcheck.identify.families import FAMILIES, HELD, KNOWN_ELSEWHERE
 from springcheck.identify.fit import Map, fit
+from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
 from springcheck.identify.judged import judged
-from springcheck.identify.notes import LEAPFROG, hidden_friction, of_few, same_maps, untold
+from springcheck.identify.notes import (
+    LEAPFROG,
+    beside_unknown,
+    hidden_friction,
+    of_few,
+    of_unasked_friction,
+    same_maps,
+    untold,
+)
 from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, of_size, read, stated_stride
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.search import (
-    FEW,
     SINGLE,
-    Joint,
     difference,
-    distinct,
+    disagreements,
     find,
-    frictionless,
     numbers,
-    search,
     visible,
 )
-from springcheck.identify.starts import Terms
-from springcheck.identify.wrong import faults_of
+from springcheck.identify.shortened import single_parameters
+from springcheck.identify.thermal import of_bath
+from springcheck.identify.together import of_a_bond, of_rotation
+from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import ELSEWHERE, SCHEMES
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
@@ -97,11 +105,18 @@ def identify_arrays(
     return either_way([*ways, *([_of_states(*reverse, **stated)] if turned else [])])
 
 
-def _of_states(*states: Any, mass: ArrayLike | None, **stated: Any) -> Identification:
+def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stated: Any) -> Identification:
     """The scheme of times, positions, momenta and velocities, of which one may be None."""
-    t, q, p, v = states
     record = read(t, q, p, v, mass)
-    return of_few(record, _of_record(record, **stated))
+    try:
+        found = of_few(record, _of_record(record, **stated))
+    except IdentificationError:
+        if in_a_bath := of_bath(t, q, p, v, mass):
+            return in_a_bath
+        raise
+    # what a scheme or the record explains takes no noise
+    local = any(x.local for x in found.explanations)
+    return found if found.candidates or local else of_bath(t, q, p, v, mass) or found
 
 
 def _of_record(
@@ -135,12 +150,17 @@ def _of_record(
         explained = _explained(record, moving, apart, joints, terms)
         maps = apart if explained else maps
     if not explained:
-        joints, remark = _single_parameters(record, moving, maps, base, stride)
+        joints = compare(maps, base, KNOWN_ELSEWHERE, FEW)
+        explained = _explained(record, moving, maps, sorted(joints, key=lambda x: x.stride)[:1], base)
+    if not explained:
+        joints, remark = single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)
         notes += [remark] if explained else []
     if not explained:
         return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
     joints = list(explained)
+    if stated is not None and disagreements(record, moving, joints[0], stated):
+        stated = of_a_bond(record, moving, stated, notes)
     if stated is not None:
         precisions = {x: ds[0].precision for x, ds in explained.items()}
         joints = of_stated_stiffness(record, moving, precisions, stated)
@@ -159,11 +179,12 @@ def _of_record(
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    if (
-        stated is not None
-        and found.explanations
-        and (faults := faults_of(record, moving, maps, base, stated))
-    ):
+    found = beside_unknown(found) if stride is None and not record.deep else found
+    if stated is None:
+        return of_rotation(record, moving, found)
+    found = of_unasked_friction(found) if friction is None else found
+    faults = faults_of(record, moving, maps, base, stated) if found.explanations and found.candidates else []
+    if faults:
         # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
         return replace(
             found, verdict="none", scheme=None, candidates=(), aliases=(), statement=faults[0].cause,
@@ -188,8 +209,9 @@ def _terms(record: Record, j: int, stated: Floats | None) -> Terms:
     log_stiffness = None
     if record.momenta and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
-    scale = 0.0 if record.fine else SINGLE
-    return Terms(mass_unknown=record.momenta, jitter=record.jitter, log_stiffness=log_stiffness, scale=scale)
+    # in a coarse file a step or a mass may be in single precision as well
+    jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
+    return Terms(mass_unknown=record.momenta, jitter=jitter, log_stiffness=log_stiffness)
 
 
 def _explained(
@@ -216,33 +238,6 @@ def _explained(
         defects = [[*defects[k], new[k]] for k in explained]
         left = [left[k] for k in explained]
     return dict(zip(left, defects, strict=True))
-
-
-def _single_parameters(
-    record: Record, moving: list[int], maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], str]:
-    """Schemes that fit if the step or the mass is the stated one in single precision, and which of them."""
-    if record.momenta:
-        return [], ""
-    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in moving]
-    heavier = [_shortened(m) for m in masses]
-    strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
-    longer = [0.0, *(_shortened(record.interval / s) for s in range(1, strides.stop))]
-    for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
-        for what, of_mass, of_step in (("step", 0, 1), ("mass", 1, 0), ("step and the mass", 1, 1)):
-            scales = [tuple(of_mass * m - of_step * h for h in longer) for m in heavier]
-            if not any(any(row[1:]) for row in scales):
-                continue
-            loose = [replace(x, log_mass=row) for x, row in zip(base, scales, strict=True)]
-            if joints := [x for x in search(maps, loose, strides, families) if x.accepted]:
-                remark = f"the {what} was rounded to single precision in double arithmetic"
-                return sorted(joints, key=lambda x: x.plainness), remark
-    return [], ""
-
-
-def _shortened(x: np.longdouble | float) -> float:
-    """Log of a number in single precision over the number."""
-    return -float(np.log(over_single(x)))
 
 
 def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
@@ -290,6 +285,8 @@ def _known(
         statement = f"{held_over(plainest)} ({order}){steps}"
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
+        slips = faults_like(scheme) if scheme in ELSEWHERE else ()
+        also = "".join(f" (on a spring also {x.cause})" for x in slips) or also
         statement = f"{title(scheme)}{also}{law}{steps}: {precision} arithmetic explains every step"
     else:
         names = list(dict.fromkeys(x.scheme for x in candidates))
@@ -375,7 +372,7 @@ def _unknown(
     def distance(joint: Joint) -> float:
         return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
-    tried = search(maps, terms, strides, far=True)
+    tried = nearest(maps, terms, distinct(damped=False), strides)
     determinant, symplectic = _determinants(maps, 1)
     near: dict[str, Any] = {}
     if tried:

@@ -1,4 +1,4 @@
-"""The search: every family and stride against the maps of all oscillators together."""
+"""The search: which hypotheses are looked at in turn, and what those that are left would mean."""
 
 from __future__ import annotations
 
@@ -8,24 +8,14 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.families import (
-    DAMPED,
-    FAMILIES,
-    G_ROUNDING,
-    HELD,
-    UNDAMPED,
-    Family,
-    endless,
-    substeps,
-)
-from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.maps import table, unit
-from springcheck.identify.match import Match, match
-from springcheck.identify.record import Record
-from springcheck.identify.solve import solved
-from springcheck.identify.starts import Terms
-from springcheck.physics.arrays import Floats, Reals
-from springcheck.schemes import SCHEMES
+from springcheck.identify.compare import compare, nearest
+from springcheck.identify.families import FAMILIES, HELD, Family
+from springcheck.identify.fit import Map
+from springcheck.identify.guesses import roots_of
+from springcheck.identify.hypothesis import FEW, MANY, STRIDES, Joint, Match, Terms, distinct, likely
+from springcheck.identify.maps import unit
+from springcheck.identify.record import ROUNDING, Record
+from springcheck.physics.arrays import Floats
 
 BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
@@ -40,9 +30,6 @@ SINGLE_ROOM = 8 * SINGLE
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
 
-EXCLUDED = 25.0
-"""By which chi-squared exceeds that of the best where a scheme is excluded: five standard errors."""
-
 POOR = 8.0
 """Chi-squared of three degrees of freedom that chance exceeds once in 20."""
 
@@ -52,169 +39,20 @@ ONE_MORE = 4.0
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Joint:
-    """One family and stride for all oscillators together."""
-
-    family: str
-    stride: int
-    parts: tuple[Match, ...]
-
-    @property
-    def scheme(self) -> str:
-        return FAMILIES[self.family].scheme
-
-    @property
-    def accepted(self) -> bool:
-        return all(part.accepted for part in self.parts)
-
-    @property
-    def chi2(self) -> float:
-        return sum(part.chi2 for part in self.parts)
-
-    @property
-    def damped(self) -> bool:
-        return FAMILIES[self.family].damped and not FAMILIES[self.family].held
-
-    @property
-    def keeps_area(self) -> bool:
-        """Whether all maps predicted have a determinant of 1."""
-        entries = np.array([part.predicted for part in self.parts])
-        return bool(np.all(np.abs(entries[:, 0] * entries[:, 3] - entries[:, 1] * entries[:, 2] - 1) < 1e-12))
-
-    @property
-    def plainness(self) -> tuple[int, int, int]:
-        """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
-        return (
-            max(part.turns for part in self.parts),
-            self.stride,
-            -1 if self.scheme == "exact" else list(FAMILIES).index(self.family),
-        )
-
-    @property
-    def substeps(self) -> tuple[range, bool]:
-        """Numbers of substeps that a force may be held over, and whether they kick first."""
-        found = [substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts]
-        if len({first for _, first in found}) > 1:
-            return range(0), True
-        return range(max(n.start for n, _ in found), min(n.stop for n, _ in found)), found[0][1]
-
-    @property
-    def endless(self) -> bool:
-        """Whether the force may be held over no end of substeps."""
-        return all(endless(part.g, part.g_error + G_ROUNDING) for part in self.parts)
-
-    def __str__(self) -> str:
-        steps = "" if self.stride == 1 else f", {self.stride} steps a frame"
-        return self.scheme + steps
-
-
-def same_map(one: Family, other: Family, g: tuple[float, ...] = (0, 0, 0)) -> bool:
-    """Whether two families have one map at three steps, with these frictions."""
-    return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
-
-
-@cache
-def _samples(family: Family, g: tuple[float, ...]) -> Reals:
-    return unit(family, np.array([0.3, 1.1, 2.9], np.longdouble), np.array(g, np.longdouble))
-
-
-@cache
-def aliases(name: str) -> tuple[str, ...]:
-    """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
-    own = FAMILIES[name], FAMILIES[f"{name}, damped"]
-    return tuple(
-        f.scheme
-        for f in UNDAMPED
-        if f.scheme != name
-        and same_map(f, own[0], (0, 0, 0))
-        and same_map(FAMILIES[f"{f.scheme}, damped"], own[1], (0, 0.2, 0.5))
-    )
-
-
-@cache
-def frictionless(name: str) -> tuple[str, ...]:
-    """Schemes with a friction of their own whose map is this one's where there is none."""
-    return tuple(
-        f.scheme
-        for f in UNDAMPED
-        if f.scheme != name
-        and any(kind == "friction" for kind, _ in SCHEMES[f.scheme].stages)
-        and same_map(f, FAMILIES[name], (0, 0, 0))
-    )
-
-
-@cache
-def distinct(*, damped: bool) -> tuple[Family, ...]:
-    """One family of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
-    out: list[Family] = []
-    for family in DAMPED if damped else UNDAMPED:
-        if not damped and any(kind == "friction" for kind, _ in family.stages):
-            continue
-        if not any(same_map(family, other, (0.1, 0.2, 0.5)) for other in out):
-            out.append(family)
-    return tuple(out)
+SAME_MAP = 1e-12
+"""Distance of the entries of two steps that are the same, in double precision."""
 
 
 @cache
 def coincident(name: str) -> tuple[str, ...]:
     """Damped families that have the map of this scheme without friction, on springs of another stiffness."""
-    a = np.array([0.3, 0.7, 1.1])
-    wanted = np.asarray(unit(FAMILIES[name], a, np.zeros(3)), np.float64)
-    g = -np.log(np.abs(np.linalg.det(wanted)))
-    if not np.all(g > 1e-9):
+    wanted = np.asarray(unit(FAMILIES[name], np.array([0.3, 0.7, 1.1]), np.zeros(3)), np.float64)
+    if not np.all(np.log(np.abs(np.linalg.det(wanted))) < -1e-9):
         return ()
-    every = table(distinct(damped=True))
-    n = len(every.families)
-    _, rates, off = solved(
-        every, np.repeat(np.arange(n), 3), np.tile(a + (g / 2) ** 2, n), np.tile(g, n),
-        np.tile(wanted, (n, 1, 1)), free_scale=False, turns=40,
-    )  # fmt: skip
-    same = np.all(((off < 1e-12) & (rates > 1e-6)).reshape(n, 3), axis=1)
-    return tuple(family.name for family, known in zip(every.families, same, strict=True) if known)
-
-
-def search(
-    maps: list[Map],
-    terms: list[Terms],
-    strides: range,
-    families: tuple[Family, ...] = (),
-    *,
-    far: bool = False,
-) -> list[Joint]:
-    """Every family and stride against every oscillator; what fails one is not tried on the others.
-
-    Those that are accepted, or with `far` all."""
-    families = families or distinct(damped=False)
-    asked = "search", families, tuple(terms), strides, far
-    if len(maps) > 1 or asked not in maps[0].found:
-        maps[0].found[asked] = _searched(maps, terms, strides, families, far=far)
-    return list(maps[0].found[asked])
-
-
-def _searched(
-    maps: list[Map], terms: list[Terms], strides: range, families: tuple[Family, ...], *, far: bool
-) -> list[Joint]:
-    first = match(families, maps[:1], terms[:1], strides, far=far)[0]
-    passing = {key: m for key, m in first.items() if m.accepted} or (first if far else {})
-    rest: list[dict[tuple[str, int], Match]] = []
-    if passing and len(maps) > 1:
-        left = tuple(f for f in families if any(f.name == name for name, _ in passing))
-        found = [stride for _, stride in passing]
-        within = range(min(found), max(found) + 1)
-        rest = match(left, maps[1:], terms[1:], within, keys=set(passing), far=far)
-    return [
-        Joint(family=key[0], stride=key[1], parts=(m, *(x[key] for x in rest)))
-        for key, m in passing.items()
-        if all(key in x for x in rest)
-    ]
-
-
-STRIDES = 12, 100
-"""Strides looked at: first up to this many steps per frame, and where nothing fits, up to so many."""
-
-FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
+    every = distinct(damped=True)
+    which, root, _, g = roots_of(every, wanted, SAME_MAP)
+    good = {(i, j) for i, j, x in zip(which.tolist(), root.tolist(), g.tolist(), strict=True) if x > 1e-6}
+    return tuple(f.name for i, f in enumerate(every) if all((i, j) in good for j in range(3)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -241,12 +79,12 @@ def find(
     residual = max(float(np.max(found.residual)) for found in maps)
     whole = all(found.whole for found in maps)
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    for rooms in _plan(fine=record.fine, text=record.text, whole=whole, residual=residual):
+    for rooms in _plan(record, whole=whole, residual=residual):
         accepted: list[Joint] = []
         for room in rooms:
             terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in base]
             for strides in (*first, *room.strides):
-                fitting = [x for x in search(maps, terms, strides, room.families) if x.accepted]
+                fitting = compare(maps, terms, room.families, strides)
                 if fitting:
                     accepted += fitting
                     if strides is FEW and (MANY in room.strides or not room.bias):
@@ -255,11 +93,11 @@ def find(
                         accepted += _rivals(maps, terms, fitting, many=strides is MANY)
                     break
         if accepted:
-            return _likely(accepted), terms
+            return likely(accepted), terms
     return [], base
 
 
-def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[Room]]:
+def _plan(record: Record, *, whole: bool, residual: float) -> list[list[Room]]:
     """What is allowed for, the plainest first; what stands together is equally plain.
 
     Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
@@ -270,7 +108,7 @@ def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[
     that none could be named.
     """
     biased = [BIAS] if residual > COARSE and not whole else []
-    if fine:
+    if record.fine:
         rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
         return [*rooms, [Room(strides=(MANY,))]]
     near = (FEW, MANY)
@@ -279,10 +117,10 @@ def _plan(*, fine: bool, text: bool, whole: bool, residual: float) -> list[list[
         for rounding in (ROUNDING, SINGLE)
         for damped in (False, True)
     )
-    coarse = residual > 2.0**-40
+    coarse = residual > 2.0**-40 and not record.deep
     out: list[list[Room]] = []
     if whole or not coarse:
-        out += [[double], [double_damped, single] if text and coarse else [double_damped]]
+        out += [[double], [double_damped, single] if record.text and coarse else [double_damped]]
     if coarse:
         out += [[single], [single_damped]]
     return out + [
@@ -302,10 +140,14 @@ def _further(
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
     if open_ended or (coarse and not room.damped):
-        out += [x for x in search(maps, terms, MANY, room.families) if x.accepted]
-    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
-        out += [x for x in search(maps, terms, FEW, distinct(damped=True)) if x.accepted]
+        out += compare(maps, terms, room.families, MANY)
+    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED_BY_FRICTION:
+        out += compare(maps, terms, distinct(damped=True), FEW)
     return out
+
+
+EXCLUDED_BY_FRICTION = 25.0
+"""Chi-squared from which friction may explain what a scheme without it leaves over: five standard errors."""
 
 
 def _rivals(maps: list[Map], terms: list[Terms], fitting: list[Joint], *, many: bool) -> list[Joint]:
@@ -314,15 +156,8 @@ def _rivals(maps: list[Map], terms: list[Terms], fitting: list[Joint], *, many: 
     losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
     others = distinct(damped=True) if losing else ()
     same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
-    found = [x for x in search(maps, terms, FEW, (*others, HELD)) if x.accepted]
+    found = compare(maps, terms, (*others, HELD), FEW)
     return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
-
-
-def _likely(accepted: list[Joint]) -> list[Joint]:
-    """Those of which the best is not five standard errors better, each once, the plainest first."""
-    best = min(x.chi2 for x in accepted)
-    each = {(x.family, x.stride): x for x in sorted(accepted, key=lambda x: -x.chi2)}
-    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
 
 
 def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
@@ -334,8 +169,8 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
     asked = "visible", terms, damped
     if asked not in found.found:
         flow = FAMILIES["exact, damped" if damped else "exact"]
-        near = match((flow,), [found], [replace(terms, bias=1.0)], range(1, 2), far=True)[0]
-        found.found[asked] = all(m.chi2 > PLAIN**2 for m in near.values())
+        near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
+        found.found[asked] = all(m.chi2 > PLAIN**2 for m in near)
     return bool(found.found[asked])
 
 

@@ -13,8 +13,9 @@ from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify.evidence import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import ELSEWHERE, SCHEMES
 
 Stepper: TypeAlias = Callable[..., Any]
 
@@ -116,12 +117,16 @@ def identify_stepper(step: Stepper) -> Identification:
         )
     if found.scheme and not wrong:
         wrong += _backwards(step, found)
+    if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
+        # more stages than the scheme needs: a fault of the same map has them
+        wrong += [_wrong(one.cause, one.remedy) for one in faults_like(found.scheme)]
     slope, deviation = _order(step)
     if math.isnan(slope):
         notes.append("its error on a quartic well does not fall as a power of the step: no order is seen")
     else:
         notes.append(f"order {slope:.2f} +- {deviation:.2f} on a quartic well")
-        order = SCHEMES[found.scheme].order if found.scheme in SCHEMES else 0
+        known = SCHEMES.get(str(found.scheme)) or ELSEWHERE.get(str(found.scheme))
+        order = known.order if known else 0
         if order and slope < order - max(5 * deviation, 0.25):
             wrong.append(
                 _wrong(
@@ -140,6 +145,19 @@ def identify_stepper(step: Stepper) -> Identification:
         notes=tuple(dict.fromkeys(notes)),
         defect_ulp=max(x.defect_ulp for x in results),
     )
+
+
+def _calls(step: Stepper) -> int:
+    """Evaluations of the force in a step."""
+    m, k, h = SPRINGS[0]
+    calls = [0]
+
+    def force(q: Any, p: Any = 0.0) -> Any:
+        calls[0] += 1
+        return -k * q
+
+    _one(step, 1.3, 0.7 * m, h, force, m)
+    return calls[0]
 
 
 def _wrong(cause: str, remedy: str) -> Explanation:

@@ -7,13 +7,14 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.evidence import Evidence, distance, title
-from springcheck.identify.families import FAMILIES, FAULTS, HELD, Family
-from springcheck.identify.fit import ROUNDING, Map
-from springcheck.identify.record import Record
+from springcheck.identify.compare import compare
+from springcheck.identify.evidence import Evidence, matched, title
+from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, Family
+from springcheck.identify.fit import Map
+from springcheck.identify.hypothesis import Joint, Terms, distinct, same_map
+from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Explanation
-from springcheck.identify.search import Joint, distinct, same_map, search
-from springcheck.identify.starts import Terms
+from springcheck.identify.unknown import misfit
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
@@ -24,17 +25,44 @@ def _faults() -> tuple[Family, ...]:
     return tuple(f for f in FAULTS if not any(same_map(f, scheme) for scheme in distinct(damped=False)))
 
 
+@cache
+def faults_like(scheme: str) -> tuple[Family, ...]:
+    """Faults whose map is this scheme's."""
+    return tuple(f for f in FAULTS if same_map(f, FAMILIES[scheme]))
+
+
 def wrong_map(e: Evidence) -> list[Explanation]:
-    """Schemes that are written down wrongly; friction of the wrong sign; held forces; wrong scales."""
+    """Schemes that are written down wrongly; friction of the wrong sign; held forces; wrong scales.
+
+    Where a scheme has the map itself, a fault that has it too is that scheme on another spring: none, but
+    with a stiffness that is stated.
+    """
     ranked: list[tuple[int, Explanation]] = []
-    for joint in search([e.found], [e.terms], range(1, 5), _faults()):
+    fitting = matched(e.found, e.terms)
+    for joint in compare([e.found], [e.terms], _faults(), range(1, 5)):
         family = FAMILIES[joint.family]
-        if joint.accepted:
-            steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
-            ranked.append((_rank(e, joint), _found(f"{family.cause}{steps}", family.remedy, joint)))
-    for rank, look in ((1, _scales), (2, _negative_friction)):
-        ranked += [(rank, x) for x in look(e)]
+        steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
+        ranked.append((_rank(e, joint), _found(f"{family.cause}{steps}", family.remedy, joint)))
+    if fitting:
+        own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None]
+        return own or [_departing(e, title(fitting[0].scheme))]
+    ranked += [(2, x) for x in _negative_friction(e)]
+    scaled, certain = _scales(e)
+    # factors that mean nothing, one for each of several schemes, say less than the kind of the map
+    ranked += (
+        [(1, x) for x in scaled] if certain else [(4, x) for x in (misfit(e), *scaled)] if scaled else []
+    )
     return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
+
+
+def _departing(e: Evidence, scheme: str) -> Explanation:
+    size = float(np.max(np.abs(e.misses)))
+    return Explanation(
+        cause=f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
+        "size, which no arithmetic that is known explains",
+        remedy="look at what is rounded in a step beside positions, velocities and forces",
+        misfit=size,
+    )
 
 
 def _rank(e: Evidence, joint: Joint) -> int:
@@ -57,10 +85,8 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     )
     joints = [
         x
-        for x in search(
-            [e.found], [growing], range(1, 3), tuple(f for f in distinct(damped=True) if f is not HELD)
-        )
-        if x.accepted and x.parts[0].g < 0
+        for x in compare([e.found], [growing], distinct(damped=True), range(1, 3))
+        if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING)
     ]
     if not joints:
         return []
@@ -76,12 +102,24 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     ]
 
 
+SURE = 6.0
+"""Standard errors that a number must differ from its right value by to be a cause."""
+
+UNSCALED = 1e-6
+"""Factor of velocities less 1 below which it is none of units."""
+
 SHOWN = 4
 """Schemes that a sentence names of those that would fit at a scale of their own."""
+
+ASE, AKMA = 10.180505710759414, 48.88821290839616
+"""Units of time [fs] of A sqrt(u/eV), and of A sqrt(u mol/kcal)."""
 
 CONSTANTS = (
     (math.degrees(1), "positions are in degrees, velocities in radians"),
     (math.radians(1), "positions are in radians, velocities in degrees"),
+    (ASE, "1 unit of time of ASE is 10.1805 fs"), (1 / ASE, "1 unit of time of ASE is 10.1805 fs"),
+    (AKMA, "1 unit of time of CHARMM (AKMA) is 48.888 fs"),
+    (1 / AKMA, "1 unit of time of CHARMM (AKMA) is 48.888 fs"),
     (4.184, "kcal and kJ are mixed up"), (1 / 4.184, "kcal and kJ are mixed up"),
     (math.sqrt(4.184), "kcal and kJ are mixed up"), (1 / math.sqrt(4.184), "kcal and kJ are mixed up"),
     (2 * math.pi, "a factor 2 pi"), (1 / (2 * math.pi), "a factor 2 pi"),
@@ -91,22 +129,26 @@ CONSTANTS = (
 """Factors between velocities and positions that mean something."""
 
 
-def _scales(e: Evidence) -> list[Explanation]:
-    """Schemes that fit once velocities have another scale, and what that scale means."""
+def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
+    """Schemes that fit once velocities have another scale, what that scale means, and whether it is one: a
+    known factor, or that of the stated stiffness."""
     if e.terms.mass_unknown:
-        return []
+        return [], False
     free = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
-    fitting = [x for x in search([e.found], [free], range(1, 4)) if x.accepted]
-    fitting.sort(key=lambda x: x.plainness)
+    fitting = compare([e.found], [free], distinct(damped=False), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
+    of_stated = [
+        x for x in fitting if e.stiffness is not None and e.record.mass is not None and _rank(e, x) == 0
+    ]
+    fitting = of_stated or fitting
     meant = [(x, meaning) for x in fitting if (meaning := _meaning(e, x))]
     if meant:
         x, (cause, remedy) = meant[0]
         # schemes that differ by less than the numbers show would each mean the same
         names = list(dict.fromkeys(title(y.scheme) for y, _ in meant))
-        return [_found(f"{either(names)}, but {cause}", remedy, x)]
+        return [_found(f"{either(names)}, but {cause}", remedy, x)], True
     if not fitting:
-        return []
+        return [], False
     x = fitting[0]
     scale = {str(y): math.exp(-y.parts[0].log_mass) for y in fitting}
     one = scale[str(x)]
@@ -120,7 +162,7 @@ def _scales(e: Evidence) -> list[Explanation]:
             f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}{more}"
         )
     advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
-    return [_found(cause, advice, x)]
+    return [_found(cause, advice, x)], len(of_stated) == 1 and abs(one - 1) > UNSCALED
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
@@ -176,8 +218,8 @@ def faults_of(
     )
     return [
         _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x)
-        for x in search([e.found], [e.terms], range(1, 3), _faults())
-        if x.accepted and _rank(e, x) == 0
+        for x in compare([e.found], [e.terms], _faults(), range(1, 3))
+        if _rank(e, x) == 0
     ]
 
 
@@ -196,23 +238,3 @@ def stiffness_ratio(ratio: float, mass: float | None) -> str:
             (mass, "the mass is left out"),
         ]
     return next((text for value, text in known if abs(ratio / value - 1) < 1e-5), "")
-
-
-def misfit(e: Evidence) -> Explanation:
-    """How large the misfit is, in physical terms: growth and phase of a frame."""
-    entries = e.found.entries.astype(np.float64)
-    det = float(np.linalg.det(entries))
-    joints = [x for x in search([e.found], [e.terms], range(1, 2), far=True) if math.isfinite(x.chi2)]
-    nearest = min(joints, key=lambda x: distance(e.found, x.parts[0]), default=None)
-    growth = (
-        f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"
-    )
-    near = ""
-    if nearest is not None:
-        off = distance(e.found, nearest.parts[0])
-        near = f"; the nearest, {title(nearest.scheme)}, misses a frame by {off:.1e} of its size"
-    return Explanation(
-        cause=f"One linear map explains the states, but it is none of the known schemes': {growth}{near}",
-        remedy="compare the order of its stages and their coefficients with the scheme's",
-        misfit=math.nan if nearest is None else distance(e.found, nearest.parts[0]),
-    )

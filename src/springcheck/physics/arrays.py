@@ -41,6 +41,10 @@ Force: TypeAlias = Callable[[Reals, Reals], Reals]
 """(q, p), each (..., n) -> force on every particle (..., n) [M L/T2]."""
 
 
+AS_WRITTEN = "as written"
+"""The name of the arithmetic of numbers in a file, whose decimals are seen in them."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arithmetic:
     """How a platform rounds.  The defaults are IEEE double precision throughout."""
@@ -62,3 +66,16 @@ class Arithmetic:
     """Forces are kept while no position has moved by more than this since they were computed [L]."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
+
+    def __str__(self) -> str:
+        """What of it is not double precision, in words, or nothing."""
+        named = {
+            "state": f"states to {self.state:.2g}",
+            "force": f"forces to {self.force:.2g}",
+            "quantum": f"forces in units of {self.quantum:.2g}",
+            "parameters": f"parameters in {self.parameters} precision",
+            "excess": f"every force {self.excess:.2g} too large",
+            "stale": f"forces kept within {self.stale:.2g}",
+        }
+        plain = Arithmetic()
+        return ", ".join(said for name, said in named.items() if getattr(self, name) != getattr(plain, name))

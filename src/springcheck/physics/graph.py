@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -84,3 +84,26 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
     for first, last in zip(starts, [*starts[1:], len(springs.a)], strict=True):
         found[springs.b[first:last]] = np.cumsum(springs.rest[first:last])
     return found
+
+
+def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integers, Integers], ...]:
+    """Of each two axes that nothing tells apart the coordinates along the one and the other, by particle.
+
+    Linear terms that act on both alike and rest in 0 keep the angular momentum about 0 in their plane.
+    `places` (n,) are those of `Scene`.
+    """
+    parts = tuple(terms)
+    if places is None or any(np.any(getattr(term, term.origin, 0)) for term in parts):
+        return ()
+    found = []
+    for a, b in ((0, 1), (1, 2), (0, 2)):
+        one, other = (np.flatnonzero(places % 3 == axis) for axis in (a, b))
+        if len(one) and np.array_equal(places[one] // 3, places[other] // 3):
+            rows = []
+            for own in (one, other):
+                number = np.full(len(places), -1)
+                number[own] = np.arange(len(own))
+                rows.append([(term.key, *sorted(term.restricted(number).rows())) for term in parts])
+            if rows[0] == rows[1]:
+                found.append((one, other))
+    return tuple(found)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -40,25 +41,33 @@ class Norm:
 
     def size(self, dq: Reals, dp: Reals) -> Extended:
         """The same, not divided by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        return self._root(dq, dp, lambda term, q: term.stretch(q))
+
+    def most(self, of_q: Reals, of_p: Reals) -> Extended:
+        """The largest `size` of differences whose numbers are at most these, of any sign, (...)."""
+        return self._root(of_q, of_p, lambda term, q: term.most_stretch(q))
+
+    def _root(self, dq: Reals, dp: Reals, stretch: Callable[[Term, Reals], Reals]) -> Extended:
         q, p = np.broadcast_arrays(np.asarray(dq, np.longdouble), np.asarray(dp, np.longdouble))
         with np.errstate(invalid="ignore", over="ignore"):
-            energy = np.asarray(self._energy(q, p), np.longdouble)
+            energy = np.asarray(self._energy(q, p, stretch), np.longdouble)
             size = np.array(np.sqrt(energy))
             # squares that leave the range: of a power of two of the difference, which rounds nothing
             out = ~((energy > SMALLEST_ENERGY) & np.isfinite(energy))
             if np.any(out):
                 power = np.frexp(np.max(np.maximum(np.abs(q[out]), np.abs(p[out])), axis=-1))[1]
-                scaled = (np.ldexp(x[out], -power[..., None]) for x in (q, p))
-                size[out] = np.ldexp(np.sqrt(self._energy(*scaled)), power)
+                small_q, small_p = (np.ldexp(x[out], -power[..., None]) for x in (q, p))
+                size[out] = np.ldexp(np.sqrt(self._energy(small_q, small_p, stretch)), power)
             return np.asarray(size)
 
-    def _energy(self, dq: Reals, dp: Reals) -> Reals:
-        return in_pieces(self._energy_at_once, max(map(len, self.terms), default=0))(dq, dp)
+    def _energy(self, dq: Reals, dp: Reals, stretch: Callable[[Term, Reals], Reals]) -> Reals:
+        whole = partial(self._energy_at_once, stretch)
+        return in_pieces(whole, max(map(len, self.terms), default=0))(dq, dp)
 
-    def _energy_at_once(self, dq: Reals, dp: Reals) -> Reals:
+    def _energy_at_once(self, stretch: Callable[[Term, Reals], Reals], dq: Reals, dp: Reals) -> Reals:
         total = kinetic_energy(self.m, dp)
         for term in self.terms:
-            du = term.stretch(dq)
+            du = stretch(term, dq)
             total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
         for group in self.groups:
             m = self.m[group]

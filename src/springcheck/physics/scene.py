@@ -8,12 +8,14 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.bath import Bath
 from springcheck.physics.system import System
 from springcheck.physics.term import Term, check_sign, frozen, refrozen
 from springcheck.physics.terms import in_order
@@ -40,6 +42,9 @@ class Scene:
     """Positions at the start (n,) [L]."""
     p: Floats
     """Momenta at the start (n,) [M L/T]."""
+    places: Integers | None = None
+    """Where each coordinate stands among x, y and z of all particles (n,): 3 particle + axis.  Arrays (n,)
+    hold a number for each coordinate.  None where each particle has one, along x."""
     terms: tuple[Term, ...] = ()
     """One of each kind, in the order of `terms.known`; terms of one kind are joined."""
     step: float
@@ -47,6 +52,8 @@ class Scene:
     steps: int
     every: int = 1
     """Every how many steps a frame is recorded; it divides `steps`."""
+    bath: Bath | None = None
+    """The heat bath, which only random methods have; None where the motion is deterministic."""
     tolerance: float = 1e-12
     """Relative tolerance per step of adaptive solvers."""
     units: Units = "reduced"
@@ -64,20 +71,53 @@ class Scene:
             object.__setattr__(self, field, value)
 
     def __repr__(self) -> str:
-        size = f"{self.n} particle{'s' if self.n != 1 else ''}"
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
         steps = f"{self.steps} step{'s' if self.steps != 1 else ''} of {self.step:g}"
-        return f"Scene({self.name!r}, {size}, {terms}, {steps})"
+        return f"Scene({self.name!r}, {self.size}, {terms}, {steps})"
 
     @property
     def n(self) -> int:
-        """Number of particles."""
+        """Number of coordinates: of particles, where each moves along one axis."""
         return len(self.m)
+
+    @property
+    def particles(self) -> int:
+        """Number of particles."""
+        return self.n if self.places is None else int(np.max(self.places)) // 3 + 1
+
+    @property
+    def size(self) -> str:
+        """How many particles there are, and along which axes they move where that is not x, in words."""
+        particles = f"{self.particles} particle{'s' if self.particles != 1 else ''}"
+        along = ", ".join(self.axes[:-1]) + " and " * (len(self.axes) > 1) + self.axes[-1]
+        return particles if self.places is None else f"{particles} along {along}"
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes along which something moves, of x, y and z."""
+        return ("x",) if self.places is None else tuple("xyz"[i] for i in np.unique(self.places % 3))
+
+    @property
+    def where(self) -> slice | Integers:
+        """The coordinates among x, y and z of all particles, as an index of an array (3 particles,)."""
+        return slice(0, 3 * self.n, 3) if self.places is None else self.places
+
+    @cached_property
+    def elsewhere(self) -> NDArray[np.bool_]:
+        """Which of x, y and z of all particles (3 particles,) are no coordinates of the scene."""
+        left = np.ones(3 * self.particles, dtype=bool)
+        left[self.where] = False
+        return left
 
     @property
     def frames(self) -> int:
         """Number of recorded states, the start among them."""
         return self.steps // self.every + 1
+
+    @property
+    def thermal(self) -> float:
+        """The thermal energy kT of the bath [M L2/T2]; 0 without one."""
+        return self.bath.thermal(self.units) if self.bath else 0.0
 
     @cached_property
     def system(self) -> System:
@@ -94,6 +134,10 @@ class Scene:
         total = hashlib.sha256()
         known = (self.kind, self.units, self.step, self.steps, self.every, self.tolerance, *self.quantities)
         total.update(repr(known).encode())
+        if self.places is not None:
+            total.update(self.places.astype("<i8").tobytes())
+        if self.bath:
+            total.update(repr(self.bath).encode())
         for values in (self.m, self.q, self.p):
             total.update((values + 0.0).astype("<f8").tobytes())
         for term in self.terms:
@@ -141,7 +185,9 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
         check_sign(values, sign, field)
         yield field, values
     assert n is not None
-    yield "terms", _terms(scene.terms, n)
+    places = _places(scene)
+    yield "places", places
+    yield "terms", _terms(scene.terms, n, places)
     steps, every = _whole(scene.steps, "steps"), _whole(scene.every, "every")
     if steps > MOST_STEPS:
         raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h")
@@ -162,6 +208,13 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
         raise SceneError(
             f"units = {scene.units!r}: a circuit is given in H, F, Ohm, C and Wb; leave units out"
         )
+    if scene.bath is not None:
+        if not isinstance(scene.bath, Bath):
+            raise SceneError(f"bath = {scene.bath!r}: a springcheck.physics.bath.Bath is needed")
+        if scene.step < 0:
+            raise SceneError(f"step = {scene.step}: a bath acts forwards in time only")
+        if any(term.key == "damping" for term in scene.terms):
+            raise SceneError("bath: it has a friction of its own; leave [[damping]] out")
     yield "quantities", _quantities(scene.quantities)
     include = scene.include if isinstance(scene.include, tuple | list) else ()
     if not include or not all(isinstance(one, str) and one for one in include):
@@ -171,11 +224,34 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
         _check_text(getattr(scene, field), field)
 
 
-def _terms(given: Any, n: int) -> tuple[Term, ...]:
+def _places(scene: Scene) -> Integers | None:
+    """The places of the coordinates, None where they are what None stands for."""
+    if scene.places is None:
+        return None
+    n = len(scene.m)
+    places = cast("Integers", frozen(scene.places, np.int64, n, "places"))
+    if scene.kind != "particles":
+        raise SceneError(f"places: a {scene.kind} has no axes; leave them out")
+    if len(np.unique(places)) < n or np.any(places < 0):
+        raise SceneError("places: every coordinate needs one of its own, 3 particle + axis, from 0 on")
+    of = places // 3
+    number = len(np.unique(of))
+    if np.max(of) != number - 1 or np.any(np.diff(of) < 0):
+        raise SceneError(f"places: particles 0 to {number - 1} need a coordinate each, one after the other")
+    mass = np.zeros(number)
+    mass[of] = scene.m
+    if np.any(mass[of] != scene.m):
+        raise SceneError("m: the coordinates of one particle need one mass")
+    return None if np.array_equal(places, 3 * np.arange(n)) else places
+
+
+def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:
     if not isinstance(given, tuple | list) or not all(isinstance(term, Term) for term in given):
         raise SceneError("terms: objects of springcheck.physics.terms are needed, such as WallSpring(...)")
     for term in given:
         term.check(n)
+        if places is not None and len({tuple(places[index] % 3) for index in term.particles}) > 1:
+            raise SceneError(f"{term.key}: its rows join coordinates along different axes")
     return in_order(given)
 
 

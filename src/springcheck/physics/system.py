@@ -111,6 +111,11 @@ class System:
         return count.astype(np.int64)
 
     @cached_property
+    def alike(self) -> tuple[tuple[Integers, Integers], ...]:
+        """Of each two axes that nothing tells apart the coordinates along each: `graph.alike`."""
+        return graph.alike(self.scene.places, self.terms) if self.is_linear else ()
+
+    @cached_property
     def free_groups(self) -> tuple[Integers, ...]:
         """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
         return graph.free_groups(self.n, self.terms)
@@ -140,7 +145,7 @@ class System:
     @cached_property
     def potential_force(self) -> Force:
         """The force of the potential: all but friction."""
-        return self.force_of(term for term in self.terms if term.is_potential)
+        return self.force_of(term for term in self.terms if term.kind == "potential")
 
     @cached_property
     def parts(self) -> tuple[Force, Force]:
@@ -154,7 +159,7 @@ class System:
 
     def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
         """What these functions of (q, v, out), one a term, add up to, as a function of (q, p)."""
-        needs_velocity = not all(term.is_potential for term in parts)
+        needs_velocity = any(term.kind == "friction" for term in parts)
 
         def total(q: Reals, p: Reals) -> Reals:
             out = np.zeros_like(q)
@@ -286,7 +291,9 @@ class System:
         return kinetic_energy(self.m, p)
 
     def energy(self, q: Reals, p: Reals) -> Reals:
-        """Total energy of states q, p (..., n) -> (...) [M L2/T2]."""
+        """Total energy of states q, p (..., n) -> (...) [M L2/T2], whatever the order of the arrays."""
+        # NumPy adds up rows of another order in another order
+        q, p = np.ascontiguousarray(q), np.ascontiguousarray(p)
         total = self.kinetic_energy(p)
         for term in self.terms:
             total = total + in_pieces(lambda q, _, term=term: term.energy(q), len(term))(q, p)
@@ -349,8 +356,8 @@ class System:
 
     @cached_property
     def solution(self) -> Solution | None:
-        """The exact (analytic) solution, None where no closed form is known."""
-        return solution(self)
+        """The exact (analytic) solution, None where no closed form is known, or where a bath acts."""
+        return None if self.scene.bath else solution(self)
 
     # other scenes made of this one
 
@@ -370,7 +377,10 @@ class System:
         """So many copies of the scene side by side, which do not act on each other."""
         m, q, p = (np.tile(x, copies) for x in (self.m, self.scene.q, self.scene.p))
         terms = tuple(term.tiled(copies, self.n) for term in self.terms)
-        return self.scene.derived(m=m, q=q, p=p, terms=terms)
+        places = self.scene.places
+        if places is not None:
+            places = (places + 3 * self.scene.particles * np.arange(copies)[:, None]).ravel()
+        return self.scene.derived(m=m, q=q, p=p, places=places, terms=terms)
 
     def from_states(self, q: Floats, p: Floats) -> Scene:
         """Copies of the scene side by side, one from each of these states (c, n), and one step of them."""
@@ -382,4 +392,9 @@ class System:
         number[chosen] = np.arange(len(chosen))
         m, q, p = (x[chosen] for x in (self.m, self.scene.q, self.scene.p))
         terms = (term.restricted(number) for term in self.terms)
-        return self.scene.derived(m=m, q=q, p=p, terms=tuple(term for term in terms if len(term)))
+        places = self.scene.places
+        if places is not None:
+            # the particles that are left, numbered anew
+            _, of = np.unique(places[chosen] // 3, return_inverse=True)
+            places = 3 * of + places[chosen] % 3
+        return self.scene.derived(m=m, q=q, p=p, places=places, terms=tuple(x for x in terms if len(x)))

@@ -20,6 +20,7 @@ from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers, Reals
 
 Where: TypeAlias = "slice | Integers"
+Origin: TypeAlias = Literal["potential", "friction", "drive", "constraint"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,8 @@ class Term:
     """The field that is subtracted from the elongation, and so is no argument of the law."""
     is_linear: ClassVar[bool] = False
     """Whether the force is linear in positions and velocities."""
-    is_potential: ClassVar[bool] = True
-    """Whether it is a part of the potential energy; friction is not."""
+    kind: ClassVar[Origin] = "potential"
+    """What its force comes from: a potential energy, the velocities, the time, or a length that it keeps."""
     fast: bool = False
     """Whether a method of multiple time steps takes these rows in its short step."""
 
@@ -132,6 +133,11 @@ class Term:
         first, last = self._places[0][0], self._places[-1][0]
         return _taken(q, last) - _taken(q, first) if self.bodies == 2 else _taken(q, last)
 
+    def most_stretch(self, size: Reals) -> Reals:
+        """The largest |`stretch`| of displacements of these sizes (..., n), of any sign -> (..., s) [L]."""
+        first, last = self._places[0][0], self._places[-1][0]
+        return _taken(size, last) + _taken(size, first) if self.bodies == 2 else _taken(size, last)
+
     def elongation(self, q: Reals) -> Reals:
         """The coordinate u of each row at positions q (..., n) -> (..., s) [L]: 0 at rest."""
         u = self.stretch(q)
@@ -168,9 +174,7 @@ class Term:
         `exact` says that the force is taken at `near` itself: a law that feels a rounding of its position
         more than that of its elongation may say less then.
         """
-        size = np.abs(_taken(q, self._places[-1][0]))
-        if self.bodies == 2:
-            size = size + np.abs(_taken(q, self._places[0][0]))
+        size = self.most_stretch(np.abs(q))
         if self.origin:
             size = size + np.abs(getattr(self, self.origin))
         u = -size if near is None else self.elongation(near)

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, OnPairs, OnParticles, Term
+from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
 
 __all__ = [
     "Column", "Cosine", "Damping", "Morse", "OnPairs", "OnParticles", "Quartic", "Spring", "Term",
@@ -196,7 +196,7 @@ class Damping(Term):
     columns: ClassVar[tuple[Column, ...]] = (Column("coefficient", "c", sign="nonnegative", single=False),)
     ends: ClassVar[tuple[str, ...]] = ("i",)
     is_linear: ClassVar[bool] = True
-    is_potential: ClassVar[bool] = False
+    kind: ClassVar[Origin] = "friction"
     i: Integers
     c: Floats
 
@@ -272,6 +272,6 @@ def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
 
     def place(term: Term) -> tuple[bool, bool, bool, int, str]:
         number = known.index(term.key) if term.key in known else len(known)
-        return (not term.is_potential, not isinstance(term, Hooke), term.fast, number, term.key)
+        return (term.kind != "potential", not isinstance(term, Hooke), term.fast, number, term.key)
 
     return tuple(sorted(found.values(), key=place))

@@ -147,9 +147,10 @@ class Limits:
     """The relative change of each quantity from which on a check fails; None where it says nothing of it."""
 
     stiffness: float | None = None
-    """Of every force of the potential."""
+    """Of the spring, or row of another potential, that shows least of those that show at all."""
     step: float | None = None
     friction: float | None = None
+    """Of the friction on one particle, likewise."""
     area: float | None = None
     """Of every particle's area in phase space at each step: its momentum is multiplied by 1 + x."""
     reaction: float | None = None

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from springcheck.schemes.attached import ATTACHED
 from springcheck.schemes.catalogue import (
-    FRICTION,
     SCHEMES,
     Scheme,
     number,
     solver,
 )
+from springcheck.schemes.elsewhere import ELSEWHERE
+from springcheck.schemes.kinds import KINDS
+from springcheck.schemes.law import Law, Trait
 from springcheck.schemes.linear import (
     amplification,
     condition,
     invariant,
     matrix,
+    noise,
     propagate,
     rotation,
 )
-from springcheck.schemes.lookup import bring, scheme, title
+from springcheck.schemes.lookup import bring, known, scheme, title
 from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "ATTACHED", "FRICTION", "Scheme", "SCHEMES", "bring", "scheme", "solver", "title", "number", "step",
-    "magnitude_step", "roundings", "amplification", "condition", "invariant", "matrix", "propagate",
-    "rotation",
+    "ATTACHED", "ELSEWHERE", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "scheme",
+    "solver", "title", "number", "step", "magnitude_step", "roundings", "amplification", "condition",
+    "invariant", "matrix", "noise", "propagate", "rotation",
 ]  # fmt: skip

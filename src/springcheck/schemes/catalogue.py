@@ -1,10 +1,9 @@
 """The mathematics of the methods: one-step maps as data, and what follows from them exactly.
 
-A scheme is either a splitting (a sequence of kicks ``p += c h F(q)``, drifts ``q += d h p/m`` and
-frictions ``p *= exp(-c h gamma)``) or a Runge-Kutta tableau.  Coefficients are exact: fractions, or
-decimal strings of 40 digits where they are irrational.  `stepping.step` carries out a scheme in the width
-of the numbers it is given; everything else (matrix, determinant, frequency, shadow energy, stability) is
-derived from that one definition.
+A scheme is either a splitting (a sequence of stages: see `kinds`) or a Runge-Kutta tableau.  Coefficients
+are exact: fractions, or decimal strings of 40 digits where they are irrational.  `stepping.step` carries out
+a scheme in the width of the numbers it is given; everything else (matrix, determinant, frequency, shadow
+energy, stability) is derived from that one definition.
 
 Sources: Hairer, Lubich & Wanner, Geometric Numerical Integration (2006), chapters I, II and VI, for
 the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary Differential Equations
@@ -16,27 +15,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from springcheck.schemes.kinds import KINDS, Acting, StageKind
+
 Coefficient: TypeAlias = Fraction | str
-Kind: TypeAlias = Literal["kick", "held", "drift", "pull", "friction", "implicit-friction", "slow", "fast"]
-Stage: TypeAlias = tuple[Kind, Coefficient]
-"""What is done for a fraction of the step: a kick by all forces at the present q and p, a kick by the force
-of the kick before, which is not evaluated anew, a drift, a pull by the forces of the potential alone, the
-exact decay of p by friction alone, its decay by implicit Euler, or a kick by the slow or by the fast springs
-alone."""
+Stage: TypeAlias = tuple[str, Coefficient]
+"""What is done, by its name in `KINDS`, and for which fraction of the step."""
+
+Trait: TypeAlias = Literal[
+    "named", "one-step", "flow", "adaptive", "splitting", "explicit", "implicit", "symplectic", "reversible",
+    "mixes", "friction", "plain", "random",
+]  # fmt: skip
+"""What a scheme may be: of a fixed step that is known, the exact flow, or a solver that chooses its steps;
+made of stages; solving no equation, or one; its own adjoint (reversible); taking slow and fast springs at
+different times, so that no normal mode stays by itself; acting by friction alone in some stage; made of kicks
+by all forces and drifts alone (plain); taking draws."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
 
-FRICTION = frozenset({"friction", "implicit-friction"})
-"""Stages that act by friction alone."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Scheme:
     """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
 
@@ -56,53 +58,86 @@ class Scheme:
     flow: bool = False
     convergence: Fraction | None = None
     """Of an adaptive solver: the power of its tolerance with which its error falls, on a smooth motion."""
+    thermostat: bool = False
+    """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""
 
-    @property
-    def implicit(self) -> bool:
-        """Whether a step solves an equation."""
-        return any(x for i, row in enumerate(self.a) for x in row[i:])
+    @cached_property
+    def kinds(self) -> tuple[StageKind, ...]:
+        """The kind of each stage."""
+        return tuple(KINDS[name] for name, _ in self.stages)
 
     @property
-    def mixes(self) -> bool:
-        """Whether slow and fast springs act at different times, so that no normal mode stays by itself."""
-        return any(kind in ("slow", "fast") for kind, _ in self.stages)
+    def draws(self) -> int:
+        """Standard normal draws a step, for each degree of freedom."""
+        return sum(kind.random for kind in self.kinds)
+
+    @cached_property
+    def traits(self) -> frozenset[Trait]:
+        """What the scheme is, as far as anything depends on it."""
+        one_step = bool(self.stages or self.b)
+        implicit = any(x for i, row in enumerate(self.a) for x in row[i:])
+        facts: dict[Trait, bool] = {
+            "named": not self.unnamed,
+            "one-step": one_step,
+            "flow": self.flow,
+            "adaptive": not (one_step or self.flow or self.unnamed or self.thermostat),
+            "splitting": bool(self.stages),
+            "explicit": one_step and not implicit,
+            "implicit": implicit,
+            "symplectic": self.symplectic,
+            "reversible": one_step and self._is_symmetric,
+            "mixes": any(kind.evaluates in ("slow", "fast") for kind in self.kinds),
+            "friction": any(kind.friction for kind in self.kinds),
+            "plain": bool(self.kinds) and all(k.drifts or k.evaluates == "all" for k in self.kinds),
+            "random": self.draws > 0 or self.thermostat,
+        }
+        return frozenset(name for name, is_so in facts.items() if is_so)
+
+    def has(self, *traits: Trait) -> bool:
+        """Whether it has all of these traits."""
+        return self.traits.issuperset(traits)
+
+    @property
+    def _is_symmetric(self) -> bool:
+        """Whether it is its own adjoint."""
+        if self.stages:
+            return self.stages == tuple(reversed(self.stages))
+        s = len(self.b)
+        if self.b != tuple(reversed(self.b)):
+            return False
+        full = [row + (row[0] * 0,) * (s - len(row)) for row in self.a]
+        return all(full[s - 1 - i][s - 1 - j] + full[i][j] == self.b[j] for i in range(s) for j in range(s))
 
     @property
     def reach(self) -> int:
         """How far a force gets within its step: 0 to the momentum, 1 to the position, 2 to a later force."""
         reach, kicked = 0, False
-        for kind, _ in self.stages:
-            if kind == "drift":
+        for kind in self.kinds:
+            if kind.evaluates:
+                reach = 2 if reach else 0
+            kicked = kicked or kind.kicks
+            if kind.drifts:
                 reach = max(reach, int(kicked))
-            elif kind == "held":
-                kicked = True
-            elif kind not in FRICTION:
-                reach, kicked = 2 if reach else 0, True
         uses = np.array(self.a, dtype=np.float64)
         # a stage takes its position from velocities, and these from the forces of stages before
         return reach if self.stages else 2 if np.any(uses @ uses) else int(np.any(uses))
 
     @property
-    def evaluations(self) -> list[tuple[Kind, Coefficient, bool]]:
-        """Each evaluation of the force within a step: by which forces, for which part of the step, and
+    def evaluations(self) -> list[tuple[Acting, Coefficient, bool]]:
+        """Each evaluation of the force within a step: of which terms, for which part of the step, and
         whether at the position where the step starts or ends."""
         if not self.stages:
-            return [("kick", ONE, not any(row)) for row in self.a]
-        drifts = [kind == "drift" for kind, _ in self.stages]
+            return [("all", ONE, not any(row)) for row in self.a]
+        drifts = [kind.drifts for kind in self.kinds]
         return [
-            (kind, c, not any(drifts[:i]) or not any(drifts[i:]))
-            for i, (kind, c) in enumerate(self.stages)
-            if kind not in ("drift", "held", *FRICTION)
+            (kind.evaluates, c, not any(drifts[:i]) or not any(drifts[i:]))
+            for i, (kind, (_, c)) in enumerate(zip(self.kinds, self.stages, strict=True))
+            if kind.evaluates
         ]
 
     unnamed: bool = False
     """It stands for whatever somebody brings without a name, whose step is fixed or not."""
-
-    @property
-    def one_step(self) -> bool:
-        """Whether `step` can carry the scheme out."""
-        return bool(self.stages or self.b)
 
 
 def _mirrored(*half: Stage) -> tuple[Stage, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,31 +18,49 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
     from fast takes each spring for a fast one; the exact flow is the exponential.
     """
-    m, k, friction = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
     if scheme.flow:
-        return _exponential(m, k, friction, h)
+        return _exponential(*_springs(m, k, c), h)
+    return _stepped(scheme, h, *_springs(m, k, c), np.eye(2, dtype=np.longdouble))
+
+
+def noise(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0, kT: float) -> Extended:
+    """What the draws of a step do to (q, p) of springs m, k (n,) with friction c -> (n, 2, draws), extended.
+
+    Found by stepping unit draws from rest: with the matrix A of a step, z' = A z + G xi.
+    """
+    rest = np.zeros((scheme.draws, 2), dtype=np.longdouble)
+    unit = np.eye(scheme.draws, dtype=np.longdouble)[..., None]
+    return _stepped(scheme, h, *_springs(m, k, c), rest, draws=tuple(unit), kT=kT)
+
+
+def _springs(m: Reals, k: Reals, c: Reals | float) -> tuple[Extended, Extended, Extended]:
+    m, k, c = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
+    return m, k, c
+
+
+def _stepped(
+    scheme: Scheme, h: float, m: Extended, k: Extended, c: Extended, states: Extended, **noise: Any
+) -> Extended:
+    """Where one step takes states (s, 2) of each spring: columns of (n, 2, s)."""
 
     def force(q: Reals, p: Reals) -> Reals:
-        return np.asarray(-k * q - friction * (p / m))
+        return np.asarray(-k * q - c * (p / m))
 
     def none(q: Reals, p: Reals) -> Reals:
         return np.zeros_like(q)
 
-    out = np.empty((len(m), 2, 2), dtype=np.longdouble)
-    ones, zeros = np.ones(len(m), dtype=np.longdouble), np.zeros(len(m), dtype=np.longdouble)
     q, p = step(
         scheme,
-        np.stack([ones, zeros]),
-        np.stack([zeros, ones]),
+        *(np.broadcast_to(x[:, None], (len(states), len(m))) for x in states.T),
         h=h,
         m=m,
         force=force,
         stiffness=k,
-        rate=friction / m if np.any(friction) else None,
+        rate=c / m if np.any(c) else None,
         parts=(none, force),
+        **noise,
     )
-    out[:, 0, :], out[:, 1, :] = q.T, p.T
-    return out
+    return np.asarray(np.stack([q.T, p.T], axis=1), np.longdouble)
 
 
 def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import get_args
 
 import numpy as np
 
 from springcheck.errors import MethodError, nearest
 from springcheck.schemes.attached import ATTACHED
-from springcheck.schemes.catalogue import SCHEMES, Kind, Scheme
+from springcheck.schemes.catalogue import SCHEMES, Scheme
+from springcheck.schemes.kinds import KINDS
 
 # as an imported module, a scheme that an engine has brought stays for the life of the process
 _brought: dict[str, Scheme] = dict(ATTACHED)
@@ -24,6 +24,11 @@ def scheme(name: str) -> Scheme:
             f"{nearest(name, (*SCHEMES, *_brought))}"
         )
     return found
+
+
+def known() -> dict[str, Scheme]:
+    """Every scheme by its name: of the catalogue, of attachments, and those brought so far."""
+    return SCHEMES | _brought
 
 
 def title(name: str) -> str:
@@ -48,10 +53,9 @@ def _flaw(found: Scheme) -> str:
     """Why a scheme cannot be carried out, or "" where it can."""
     if found.stages and found.b:
         return "it has stages and a tableau; one of them is the step"
-    kinds = get_args(Kind)
     for stage in found.stages:
-        if len(stage) != 2 or stage[0] not in kinds:
-            return f"{stage!r} is no stage: a pair of one of {', '.join(kinds)} and a coefficient"
+        if len(stage) != 2 or stage[0] not in KINDS:
+            return f"{stage!r} is no stage: a pair of one of {', '.join(KINDS)} and a coefficient"
         if not _is_coefficient(stage[1]):
             return f"coefficient {stage[1]!r} of {stage[0]} is neither a Fraction nor a decimal string"
     if found.b and (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
+from springcheck.schemes.kinds import Setting
 from springcheck.schemes.stepping import sparse_solver, weighted_sum
 
 
@@ -17,16 +18,17 @@ from springcheck.schemes.stepping import sparse_solver, weighted_sum
 class Met:
     """One evaluation of the force within a step: what bounds its rounding there, and its slope.
 
-    `magnitude` is made by `System.magnitude`, near the position `q` (..., n) of the evaluation.
-    `stiffness` are the second derivatives of the potential there, (..., n) where no particle is joined to
-    another, else (..., n, n) or (n, n); only an implicit stage needs them.  Without `q` the scene is
-    linear, and what bounds the solution stands for it.
+    `magnitude` is made by `System.magnitude`, near the position `q` (..., n) of the evaluation, and `pull`
+    is the force of the potential there.  `stiffness` are the second derivatives of the potential there,
+    (..., n) where no particle is joined to another, else (..., n, n) or (n, n); only an implicit stage needs
+    them.  Without `q` the scene is linear, and what bounds the solution stands for it.
     """
 
     magnitude: Force
     stiffness: Any = None
     joined: bool = False
     q: Reals | None = None
+    pull: Reals | None = None
 
 
 def magnitude_step(
@@ -38,57 +40,87 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
+    draws: Sequence[Reals] | None = None,
+    kT: Any = 0,
 ) -> tuple[Reals, Reals]:
-    """What bounds the rounding of `step`: the same step with every difference taken as a sum.
+    """What bounds the rounding of `step` from (q, p): the same step with every difference taken as a sum.
 
     `met` has one entry for each evaluation of the force, in their order.
     """
-    direction = np.sign(h)
+    start = q, p
     # in extended precision: the square of a step may leave the range of a double
-    q, p, size = np.abs(q), np.abs(p), np.abs(np.longdouble(h))
+    q, p, wide = np.abs(q), np.abs(p), np.longdouble(h)
     each = iter(met)
     if scheme.stages:
-        stages: list[tuple[str, float]] = [(kind, abs(number(c, np.float64))) for kind, c in scheme.stages]
-        last = np.zeros_like(p)
-        for kind, c in stages:
-            if kind == "drift":
-                q = q + c * size * p / m
-            elif kind == "friction":
-                # a rounding of x in exp(-x) costs x exp(-x) p, and the decayed p is exp(-x) p: the sum is
-                # below p forwards in time; backwards p grows first
-                x = np.zeros_like(m) if rate is None else -c * direction * size * rate
-                p = p * np.where(x > 0, (1 + x) * np.exp(x), 1)
-            elif kind == "implicit-friction":
-                # backwards in time 1 - h c/m cancels
-                x = np.zeros_like(m) if rate is None else c * direction * size * rate
-                p = p * (1 + np.abs(x)) / np.abs(1 + x)
-            else:
-                if kind != "held":
-                    last = next(each).magnitude(q, np.zeros_like(p) if kind == "pull" else p)
-                p = p + c * size * last
+        last, drawn = np.zeros_like(p), iter(() if draws is None else draws)
+        for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
+            if kind.evaluates:
+                last = next(each).magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
+            mine = next(drawn) if kind.random and draws is not None else None
+            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
+            q, p = kind.sizes(q, p, number(c, np.float64) * wide, setting)
         return q, p
+    return _tableau(scheme, start, each, h=wide, m=m, rate=rate)
+
+
+def _tableau(
+    scheme: Scheme, start: tuple[Reals, Reals], each: Iterator[Met], *, h: Any, m: Reals, rate: Reals | None
+) -> tuple[Reals, Reals]:
+    """The same for a Butcher tableau.
+
+    Beside what bounds the roundings it carries the states of the stages themselves, signs and all: a bound
+    of a stiff force is no size of the state that the force leads to.
+    """
+    (q, p), size = (np.abs(x) for x in start), np.abs(h)
+    slowing = np.zeros_like(m) if rate is None else rate
     forces: list[Reals] = []
     velocities: list[Reals] = []
+    true_forces: list[Reals] = []
     for row in scheme.a:
         here = next(each)
-        past = [abs(float(c)) * size for c in row[: len(forces)]]
-        qs, ps = weighted_sum(q, past, velocities), weighted_sum(p, past, forces)
-        own = abs(float(row[len(forces)])) * size
+        past = [float(c) * h for c in row[: len(forces)]]
+        qs, ps = weighted_sum(q, np.abs(past), velocities), weighted_sum(p, np.abs(past), forces)
+        own = float(row[len(forces)]) * h
+        if here.q is None or here.pull is None:
+            end = None
+        else:
+            end = (weighted_sum(start[1], past, true_forces) + own * here.pull) / (1 + own * slowing)
+            true_forces.append(here.pull - slowing * end)
         if own:
-            slowed = np.ones_like(m) if rate is None else np.abs(1 + direction * own * rate)
-            qs, ps = _implicit_stage(here, qs, ps, own, m, slowed)
-        forces.append(here.magnitude(qs, ps))
+            way = None
+            if end is not None:
+                fastest = p + np.abs(end - start[1])
+                way = np.abs(end), q + size * fastest / m, fastest
+            pull = _implicit_stage(here, way, qs, ps, np.abs(own), m, np.abs(1 + own * slowing))
+            ps = (ps + np.abs(own) * pull) / np.abs(1 + own * slowing)
+        else:
+            pull = here.magnitude(qs, ps)
+        forces.append(pull)
         velocities.append(ps / m)
     weights = [abs(float(c)) * size for c in scheme.b]
     return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
-def _implicit_stage(here: Met, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals) -> tuple[Reals, Reals]:
-    """What bounds the rounding of the solution of Q = q + x P/m, slowed P = p + x F(Q).
+def _implicit_stage(
+    here: Met,
+    way: tuple[Reals, Reals, Reals] | None,
+    q: Reals,
+    p: Reals,
+    x: Reals,
+    m: Reals,
+    slowed: Reals,
+) -> Reals:
+    """What bounds the rounding of the force behind the solution of Q = q + x P/m, slowed P = p + x F(Q).
 
-    Whatever solver finds Q leaves a residual of a few roundings of what the equation adds up, at Q; the
-    inverse of its Jacobian A = 1 + x**2 K/(m slowed) carries that into Q (Higham, Accuracy and Stability of
-    Numerical Algorithms, 7.2).  An engine may as well find P first, and drift.
+    q and p bound what the stage starts from; `way` is |P|, and what positions and momenta the step goes
+    through on its way there, where that is known.  With A = 1 + x**2 K/(m slowed):
+
+    * An engine that solves for Q leaves a residual of a few roundings of what the equation adds up, at Q; the
+      inverse of A carries it into Q (Higham, Accuracy and Stability of Numerical Algorithms, 7.2), and
+      K A**-1 into the force.  As one matrix: a stiff bond turns an error of its ends alike into nothing,
+      where |K| |A**-1| would make (x**2 K/m)**2 roundings of it.
+    * One that solves for P, or for the change of velocity from p and F(q) (Baraff & Witkin, Large Steps in
+      Cloth Simulation, 1998), adds up forces all along its way, before A makes them small.
     """
     if here.stiffness is None:
         raise ValueError("an implicit stage needs the stiffness of the scene")
@@ -102,19 +134,16 @@ def _implicit_stage(here: Met, q: Reals, p: Reals, x: Reals, m: Reals, slowed: R
     else:
         solve = _Sparse(here.stiffness, factor)
     right = q + x * p / (m * slowed)
-    if here.q is None:
-        right = right + factor * here.magnitude(np.zeros_like(q), none)
-        found = solve.inverse(right)
+    if here.q is None or way is None:
+        found = solve.inverse(right + factor * here.magnitude(none, none))
+        end = solve.turned((p + x * here.magnitude(q, none)) / slowed, m)
+        way = end, q + x * (2 * p + end) / m, p + end
     else:
         found = np.abs(here.q)
-    residual = right + found + factor * here.magnitude(found, none)
-    of_q = np.maximum(solve.inverse(residual), found)
-    # the same equation for P, and what an error of Q does to the force
-    of_p = np.maximum(
-        solve.turned((p + x * here.magnitude(q, none)) / slowed, m),
-        (p + x * here.magnitude(found, none)) / slowed + solve.kicked(residual) * m / x,
-    )
-    return np.maximum(of_q, q + x * of_p / m), of_p
+    there = here.magnitude(found, way[0])
+    residual = right + found + factor * there
+    of_velocity = solve.turned(x * here.magnitude(*way[1:]), m) + solve.kicked(q) * m / x
+    return np.maximum(there + solve.kicked(residual) * m * slowed / (x * x), of_velocity / x)
 
 
 class _Separate:
@@ -194,14 +223,8 @@ def _product(matrix: Reals, x: Reals) -> Reals:
     return np.asarray(np.sum(np.where(np.isnan(terms), 0, terms), axis=-1))
 
 
-ROUNDINGS = {"drift": 3, "friction": 3, "implicit-friction": 3, "held": 2}
-
-
 def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: a force 4, a kick 2, a drift 3, in and out 4.
-
-    Friction takes 3: its exponent, the exponential and the product, or the sum and the quotient.
-    """
+    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4."""
     if scheme.stages:
-        return 4 + sum(ROUNDINGS.get(kind, 6) for kind, _ in scheme.stages)
+        return 4 + sum(kind.roundings for kind in scheme.kinds)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.schemes.catalogue import Scheme, number
+from springcheck.schemes.kinds import Acting, Setting
 
 Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]
 """Positions (..., n) -> second derivatives there, and whether as matrices (..., n, n) instead of (..., n)."""
@@ -36,6 +37,8 @@ def step(
     parts: tuple[Force, Force] | None = None,
     met: list[Reals] | None = None,
     near: Reals | None = None,
+    draws: Sequence[Reals] | None = None,
+    kT: Any = 0,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
@@ -46,29 +49,26 @@ def step(
     springs, for the schemes that part them.  `met` takes the position (..., n) of each evaluation of the
     force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
     solutions of an implicit stage the one there is found; a force after the last drift is taken there, at the
-    position that an engine has rounded.
+    position that an engine has rounded.  `draws` are the standard normal numbers of each random stage in
+    turn, `Scheme.draws` of (..., n), and kT [M L2/T2] is what they are drawn at; without them nothing random
+    happens.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
-        last = np.zeros_like(p)
-        drifts = [kind == "drift" for kind, _ in scheme.stages]
-        for number_, (kind, c) in enumerate(scheme.stages):
-            ch = number(c, width) * h
-            if kind == "drift":
-                q = q + ch * (p / m)
-            elif kind == "friction":
-                p = p if rate is None else p * np.exp(-ch * rate.astype(width))
-            elif kind == "implicit-friction":
-                p = p if rate is None else p / (1 + ch * rate.astype(width))
-            else:
-                if kind != "held":
-                    there = near is not None and not any(drifts[number_:])
-                    at = np.where(np.isfinite(near), near, q) if near is not None and there else q
-                    if met is not None:
-                        met.append(at)
-                    last = acting(kind, force, parts)(at, p)
-                p = p + ch * last
+        rate = None if rate is None else rate.astype(width)
+        last, each = np.zeros_like(p), iter(() if draws is None else draws)
+        drifts = [kind.drifts for kind in scheme.kinds]
+        for i, (kind, (_, c)) in enumerate(zip(scheme.kinds, scheme.stages, strict=True)):
+            if kind.evaluates:
+                there = near is not None and not any(drifts[i:])
+                at = np.where(np.isfinite(near), near, q) if near is not None and there else q
+                if met is not None:
+                    met.append(at)
+                last = acting(kind.evaluates, force, parts)(at, p)
+            mine = next(each) if kind.random and draws is not None else None
+            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
+            q, p = kind.act(q, p, number(c, width) * h, setting)
         return q, p
     if not scheme.b:
         raise ValueError(f"{scheme.name} has no step that a force alone defines")
@@ -94,15 +94,15 @@ def step(
     return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
-def acting(kind: str, force: Force, parts: tuple[Force, Force] | None) -> Force:
-    """The force behind a stage."""
-    if kind == "kick":
+def acting(terms: Acting, force: Force, parts: tuple[Force, Force] | None) -> Force:
+    """The force of these terms."""
+    if terms == "all":
         return force
-    if kind == "pull":
+    if terms == "potential":
         return lambda q, p: force(q, np.zeros_like(p))
     if parts is None:
         raise ValueError("this scheme needs the slow and the fast force apart")
-    return parts[kind == "fast"]
+    return parts[terms == "fast"]
 
 
 def sparse_solver(stiffness: Any, factor: Reals) -> Callable[[Reals], Reals]:

@@ -5,7 +5,7 @@ Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `r
 """
 
 from springcheck.errors import StoreError, StoreWarning
-from springcheck.store.checking import Finding, check, doubts
+from springcheck.store.checking import Damage, check, doubts
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import need_space
@@ -35,7 +35,7 @@ from springcheck.store.records import attributes
 from springcheck.store.tables import Table
 
 __all__ = [
-    "Draft", "Finding", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
+    "Draft", "Damage", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
     "is_foreign", "is_h5md", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
     "read_one", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",

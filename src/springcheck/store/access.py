@@ -1,6 +1,6 @@
 """Objects of an HDF5 file that anyone may have made: each is looked at before any of it is read.
 
-Only what lies in the file itself is read: external storage, external and soft links and virtual datasets
+Only what lies in the file itself is read: external storage, external and soft links and views of other files
 are refused, and so are filters that would load a library.  Sizes, counts, depths and lengths are bounded.
 """
 
@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
+import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
+from springcheck.physics.scenefile import LONGEST_TEXT as LONGEST_SCENE
 from springcheck.store import files
 
 Scalar: TypeAlias = str | float | int | bool
@@ -24,11 +27,19 @@ MOST_MEMBERS = 2_000
 MOST_ATTRIBUTES = 2_000
 LONGEST_NAME = 200
 """Characters of a name."""
-LONGEST_TEXT = 1 << 26
-"""Bytes of all texts of one dataset, and of one attribute."""
+LONGEST_TEXT = LONGEST_SCENE
+"""Bytes of all texts of one dataset, and of all attributes of one object."""
+LONGEST_DOCUMENT = 1 << 24
+"""Bytes of a text of JSON: as plain objects it takes some twenty times as much."""
+LARGEST_TABLE = 1 << 28
+"""Bytes of the numbers of a table."""
+MOST_TEXTS = 1 << 21
+"""Texts of a column."""
 MOST_ITEMS = 10_000
 """Items of an attribute."""
 MOST_DIMENSIONS = 4
+MOST_VIEWS = 1_000
+"""Pieces of other datasets that a virtual one is put together of."""
 LARGEST_CHUNK = 1 << 28
 """Bytes."""
 EXPANSION = 1100
@@ -41,8 +52,19 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 @contextlib.contextmanager
 def for_reading(path: Path) -> Iterator[Any]:
     """A file open for reading, whatever it does to libhdf5 (see `trust`).  StoreError where it cannot be."""
-    with files.told(path, "read"), h5py.File(path, "r", locking="best-effort") as file:
+    with files.told(path, "read"), opened(path) as file:
         yield file
+
+
+def opened(path: Path) -> Any:
+    """The same, and what is wrong with it as libhdf5 says it."""
+    try:
+        return h5py.File(path, "r", locking="best-effort")
+    except OSError as error:
+        # on a file system without locks, of which libhdf5 itself knows one
+        if "lock file" not in str(error) or files.number_of(error) not in files.UNSUPPORTED:
+            raise
+        return h5py.File(path, "r", locking=False)
 
 
 def refuse(node: Any, why: str) -> StoreError:
@@ -85,12 +107,24 @@ def find(group: Any, path: str) -> Any:
     return node
 
 
+def address(node: Any) -> int:
+    """Where an object lies in its file: the same under each of its names."""
+    return int(h5py.h5o.get_info(node.id).addr)
+
+
+def _has_one_name(node: Any) -> Any:
+    """A group or a column of ours: one with more names would be read as often as it has them."""
+    if h5py.h5o.get_info(node.id).rc > 1:
+        raise refuse(node, "has more than one name, as none of ours has")
+    return node
+
+
 def group_at(file: Any, path: str) -> Any:
     """The group at a path, or None; StoreError where something else stands there."""
     node = find(file, path)
     if node is not None and not isinstance(node, h5py.Group):
         raise refuse(node, "is no group")
-    return node
+    return None if node is None else _has_one_name(node)
 
 
 def children(file: Any, path: str) -> list[str]:
@@ -110,28 +144,81 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
         raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
     if not isinstance(node, h5py.Dataset):
         raise refuse(node, "is no dataset")
-    how = node.id.get_create_plist()
-    layout = how.get_layout()
-    if how.get_external_count() or layout == h5py.h5d.VIRTUAL:
-        raise refuse(node, "lies outside the file: what other files hold is not read")
-    if node.ndim > MOST_DIMENSIONS:
-        raise refuse(node, f"has {node.ndim} dimensions")
+    how = _Storage.of(node)
     size = node.file.id.get_filesize()
     claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
-    if layout == h5py.h5d.CHUNKED:
-        used = {how.get_filter(i)[0] for i in range(how.get_nfilters())}
-        chunk = int(np.prod(how.get_chunk(), dtype=object)) * node.dtype.itemsize
-        if not packed or used - _FILTERS:
+    if node.ndim > MOST_DIMENSIONS:
+        raise refuse(node, f"has {node.ndim} dimensions")
+    if how.external:
+        raise refuse(node, "lies outside the file: what other files hold is not read")
+    if how.layout == h5py.h5d.VIRTUAL:
+        if not packed:
+            raise refuse(node, "is stored in a way that is not read")
+        _look_at_views(node, how.views)
+    elif how.layout == h5py.h5d.CHUNKED:
+        chunk = int(np.prod(how.chunk, dtype=object)) * node.dtype.itemsize
+        if not packed or how.filters - _FILTERS:
             raise refuse(node, "is stored in a way that is not read")
         stored = node.id.get_storage_size()
         # libhdf5 makes room for as many bytes as a chunk says that it takes in the file
         if chunk > LARGEST_CHUNK or stored > size or claimed > EXPANSION * stored:
             raise refuse(node, f"claims {claimed} bytes, more than the file holds")
-    elif layout == h5py.h5d.CONTIGUOUS and claimed:
+    elif how.layout == h5py.h5d.CONTIGUOUS and claimed:
         offset = node.id.get_offset()
         if offset is None or offset + claimed > size:
             raise refuse(node, f"claims {claimed} bytes, more than the file holds")
     return node
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Storage:
+    """How a dataset is stored, as plain data.
+
+    libhdf5 2.0 crashes at the program's end where the creation properties of a virtual dataset are still
+    held, as an exception's traceback would hold them, or h5py's own Dataset once it was asked for its views.
+    """
+
+    layout: int
+    external: int
+    chunk: tuple[int, ...]
+    filters: frozenset[int]
+    views: tuple[tuple[str, str], ...]
+    """Files and datasets that a virtual dataset shows; no more than a few."""
+
+    @classmethod
+    def of(cls, node: Any) -> _Storage:
+        how = node.id.get_create_plist()
+        layout = how.get_layout()
+        return cls(
+            layout=layout,
+            external=how.get_external_count(),
+            chunk=how.get_chunk() if layout == h5py.h5d.CHUNKED else (),
+            filters=frozenset(how.get_filter(i)[0] for i in range(how.get_nfilters())),
+            views=tuple(
+                (how.get_virtual_filename(i), how.get_virtual_dsetname(i))
+                for i in range(min(how.get_virtual_count(), MOST_VIEWS))
+            )
+            if layout == h5py.h5d.VIRTUAL
+            else (),
+        )
+
+
+def views(node: Any) -> tuple[tuple[str, str], ...]:
+    """The files and datasets that a virtual dataset shows ("." is its own file); none of any other."""
+    return _Storage.of(node).views
+
+
+def _look_at_views(node: Any, shown: tuple[tuple[str, str], ...]) -> None:
+    """StoreError unless a virtual dataset shows plain datasets of its own file alone, as ours do."""
+    if len(shown) == MOST_VIEWS:
+        raise refuse(node, "is put together of more pieces than can be looked at")
+    for file, name in shown:
+        if file != ".":
+            raise refuse(node, f"shows another file, {file}: what other files hold is not read")
+        source = find(node.file, name)
+        if isinstance(source, h5py.Dataset) and views(source):
+            raise refuse(node, "shows a view of a view: only plain arrays are read")
+        dataset_at(node.file, name, packed=True)
 
 
 def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any:
@@ -146,21 +233,31 @@ def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any
 
 
 def texts(dataset: Any) -> np.ndarray:
-    """The texts of a dataset, bounded however often it refers to the same one."""
+    """The texts of a dataset, their lengths added up before any is read: all may be the same one."""
     if dataset.ndim > 1:
         raise refuse(dataset, "is no list of texts")
-    shown = dataset.asstr(errors="backslashreplace")
-    if dataset.ndim == 0:
-        return np.asarray(shown[()], dtype=object)
-    rows = max(1, LONGEST_TEXT // dataset.file.id.get_filesize())
-    found: list[str] = []
-    length = 0
-    for start in range(0, len(dataset), rows):
-        found.extend(shown[start : start + rows])
-        length += sum(map(len, found[start:]))
-        if length > LONGEST_TEXT:
-            raise refuse(dataset, "holds more text than any of ours")
-    return np.array([*found, None], dtype=object)[:-1]
+    if dataset.size > MOST_TEXTS or _length(dataset) > LONGEST_TEXT:
+        raise refuse(dataset, "holds more text than any of ours")
+    found = dataset.asstr(errors="backslashreplace")[()]
+    return np.asarray(found, object) if dataset.ndim == 0 else np.array([*found, None], dtype=object)[:-1]
+
+
+def _length(dataset: Any) -> int:
+    """Bytes of all texts of a dataset, from the list of lengths and places that stands in its stead."""
+    size = dataset.size
+    if not size or dataset.dtype.kind != "O":
+        return int(size * dataset.dtype.itemsize)
+    if dataset.file.mode != "r":
+        # it is being written, here
+        return 0
+    offset = dataset.id.get_offset()
+    if offset is None or dataset.file.userblock_size:
+        raise refuse(dataset, "is stored in a way that is not read")
+    each = dataset.id.get_storage_size() // size
+    with open(dataset.file.filename, "rb") as raw:
+        raw.seek(offset)
+        listed = np.frombuffer(raw.read(size * each), np.uint8).reshape(size, each)
+    return int(np.ascontiguousarray(listed[:, :4]).view("<u4").sum(dtype=np.int64))
 
 
 def text(file: Any, path: str) -> str:
@@ -171,9 +268,27 @@ def text(file: Any, path: str) -> str:
     return str(texts(node)[()])
 
 
+def json(text: str, kind: Any = Any) -> Any:
+    """What a text of a file says in JSON.  ValueError where it is none, or longer than any of ours."""
+    if len(text) > LONGEST_DOCUMENT:
+        raise ValueError(f"has {len(text)} characters, more than any of ours")
+    try:
+        return msgspec.json.decode(text.encode("utf-8", "surrogatepass"), type=kind)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise ValueError(str(error)) from error
+
+
 def is_text(dataset: Any) -> bool:
     """Whether a column holds texts."""
     return h5py.check_string_dtype(dataset.dtype) is not None
+
+
+def columns(group: Any) -> dict[str, Any]:
+    """The datasets of a table by name, each with one name: all in all no more bytes than a table may have."""
+    found = {name: _has_one_name(dataset_at(group, name)) for name in members(group)}
+    if sum(dataset.size * dataset.dtype.itemsize for dataset in found.values()) > LARGEST_TABLE:
+        raise refuse(group, f"has more than {LARGEST_TABLE >> 20} MiB, more than any table of ours")
+    return found
 
 
 def column(dataset: Any, rows: Any = ()) -> np.ndarray:
@@ -194,11 +309,16 @@ def attributes(node: Any) -> dict[str, Any]:
     names: list[bytes] = []
     h5py.h5a.iterate(node.id, names.append)
     found: dict[str, Any] = {}
+    length = 0
     for raw in names:
         name = raw.decode("utf-8", "backslashreplace")
         if not is_name(name):
             raise refuse(node, "has an attribute whose name is no text, or too long")
-        found[name] = _value(node, h5py.h5a.open(node.id, raw), name)
+        found[name] = value = _value(node, h5py.h5a.open(node.id, raw), name)
+        # however often they refer to the same text
+        length += len(value) if isinstance(value, str) else 0
+        if length > LONGEST_TEXT:
+            raise refuse(node, f"has attributes of more than {LONGEST_TEXT >> 20} MiB of text")
     return found
 
 

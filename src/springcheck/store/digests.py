@@ -47,8 +47,7 @@ def of_array(dataset: Any) -> str:
 def of_table(group: Any) -> str:
     """sha256 of a table: its columns with names, shapes, values and attributes, and its own attributes."""
     total = hashlib.sha256(_attributes(group, "sha256"))
-    for name in sorted(access.members(group)):
-        dataset = access.dataset_at(group, name)
+    for name, dataset in sorted(access.columns(group).items()):
         text = access.is_text(dataset)
         kind = "|O" if text else dataset.dtype.str
         total.update(f"{name} {dataset.shape} {kind}\n".encode() + _attributes(dataset))

@@ -6,12 +6,15 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from springcheck.errors import StoreError
-from springcheck.store import access, checking, files, layout, parts, reading
-from springcheck.store.checking import Finding
+from springcheck.physics.arrays import Integers
+from springcheck.store import access, checking, files, layout, parts, reading, space
+from springcheck.store.checking import Damage
 
 
-def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
+def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
     """Write one trajectory as plain H5MD: one group ``/particles/trajectory``, no virtual datasets.
 
     MDAnalysis wants that name, and the ending .h5md.  Returns what else of the store cannot be trusted.
@@ -37,6 +40,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
         if known.kind != "particles" or not {"q", "p"} & set(known.kept):
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
         base, wide = f"observables/{label}", (known.frames, known.particles)
+        places = space.places_of(known.axes, known.particles)
         velocity = "velocity" if "velocity" in access.children(file, base) else "p"
         arrays = {
             element: access.array(file, f"{base}/{name}/value", wide)
@@ -47,7 +51,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
         columns = {
             "time": access.array(file, f"{first}/time", wide[:1]),
             "step": access.array(file, f"{first}/step", wide[:1], "i"),
-            "mass": access.array(file, f"particles/{label}/mass", wide[1:]),
+            "mass": access.array(file, f"particles/{label}/mass", (int(np.max(places)) // 3 + 1,)),
         }
         with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
             size = sum(2 * values.size * 8 for values in arrays.values())
@@ -55,18 +59,20 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Finding]:
                 layout.begin(target)
                 layout.write_attributes(target, {"format": layout.EXPORTED})
                 group = target.create_group("particles/trajectory")
-                _write(group, arrays, columns, layout.UNITS[known.kind, known.units])
+                _write(group, arrays, columns, places, layout.UNITS[known.kind, known.units])
                 layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
             files.put(made, out)
     return found
 
 
-def _write(group: Any, arrays: dict[str, Any], columns: dict[str, Any], unit: layout.UnitsOf) -> None:
+def _write(
+    group: Any, arrays: dict[str, Any], columns: dict[str, Any], places: Integers, unit: layout.UnitsOf
+) -> None:
     layout.write_box(group)
     first = next(iter(arrays))
     for name, source in arrays.items():
         element = group.create_group(name)
-        _copy_values(source, element)
+        _copy_values(source, element, places)
         layout.write_unit(element["value"], unit["q" if name == "position" else "velocity"])
         for kind in ("time", "step"):
             # two elements share them
@@ -76,10 +82,13 @@ def _write(group: Any, arrays: dict[str, Any], columns: dict[str, Any], unit: la
     layout.write_unit(group["mass"], unit["mass"])
 
 
-def _copy_values(source: Any, target: Any) -> None:
-    """Write (frames, n) as x of (frames, n, 3), in pieces; y and z are the fill value of their chunks."""
-    frames, n = source.shape
-    rows = max(1, min(frames, layout.CHUNK // (8 * n)))
-    made = target.create_dataset("value", (frames, n, 3), "<f8", chunks=(rows, n, 1), fillvalue=0.0)
+def _copy_values(source: Any, target: Any, places: Integers) -> None:
+    """Write (frames, n) as its places of (frames, particles, 3), in pieces; the rest is a fill value."""
+    frames, particles = source.shape[0], int(np.max(places)) // 3 + 1
+    rows = max(1, min(frames, layout.CHUNK // (8 * particles)))
+    shape = (frames, particles, 3)
+    made = target.create_dataset("value", shape, "<f8", chunks=(rows, particles, 1), fillvalue=0.0)
     for start in range(0, frames, rows):
-        made[start : start + rows, :, 0] = source[start : start + rows]
+        part = np.asarray(source[start : start + rows])
+        for columns, of, axis in space.lines(places):
+            made[start : start + rows, of, axis] = part[:, columns]

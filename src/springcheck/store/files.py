@@ -55,7 +55,7 @@ def cause(error: BaseException) -> str:
     if not isinstance(error, OSError):
         return "it is damaged, or its layout is not what its name says"
     said = str(error)
-    number = error.errno or int(next(iter(re.findall(r"errno = (\d+)", said)), 0))
+    number = number_of(error)
     if number in CAUSES:
         return CAUSES[number]
     if "signature not found" in said:
@@ -63,6 +63,11 @@ def cause(error: BaseException) -> str:
     if "truncated file" in said:
         return "it is cut off: its end is missing"
     return error.strerror or f"it is damaged ({' '.join(said.split())[:120]})"
+
+
+def number_of(error: OSError) -> int:
+    """The number of an error of the system, which libhdf5 has in its text."""
+    return error.errno or int(next(iter(re.findall(r"errno = (\d+)", str(error))), 0))
 
 
 def shown(path: Path) -> Path:

@@ -16,9 +16,10 @@ from springcheck.physics.arrays import Floats
 from springcheck.store import access, layout, trust
 
 MOST_NUMBERS = 1 << 24
-"""Positions of one particle group that are read [numbers]: frames beyond are left out."""
-MOST_FRAMES = 1 << 25
-"""Frames of a file that is looked at."""
+"""Positions of one particle group that are read [numbers]: frames beyond are left out.  Of arrays by their
+names, all together."""
+MOST_FRAMES = 1 << 21
+"""Frames of one particle group that are looked at, however many it declares."""
 DEEPEST = 4
 """Groups in groups that are looked into."""
 
@@ -107,24 +108,32 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
-    """The same one by one, in this process."""
+    """The same one by one, in this process: together no more than one trajectory may have."""
+    left = MOST_NUMBERS
     with access.for_reading(path) as file:
-        for place in _places(file, ""):
+        for place in _places(file, "", set()):
             if wanted(place):
                 with contextlib.suppress(StoreError):
                     dataset = _numbers(path, file, place)
-                    if dataset.ndim <= 3 and dataset.size <= MOST_NUMBERS:
+                    if dataset.ndim <= 3 and dataset.size <= left:
+                        left -= dataset.size
                         yield place, np.asarray(dataset[()])
 
 
-def _places(group: Any, before: str, depth: int = 0) -> Iterator[str]:
-    """Paths of the datasets below a group, no deeper than anyone nests runs."""
+def _places(group: Any, before: str, seen: set[int], depth: int = 0) -> Iterator[str]:
+    """Paths of the datasets below a group, each object once, no deeper than anyone nests runs."""
     for name in access.members(group):
         node = access.find(group, name)
+        address = access.address(node)
+        if address in seen:
+            continue
+        seen.add(address)
+        if len(seen) > access.MOST_MEMBERS:
+            raise access.refuse(group, "is one of more groups and datasets than can be looked at")
         if isinstance(node, h5py.Dataset):
             yield f"{before}{name}"
         elif isinstance(node, h5py.Group) and depth < DEEPEST:
-            yield from _places(node, f"{before}{name}/", depth + 1)
+            yield from _places(node, f"{before}{name}/", seen, depth + 1)
 
 
 def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:
@@ -137,17 +146,20 @@ def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterat
         v = _numbers(path, group, "velocity/value") if "velocity" in elements else q
         if q.ndim != 3 or q.shape[1:] != v.shape[1:] or not q.size:
             raise _unlike(path, name, q.shape, v.shape)
-        if v is q:
-            t, rows_q, rows_v = _axis(path, group, "position", "time", len(q)), slice(None), slice(None)
-        else:
-            t, rows_q, rows_v = _common(path, name, group, len(q), len(v))
-        kept = max(1, MOST_NUMBERS // (q.shape[1] * q.shape[2]))
-        kept = kept if most is None else min(most, kept)
-        if len(t) > kept:
-            t, rows_q, rows_v = t[:kept], _first(rows_q, kept), _first(rows_v, kept)
-        values = [np.asarray(dataset[rows], np.float64) for dataset, rows in ((q, rows_q), (v, rows_v))]
-        if values[0].shape != values[1].shape:
-            raise _unlike(path, name, values[0].shape, values[1].shape)
+        kept = min(MOST_FRAMES, MOST_NUMBERS // int(np.prod(q.shape[1:], dtype=object)))
+        if not kept:
+            raise StoreError(f"{path}: a frame of {name} has more than {MOST_NUMBERS} numbers")
+        frames, frames_v = len(q), len(v)
+        t, step = _axis(path, group, "position", frames, kept)
+        rows = rows_v = np.arange(len(t))
+        if v is not q:
+            t_v, step_v = _axis(path, group, "velocity", frames_v, kept)
+            if not np.array_equal(t, t_v):
+                _, rows, rows_v = np.intersect1d(step, step_v, return_indices=True)
+                if len(rows) == 0:
+                    raise StoreError(f"{path}: no position and velocity of {name} belong to the same step")
+        t, rows, rows_v = t[rows][:most], rows[:most], rows_v[:most]
+        values = [_rows(dataset, chosen) for dataset, chosen in ((q, rows), (v, rows_v))]
         time = access.find(group, "position/time")
         units = {
             key: _unit(node) for key, node in (("q", q), ("v", v), ("t", time)) if key != "v" or v is not q
@@ -175,9 +187,10 @@ def _unlike(path: Path, name: str, q: tuple[int, ...], v: tuple[int, ...]) -> St
     )
 
 
-def _first(rows: Any, most: int) -> Any:
-    """The first rows of a slice or of an index array."""
-    return slice(0, most) if isinstance(rows, slice) else rows[:most]
+def _rows(dataset: Any, chosen: Any) -> Floats:
+    """Rows of a dataset, read as one slice: libhdf5 takes minutes for as many one by one."""
+    found = np.asarray(dataset[: chosen[-1] + 1], np.float64)
+    return found if len(found) == len(chosen) else np.asarray(found[chosen])
 
 
 def _numbers(path: Path, group: Any, name: str) -> Any:
@@ -188,39 +201,28 @@ def _numbers(path: Path, group: Any, name: str) -> Any:
     return dataset
 
 
-def _common(path: Path, name: str, group: Any, frames: int, frames_v: int) -> tuple[Floats, Any, Any]:
-    """Times, and the rows of positions and of velocities that share a step."""
-    t = _axis(path, group, "position", "time", frames)
-    t_v = _axis(path, group, "velocity", "time", frames_v)
-    if t.shape == t_v.shape and np.array_equal(t, t_v):
-        return t, slice(None), slice(None)
-    step = _axis(path, group, "position", "step", frames)
-    step_v = _axis(path, group, "velocity", "step", frames_v)
-    _, rows, rows_v = np.intersect1d(step, step_v, return_indices=True)
-    if len(rows) == 0:
-        raise StoreError(f"{path}: no position and velocity of {name} belong to the same step")
-    return t[rows], rows, rows_v
+def _axis(path: Path, group: Any, element: str, frames: int, kept: int) -> tuple[Floats, Floats]:
+    """Times and steps of the first `kept` of so many frames; times where it has no steps."""
+    if access.find(group, f"{element}/time") is None:
+        raise StoreError(f"{path}: {group.name}/{element} has no time: nothing can be told without it")
+    there = ["time"] * 2 if access.find(group, f"{element}/step") is None else ["time", "step"]
+    t, step = (_column(path, group, element, name, frames, kept) for name in there)
+    return t, step
 
 
-def _axis(path: Path, group: Any, element: str, name: str, frames: int) -> Floats:
-    """Time or step of every frame; a scalar means a fixed interval (H5MD 1.1), with an optional offset."""
-    if frames > MOST_FRAMES:
-        raise StoreError(f"{path}: {group.name}/{element} has {frames} frames, more than can be looked at")
-    if access.find(group, f"{element}/{name}") is None:
-        if name == "time":
-            raise StoreError(f"{path}: {group.name}/{element} has no time: nothing can be told without it")
-        return _axis(path, group, element, "time", frames)
+def _column(path: Path, group: Any, element: str, name: str, frames: int, kept: int) -> Floats:
+    """Time or step of frames; a scalar means a fixed interval (H5MD 1.1), with an optional offset."""
     dataset = _numbers(path, group, f"{element}/{name}")
     if dataset.ndim == 0:
         offset = access.attributes(dataset).get("offset", 0.0)
         if not isinstance(offset, int | float):
             raise StoreError(f"{path}: offset of {dataset.name} is no number")
-        return np.asarray(float(offset) + np.arange(frames) * float(dataset[()]))
+        return np.asarray(float(offset) + np.arange(min(frames, kept)) * float(dataset[()]))
     if dataset.shape != (frames,):
         raise StoreError(
             f"{path}: {group.name}/{element} has {frames} frames and {name} of shape {dataset.shape}"
         )
-    return np.asarray(dataset[()], np.float64)
+    return np.asarray(dataset[:kept], np.float64)
 
 
 def _mass(path: Path, group: Any, n: int) -> tuple[Floats | None, str]:

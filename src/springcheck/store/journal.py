@@ -98,9 +98,13 @@ def _is_free(parts: Path) -> bool:
     return all(
         name == "lock"
         or files.TEMPORARY.fullmatch(name)
-        or (_NAMES.fullmatch(name) and not (parts / name).is_symlink() and _is_ours(parts / name))
+        or (_NAMES.fullmatch(name) and _is_plain(parts / name) and _is_ours(parts / name))
         for name in known
     )
+
+
+def _is_plain(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
 
 
 def _is_ours(path: Path) -> bool:
@@ -124,7 +128,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
             _remove(parts, lambda name: name.endswith(".new"))
             _look_at_parts(parts, known["run"])
             return known["run"]
-        if not force:
+        if not force and not known["failed"]:
             raise StoreError(
                 f"{parts} holds finished work of another command, or of other versions of what it runs: "
                 "give that command again to complete it, or --force to discard it"
@@ -141,7 +145,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
 
 def _look_at_parts(parts: Path, run: str) -> None:
     """Remove the damaged parts of a run, and say so: they alone are measured again."""
-    for part in sorted(parts.glob("*-*.h5")):
+    for part in sorted(filter(_is_plain, parts.glob("*-*.h5"))):
         name = name_of(part)
         known = seal.find(part)
         if known is not None and known.run != run:
@@ -211,7 +215,7 @@ class Journal:
             draft.append(trajectory.t, trajectory.q, trajectory.p, trajectory.energy)
             return draft.finish(records.attributes(trajectory))
 
-    def add(self, table: Table, *, by: Sequence[pieces.Record] = (), rows: bool = False) -> None:
+    def add(self, table: Table, *, by: Sequence[pieces.Worker] = (), rows: bool = False) -> None:
         """Store one table; once this returns it outlives crashes.
 
         `by` says who measured it.  With `rows` it is a piece ``<table>/<piece>`` of a table: the final
@@ -286,6 +290,16 @@ class Journal:
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
+
+    def fail(self) -> None:
+        """Note that a method of this command failed: what is finished is resumed by the same command, and
+        gives way to any other, the corrected one."""
+        known = claim(self.folder)
+        if known is None:
+            return
+        content = {**known, "format": files.JOURNAL_FORMAT, "forced": bool(known["forced"]), "failed": True}
+        with files.told(self.folder, "write"):
+            files.put_bytes(json.dumps(content).encode(), self.folder / "command")
 
     def close(self) -> None:
         """Give the lock back; what is finished stays for the next one."""

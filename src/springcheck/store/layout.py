@@ -11,8 +11,8 @@
 
 The numbers are stored once, contiguous, as little-endian float64, and neither compressed nor chunked:
 trajectories are noise to gzip (validation/long_runs.py), and a contiguous array is written past
-libhdf5 at the speed of the disk.  /particles holds virtual datasets of three dimensions over them, whose
-y and z are a fill value, so it costs no bytes.  `time` and `step` are hard links to one array each.
+libhdf5 at the speed of the disk.  /particles holds virtual datasets of three dimensions over them; axes along
+which nothing moves are a fill value and cost no bytes.  `time` and `step` are hard links to one array each.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ import h5py
 import numpy as np
 
 import springcheck
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, plain
 from springcheck.physics.scene import Scene
-from springcheck.store import access, files
+from springcheck.store import access, files, space
 from springcheck.store.access import Scalar
 
 FORMAT = "springcheck store 2"
@@ -136,7 +136,9 @@ def begin(file: Any) -> None:
     write_attributes(file, {"NX_class": "NXroot"})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
-    write_attributes(head.create_group("author"), {"name": os.environ.get("USER") or "unknown"})
+    # a user's name need not be UTF-8
+    author = plain(os.environ.get("USER") or "unknown", access.LONGEST_NAME)
+    write_attributes(head.create_group("author"), {"name": author})
     write_attributes(
         head.create_group("creator"), {"name": "springcheck", "version": springcheck.__version__}
     )
@@ -229,17 +231,22 @@ def _particles(
     unit = units(scene)
     group = file.create_group(f"particles/{label}")
     write_box(group)
+    places = 3 * np.arange(scene.n) if scene.places is None else scene.places
     for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
         if source not in found:
             continue
         element = group.create_group(name)
         shape = found[source].shape
-        view = h5py.VirtualLayout((*shape, 3), "<f8")
-        view[:, :, 0] = h5py.VirtualSource(".", found[source].path, shape, "<f8")
+        view = h5py.VirtualLayout((shape[0], scene.particles, 3), "<f8")
+        numbers = h5py.VirtualSource(".", found[source].path, shape, "<f8")
+        for columns_, particles, axis in space.lines(places):
+            view[:, particles, axis] = numbers[:, columns_]
         made = element.create_virtual_dataset("value", view, fillvalue=0.0)
         write_unit(made, unit["q"] if name == "position" else unit["velocity"])
         _link(element, time, step)
-    write_unit(group.create_dataset("mass", data=scene.m.astype("<f8")), unit["mass"])
+    mass = np.empty(scene.particles)
+    mass[places // 3] = scene.m
+    write_unit(group.create_dataset("mass", data=mass.astype("<f8")), unit["mass"])
 
 
 def write_unit(dataset: Any, unit: str, name: str = "") -> None:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import adopt, digests, files, layout, pieces, seal, tables
+from springcheck.store import access, adopt, digests, files, layout, pieces, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.parts import Parts, name_of
 from springcheck.store.tables import Table
@@ -50,7 +50,7 @@ def collection(
         layout.write_attributes(file, root)
         provenance = pieces.Provenance()
         for source in sources:
-            with h5py.File(source, "r", locking="best-effort") as part:
+            with access.opened(source) as part:
                 _take(file, part)
                 provenance.note(name_of(source), pieces.by_of(part))
         pieces.join(file, found.rows, provenance)

@@ -33,8 +33,9 @@ def parts_folder(path: Path) -> Path:
 
 
 def claim(parts: Path) -> dict[str, str] | None:
-    """Run id and command of a journal of ours, and whether --force began it; None where there is none.
+    """Run id and command of a journal of ours, whether --force began it and whether a method of it failed.
 
+    None where there is none.
     StoreError where what stands there cannot be read as ours.
     """
     try:
@@ -43,7 +44,13 @@ def claim(parts: Path) -> dict[str, str] | None:
         if found["format"] != files.JOURNAL_FORMAT:
             raise ValueError("another format")
         forced = "forced" if found["forced"] else ""
-        return {"run": str(found["run"]), "command": str(found["command"]), "forced": forced}
+        failed = "failed" if found.get("failed") else ""
+        return {
+            "run": str(found["run"]),
+            "command": str(found["command"]),
+            "forced": forced,
+            "failed": failed,
+        }
     except FileNotFoundError:
         return None
     except (ValueError, KeyError, TypeError, OSError) as error:
@@ -78,7 +85,9 @@ class Parts:
         if known is None:
             with contextlib.suppress(StoreError):
                 known = (claim(folder) or {}).get("run")
-        parts = sorted(folder.glob("*-*.h5")) if known is not None else []
+        # what is a pipe there, or leads elsewhere, is none of ours
+        there = folder.glob("*-*.h5") if known is not None else ()
+        parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
         return cls(
             collection=None,

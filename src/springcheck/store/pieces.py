@@ -15,8 +15,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-import h5py
-import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
@@ -29,11 +27,11 @@ BY = "measured_by"
 
 WORKERS, PIECES = "provenance/workers", "provenance/pieces"
 
-Record = Mapping[str, str]
+Worker = Mapping[str, str]
 """What is known of a worker: host, processor, versions ..."""
 
 
-def by_text(by: Sequence[Record]) -> dict[str, str]:
+def by_text(by: Sequence[Worker]) -> dict[str, str]:
     """The attribute of a part that says by whom it was measured; none where that is not known."""
     return {BY: json.dumps([dict(record) for record in by], sort_keys=True)} if by else {}
 
@@ -41,8 +39,11 @@ def by_text(by: Sequence[Record]) -> dict[str, str]:
 def by_of(file: Any) -> list[dict[str, str]]:
     """By whom an open part was measured."""
     try:
-        return msgspec.json.decode(str(access.attribute(file, BY) or "[]"), type=list[dict[str, str]])
-    except (msgspec.MsgspecError, RecursionError):
+        found: list[dict[str, str]] = access.json(
+            str(access.attribute(file, BY) or "[]"), list[dict[str, str]]
+        )
+        return found
+    except ValueError:
         return []
 
 
@@ -53,7 +54,7 @@ class Provenance:
         self._records: dict[str, int] = {}
         self._pieces: dict[tuple[str, int], None] = {}
 
-    def note(self, piece: str, by: Iterable[Record]) -> None:
+    def note(self, piece: str, by: Iterable[Worker]) -> None:
         """A piece was measured by these."""
         for record in by:
             number = self._records.setdefault(json.dumps(dict(record), sort_keys=True), len(self._records))
@@ -103,9 +104,9 @@ def join(file: Any, parts: Sequence[Path], provenance: Provenance) -> None:
 def _join(file: Any, name: str, parts: Sequence[Path], provenance: Provenance) -> None:
     lengths = np.zeros(len(parts) + 1, np.int64)
     for j, part in enumerate(parts):
-        with h5py.File(part, "r", locking="best-effort") as source:
+        with access.opened(part) as source:
             lengths[j + 1] = lengths[j] + _length(source[name_of(part)])
-    with h5py.File(parts[0], "r", locking="best-effort") as source:
+    with access.opened(parts[0]) as source:
         first = tables.read(source[name_of(parts[0])], name)
     group = tables.begin(file, first)
     whole = {
@@ -117,7 +118,7 @@ def _join(file: Any, name: str, parts: Sequence[Path], provenance: Provenance) -
         known = seal.find(part)
         if known is None or not seal.is_whole(part, known):
             raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
-        with h5py.File(part, "r", locking="best-effort") as source:
+        with access.opened(part) as source:
             provenance.note(name_of(part), by_of(source))
             rows = source[name_of(part)]
             found = {column: access.column(rows[column]) for column in access.members(rows)}

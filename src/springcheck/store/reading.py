@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError, nearest
@@ -18,7 +17,7 @@ from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verd
 from springcheck.store import access, digests, files, layout, parts, pieces, records, tables
 from springcheck.store.access import Scalar
 from springcheck.store.parts import Parts, claim, opened, parts_folder
-from springcheck.store.records import Record
+from springcheck.store.records import RunRecord
 from springcheck.store.tables import Table
 
 MAPPED = 1 << 26
@@ -53,7 +52,7 @@ def _sequence(file: Any, label: str) -> int:
     return found if isinstance(found, int) else 0
 
 
-def known_of(file: Any, label: str) -> tuple[Record, dict[str, Any]]:
+def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
     """All that is known of a trajectory besides its numbers: with types, and as it stands there."""
     group = access.group_at(file, f"parameters/{label}")
     if group is None:
@@ -62,7 +61,7 @@ def known_of(file: Any, label: str) -> tuple[Record, dict[str, Any]]:
     return records.record(f"cannot read {file.filename}, {label}", known), known
 
 
-def _datasets(file: Any, label: str, known: Record) -> dict[str, Any]:
+def _datasets(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
     """The arrays of a trajectory, looked at: time, and of q, p and energy those that are recorded."""
     base = f"observables/{label}"
     wide = (known.frames, known.particles)
@@ -74,7 +73,7 @@ def _datasets(file: Any, label: str, known: Record) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _held(path: str | Path, label: str) -> Iterator[tuple[Record, dict[str, Any], dict[str, Any]]]:
+def _held(path: str | Path, label: str) -> Iterator[tuple[RunRecord, dict[str, Any], dict[str, Any]]]:
     """What is known of a trajectory of a store (see `known_of`), and its arrays (see `_datasets`)."""
     with opened(source_of(Path(path), label)) as file:
         known, rest = known_of(file, label)
@@ -309,8 +308,8 @@ def document(path: str | Path, name: str) -> str:
 def decoded(path: str | Path, name: str) -> Any:
     """A document of JSON.  StoreError where it is none, or nested deeper than any of ours."""
     try:
-        return msgspec.json.decode(document(path, name).encode())
-    except (msgspec.MsgspecError, RecursionError) as error:
+        return access.json(document(path, name))
+    except ValueError as error:
         raise StoreError(f"{path}: its document {name} is no JSON: {error}") from error
 
 

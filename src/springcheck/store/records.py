@@ -46,7 +46,7 @@ KEPT = {
 """Attributes, and the fields of a trajectory that they keep."""
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     """The attributes of /parameters/<label>, but for those that only people read."""
 
     scene: str
@@ -55,6 +55,9 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     kind: Kind
     frames: Size
     particles: Size
+    """Number of coordinates: of particles, where each moves along one axis."""
+    axes: Annotated[str, msgspec.Meta(max_length=1 << 20)] = "x"
+    """See `space.axes_of`."""
     quantities: Name
     sequence: Count = 0
     sha256: Name
@@ -85,10 +88,10 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         return tuple(name for name in ("q", "p", "energy") if name in self.quantities.split())
 
 
-def record(place: str, known: Mapping[str, Any]) -> Record:
+def record(place: str, known: Mapping[str, Any]) -> RunRecord:
     """Attributes with their types; StoreError that names the one that has another, or is missing."""
     try:
-        found = msgspec.convert(known, Record)
+        found = msgspec.convert(known, RunRecord)
     except msgspec.ValidationError as error:
         raise StoreError(f"{place}: {error}") from error
     if not found.kept:
@@ -104,7 +107,7 @@ def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
 
 
 def trajectory(
-    label: str, x: Record, known: Mapping[str, Any], arrays: Mapping[str, Floats], stride: int = 1
+    label: str, x: RunRecord, known: Mapping[str, Any], arrays: Mapping[str, Floats], stride: int = 1
 ) -> Trajectory:
     """A trajectory, or every stride-th frame of it, from its record and its arrays."""
     parts: dict[str, dict[str, Any]] = {"": {}, "outcome": {}, "timing": {}, "arithmetic": {}}

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import h5py
-import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError
@@ -21,6 +20,8 @@ _STYLE = "SILX_style"
 """The attribute from which silx and H5Web take scales."""
 DEEPEST = 8
 """Groups that a table lies in."""
+MOST_VERDICTS = 1 << 17
+"""As many as the trajectories that a store may hold have checks."""
 _PASSED = {None: -1, False: 0, True: 1}
 
 
@@ -97,11 +98,11 @@ def read(group: Any, name: str) -> Table:
     signal = str(known.get("signal", ""))
     axes = tuple(map(str, _listed(known.get("axes"))))
     try:
-        style = msgspec.json.decode(str(known.get(_STYLE, "{}")), type=dict[str, Any])
-    except (msgspec.MsgspecError, RecursionError):
+        style = access.json(str(known.get(_STYLE, "{}")), dict[str, Any])
+    except ValueError:
         style = {}
     scales = [*_listed(style.get("axes_scale_types")), style.get("signal_scale_type")]
-    columns = {column: access.dataset_at(group, column) for column in access.members(group)}
+    columns = access.columns(group)
     units = {column: access.attributes(dataset).get("unit") for column, dataset in columns.items()}
     return Table(
         name=name,
@@ -134,7 +135,7 @@ def all_names(file: Any) -> list[str]:
 
 def _within(node: Any, name: str, seen: set[int], depth: int = 0) -> Iterator[str]:
     """Tables at and below a node, each once however often it is linked."""
-    address = h5py.h5o.get_info(node.id).addr
+    address = access.address(node)
     if not isinstance(node, h5py.Group) or address in seen or depth > DEEPEST:
         return
     seen.add(address)
@@ -173,6 +174,8 @@ def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     names = ("method", "check", "unit", "why")
     texts = [_column(table, name, "O") for name in names]
     value, bound, passed = (_column(table, name, kind) for name, kind in _NUMBERS.items())
+    if len(value) > MOST_VERDICTS:
+        raise StoreError(f"the table of verdicts has {len(value)} rows, more than any of ours")
     if len({len(column) for column in (*texts, value, bound, passed)}) > 1 or set(passed) - {-1, 0, 1}:
         raise StoreError("the table of verdicts is none of ours: its columns do not fit together")
     back = {number: passed for passed, number in _PASSED.items()}

@@ -6,26 +6,18 @@ of its own, with little memory and time, whose end tells; what survives that is 
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from functools import lru_cache
 from pathlib import Path
 
 import h5py
 
 from springcheck.errors import StoreError
-from springcheck.interrupts import called
-from springcheck.store import files, seal
+from springcheck.store import apart, files, seal
 
 OURS, FOREIGN = "ours", "foreign"
 """What a file is read as when it is tried."""
 
 MODULE = "springcheck.store"
-LIMIT, SPEED = 8.0, 1e8
-"""Seconds that reading a file may take, whatever its size, and bytes a second on top."""
-MEMORY = 1 << 30
-"""Bytes of memory that it may take."""
 
 
 def trust(path: Path, kind: str) -> None:
@@ -74,20 +66,7 @@ def guarded(path: Path, kind: str) -> str:
 @lru_cache(maxsize=4096)
 def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
     """What the process says, and whether it lived to say it."""
-    root = str(Path(__file__).parents[2])
-    paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
-    # BLAS would take memory for a thread of each core
-    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    limit = LIMIT + path.stat().st_size / SPEED
     try:
-        done = called(
-            [sys.executable, "-P", "-m", MODULE, kind, str(path), str(int(limit) + 1), str(MEMORY)],
-            # on a busy machine it waits longer than it works, and work is what is limited
-            6 * limit,
-            env={**os.environ, **threads, "PYTHONPATH": paths},
-        )
-    except subprocess.TimeoutExpired:
-        return "it is damaged, reading it does not end", False
-    if done.returncode:
-        return "it is damaged, reading it crashes the HDF5 library, or asks for too much of it", False
-    return done.stdout.decode("utf-8", "backslashreplace").strip(), True
+        return apart.read(MODULE, kind, path).decode("utf-8", "backslashreplace").strip(), True
+    except apart.EndedError as error:
+        return f"it is damaged, reading it {error}", False

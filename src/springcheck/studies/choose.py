@@ -28,14 +28,26 @@ def sorted_out(
     return [label for label, why in reasons.items() if not why], left
 
 
+ALL = "*:?*"
+"""What names every method, and not the default ones alone."""
+
+
+def others(scene: Scene, chosen: Sequence[Label]) -> tuple[str, ...]:
+    """Methods beside those chosen that are here and could serve a scene."""
+    every = engines.match((ALL,), bath=scene.bath is not None)
+    able = (x for x in every if not engines.refusal(scene, x) and not engines.absence(x.engine))
+    return tuple(str(label) for label in able if label not in chosen)
+
+
 def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut]]:
     """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
 
     Raises MethodError when a method that is named in full cannot run: it was asked for.
     """
-    named = tuple(patterns) or scene.include
+    # a scene's `*` stands for the default methods, one that somebody gives for all
+    named = tuple(ALL if x == "*" else x for x in patterns) or scene.include
     try:
-        matched = engines.match(named)
+        matched = engines.match(named, bath=scene.bath is not None)
     except MethodError as error:
         if patterns:
             raise

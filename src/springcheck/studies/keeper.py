@@ -23,8 +23,8 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.store import Draft, Table
 from springcheck.studies import provenance
 from springcheck.studies import team as teams
+from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.study import Progress
 from springcheck.studies.team import ALONE, Team
 
 if TYPE_CHECKING:

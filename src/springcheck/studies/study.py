@@ -16,20 +16,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from springcheck.studies.arguments import Argument, Progress
+
 if TYPE_CHECKING:
+    from springcheck.figures.charts import Bank
     from springcheck.store import Summary
-    from springcheck.studies.charts import Bank
     from springcheck.text.lines import Lines
-
-
-Argument = tuple[tuple[str, ...], dict[str, Any]]
-"""An argument of a command: its names, and what argparse is told of it."""
-
-
-class Progress(Protocol):
-    """Told how much is done, of how much (pieces, steps or seconds of a budget), and what comes next."""
-
-    def __call__(self, done: float, whole: float, what: str = "") -> None: ...
 
 
 class Result(Protocol):
@@ -94,20 +86,39 @@ class Study:
         found: Result = self._part("measure").stored(path)
         return found
 
-    def draw(self, found: Result, folder: Path, **chosen: Any) -> list[Path]:
-        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
-        from springcheck.figures.style import save, style
+    def draw(
+        self,
+        found: Result,
+        folder: Path,
+        *,
+        look: Callable[[list[str]], None] = lambda names: None,
+        **chosen: Any,
+    ) -> list[Path]:
+        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files.
+
+        `look` is given their names before the work that takes longest.
+        """
+        from springcheck.figures.style import file_names, save, style
 
         with style():
-            pictures = self._part("figure").pictures(found, **chosen)
+            if self._has("figure"):
+                pictures = self._part("figure").pictures(found, **chosen)
+            else:
+                from springcheck.figures import render
+
+                pictures = {bank.name: render.picture(bank) for bank in self.banks(found) if bank.name}
+            look([file for name in pictures for file in file_names(name)])
             return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
 
     def banks(self, found: Result) -> list[Bank]:
         """Its charts in the report page; none where it has no such part."""
-        if find_spec(f"{self._package}.page") is None:
+        if not self._has("page"):
             return []
         banks: list[Bank] = self._part("page").banks(found)
         return banks
+
+    def _has(self, name: str) -> bool:
+        return find_spec(f"{self._package}.{name}") is not None
 
     def _part(self, name: str) -> Any:
         return import_module(f"{self._package}.{name}")
@@ -115,45 +126,3 @@ class Study:
     @property
     def _package(self) -> str:
         return self.package or f"springcheck.studies.{self.name}"
-
-
-def argument(*names: str, **how: Any) -> Argument:
-    """An argument of a command."""
-    return names, how
-
-
-def repeatable(name: str, metavar: str, about: str, **more: Any) -> Argument:
-    """An option that may be given more than once."""
-    return argument(name, action="append", default=[], metavar=metavar, help=f"{about}; repeatable", **more)
-
-
-JSON = argument("--json", action="store_true", help="one JSON document on standard output")
-QUIET = argument("--quiet", action="store_true", help="print nothing but mistakes")
-FORCE = argument("--force", action="store_true", help="write an existing store anew")
-ENGINE = repeatable("--engine", "FILE.py", "an engine of your own, for this call")
-SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file")
-"""Arguments of many commands."""
-
-
-def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
-    """Those of every study that is kept in a store: where, which methods, what runs beside them."""
-    return (
-        argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})"),
-        repeatable("--method", "LABEL", "engine:method[@platform[-precision]] or a glob such as 'own:*'"),
-        ENGINE,
-        repeatable(
-            "--stepper", "MODULE:FUNCTION",
-            "your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION",
-        ),
-        repeatable(
-            "--command", "NAME=COMMAND", "a program in any language, as 'name=./engine {scene} {out}'",
-            dest="program",
-        ),
-        repeatable(
-            "--scheme", "SCHEME|NAME=SCHEME", "the scheme of your functions and programs, or of one of them"
-        ),
-        argument("--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"),
-        FORCE,
-        JSON,
-        QUIET,
-    )  # fmt: skip

@@ -69,7 +69,7 @@ class Form(Generic[T]):
         return {self.named: table.name.removeprefix(self.beginning)} if self.named else {}
 
 
-class Record(Form[T]):
+class RecordForm(Form[T]):
     """One result a table: its arrays are the columns, its numbers and texts the attributes."""
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:

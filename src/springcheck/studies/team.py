@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from springcheck.studies.study import Argument, argument
+from springcheck.studies.arguments import Argument, argument
 
 if TYPE_CHECKING:
     from springcheck.doors import Brought

@@ -27,7 +27,7 @@ def plain(text: str = "", style: str = "") -> Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TextTable:
     """A table without lines, as narrow as its cells; `prose` alone is broken to fit the width.
 
     Columns that do not fit beside each other stand below each other, each block beside the first column:
@@ -108,9 +108,9 @@ def _line(text: Text) -> Text:
 
 def table(
     titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = ""
-) -> Table:
+) -> TextTable:
     """A table; the columns `left` start at their left edge, numbers end at their right one."""
-    return Table(tuple(titles), tuple(rows), frozenset(left), prose)
+    return TextTable(tuple(titles), tuple(rows), frozenset(left), prose)
 
 
 def hanging(head: str, text: str) -> Lines:

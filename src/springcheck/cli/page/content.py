@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from springcheck import checks, schemes, store
 from springcheck.checks import compare
@@ -15,19 +17,21 @@ from springcheck.checks.compare import EXACT, Same
 from springcheck.cli import explain
 from springcheck.cli.page.sections import Section, sections
 from springcheck.errors import SpringcheckError
+from springcheck.figures.charts import numbers
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
-from springcheck.store import Finding, Summary
-from springcheck.studies.charts import numbers
+from springcheck.store import Damage, Summary
 
 NUMBERS = 15_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
-FEWEST = 50
+FEWEST_SHOWN = 50
 """Frames that are kept of each trajectory however many there are."""
 LONGEST = 2_000_000
 """Steps up to which a browser runs the loops again: about a second."""
+STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
+"""Of a splitting that a page carries out."""
 TAIL = 1 << 20
 """Frames at the end of a run by which it is told whether two of them are one motion, as `run` does."""
 
@@ -39,6 +43,19 @@ class Passed:
     method: str
     scheme: str
     verdicts: tuple[Verdict, ...]
+
+    @property
+    def found(self) -> str:
+        """What its states show, the first check that failed, and why."""
+        first = next((v for v in self.verdicts if v.passed is False), None)
+        if first is None:
+            return ""
+        why, _, shown = first.why.partition(". What the states show: ")
+        return (
+            f"{self.method}: {shown}. {first.check}: {why}"
+            if shown
+            else f"{self.method} {first.check}: {why}"
+        )
 
     def count(self, passed: bool | None) -> int:
         """How many passed, failed, or did not apply."""
@@ -63,7 +80,7 @@ class Content:
     sections: tuple[Section, ...]
     """Of the studies."""
     summary: Summary
-    not_trusted: tuple[Finding, ...]
+    not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
     explained: Mapping[str, tuple[str, tuple[str, ...]]]
     """Of the checks among the verdicts: what each looks at, in a sentence and in lines."""
@@ -76,6 +93,16 @@ class Content:
     """Every how many stored frames one stands in the page."""
     data: Mapping[str, Any]
     """For the scripts; numbers that are none are the words that JavaScript has for them."""
+
+    @property
+    def summary_line(self) -> str:
+        """How many verdicts passed, or which failed."""
+        return checks.summary([verdict for one in self.methods for verdict in one.verdicts])
+
+    @property
+    def failed(self) -> tuple[Passed, ...]:
+        """The methods that some verdict rejects."""
+        return tuple(one for one in self.methods if one.count(False))
 
     @property
     def name(self) -> str:
@@ -93,11 +120,12 @@ def gather(path: Path) -> Content:
     name = str(summary.root.get("scene_name") or path.stem)
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
     labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
-    most = max(FEWEST, NUMBERS // (4 * max(1, len(labels))))
+    most = max(FEWEST_SHOWN, NUMBERS // (4 * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
     kept = bool(summary.runs) and path.is_file()
     verdicts = store.verdicts(path) if kept else ()
     comparison = store.comparison(path) if kept else None
+    wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
     title = (scene.title or scene.name) if scene else path.name
     return Content(
         title=title,
@@ -107,7 +135,8 @@ def gather(path: Path) -> Content:
         sections=tuple(studies),
         summary=summary,
         not_trusted=tuple(store.doubts(path)),
-        methods=tuple(_methods(summary, verdicts)),
+        # what failed comes first
+        methods=tuple(sorted(_methods(summary, verdicts), key=lambda one: not one.count(False))),
         explained={
             check.name: (explain.sentence(check), tuple(explain.check_lines(check)))
             for check in checks.ALL
@@ -118,8 +147,10 @@ def gather(path: Path) -> Content:
         sha256=_digest(path) if path.is_file() else "",
         stride=max((stride for _, stride in pieces.values()), default=1),
         data={
-            "runs": [drawn(piece) for piece, _ in pieces.values()],
+            "runs": [drawn(piece, failed=piece.label in wrong) for piece, _ in pieces.values()],
             "spring": spring(scene) if scene and labels else None,
+            "linear": linear(scene) if scene and labels else None,
+            "laws": laws(piece.scheme for piece, _ in pieces.values()),
             "steps": scene.steps if scene else 0,
             "particles": scene.n if scene else 0,
             "equal": scene is not None and scene.units == "reduced",
@@ -152,10 +183,42 @@ def spring(scene: Scene) -> dict[str, Any] | None:
     return {**found, "h": scene.step, "converted": ["ase"] if scene.units == "md" else []}
 
 
-def drawn(piece: Trajectory) -> dict[str, Any]:
+def linear(scene: Scene) -> dict[str, Any] | None:
+    """The numbers of one particle in any linear force f - k q - c p/m; None for any other scene, or one too
+    long."""
+    system = scene.system
+    if scene.n != 1 or not system.is_linear or scene.steps > LONGEST:
+        return None
+    zero = np.zeros(1)
+    found = {
+        "k": system.hessian_diagonal(zero), "f": system.force(zero, zero),
+        "c": system.friction_rates * scene.m, "m": scene.m, "q": scene.q, "p": scene.p,
+    }  # fmt: skip
+    values = {name: float(x[0]) for name, x in found.items()}
+    return {**values, "tolerance": scene.tolerance} if np.isfinite(list(values.values())).all() else None
+
+
+def laws(names: Iterable[str]) -> dict[str, Any]:
+    """Schemes by name, as their stages or their tableau in doubles; "exact" where they follow that motion."""
+    known, found = schemes.known(), dict[str, Any]()
+    for scheme in (known[name] for name in names if name in known):
+        if scheme.has("flow") or scheme.has("adaptive"):
+            found[scheme.name] = "exact"
+        elif scheme.stages and {kind for kind, _ in scheme.stages} <= STAGES:
+            found[scheme.name] = [(kind, float(schemes.number(c, np.float64))) for kind, c in scheme.stages]
+        elif scheme.b:
+            a = [[float(x) for x in row] for row in scheme.a]
+            found[scheme.name] = {"a": a, "b": [float(x) for x in scheme.b]}
+    return found
+
+
+def drawn(piece: Trajectory, *, failed: bool = False) -> dict[str, Any]:
     """The first particle of a trajectory, and the energy of all."""
+    how = piece.arithmetic
     return {
         "label": piece.label,
+        "failed": failed,
+        "roundoff": max(how.state, how.force, how.quantum),
         "scheme": piece.scheme,
         "title": schemes.title(piece.scheme),
         "every": piece.every,

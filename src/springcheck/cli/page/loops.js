@@ -87,3 +87,62 @@ function exactMotion(s, times) {
     return [s.at + x, s.m * decay * (v0 * even - (g * v0 + (s.k / s.m) * x0) * odd)];
   });
 }
+
+// One step of any scheme that the data describes, for one particle in the force f - k q - c p/m.
+function stepper(law, s) {
+  const { h, k, f, c, m } = s, force = (q, p) => f - k * q - (c * p) / m;
+  if (Array.isArray(law)) {
+    return (q, p) => {
+      let last = 0;
+      for (const [kind, part] of law) {
+        const x = part * h;
+        if (kind === "drift") q += (x * p) / m;
+        else if (kind === "friction") p *= Math.exp((-x * c) / m);
+        else if (kind === "implicit-friction") p /= 1 + (x * c) / m;
+        else p += x * (last = kind === "held" ? last : kind === "pull" ? force(q, 0) : force(q, p));
+      }
+      return [q, p];
+    };
+  }
+  const sum = (start, row, values) => values.reduce((total, v, i) => (row[i] ? total + row[i] * h * v : total), start);
+  return (q, p) => {
+    const forces = [], speeds = [];
+    law.a.forEach((row, i) => {
+      let [Q, P] = [sum(q, row, speeds), sum(p, row, forces)];
+      const x = (row[i] || 0) * h;
+      // an implicit stage: Q = q + x P/m, P = p + x F(Q, P)
+      if (x) P = (P + x * (f - k * Q)) / (1 + (x * c) / m + (x * x * k) / m);
+      Q += (x * P) / m;
+      forces.push(force(Q, P));
+      speeds.push(P / m);
+    });
+    return [sum(q, law.b, speeds), sum(p, law.b, forces)];
+  };
+}
+
+// How far a stored run is from its scheme computed here, as a fraction of what rounding may do, and where most:
+// an own rounding of either side in each of its steps, as far as the orbit is from a circle, or all its steps.
+// Of an adaptive solver: from the exact motion, as a fraction of a thousand tolerances for each radian.
+function departure(run, s, law) {
+  const w = Math.sqrt(Math.abs(s.k) / s.m) || 1, own = { ...s, h: run.step };
+  const step = law === "exact" ? null : stepper(law, own), plain = step && stepper(law, { ...own, f: 0 });
+  let stretch = 1;
+  if (step) {
+    const [a, c] = plain(1, 0), [b, d] = plain(0, 1), half = Math.abs(c / (w * s.m) - b * w * s.m) / 2;
+    const area = -((a - d) ** 2 / 4 + b * c);
+    stretch = area > 0 ? (half + Math.sqrt(Math.max(half * half - area, 0))) / Math.sqrt(area) : run.t.length * run.every;
+  }
+  const at = s.k ? s.f / s.k : 0, exact = step ? null : exactMotion({ ...s, at }, run.t);
+  let [q, p] = [s.q, s.p], size = 0, worst = { share: 0, frame: 0 };
+  for (let i = 0; i < run.t.length; i++) {
+    if (step && i) for (let j = 0; j < run.every; j++) [q, p] = step(q, p);
+    if (exact) [q, p] = exact[i];
+    size = Math.max(size, Math.hypot(w * q, p / s.m), Math.hypot(w * (q - at), p / s.m));
+    const rounding = 256 * Math.max(run.roundoff, 2 ** -53) * (1 + i * run.every) * stretch;
+    const allowed = size * (exact ? Math.max(1e3 * s.tolerance * (1 + w * Math.abs(run.t[i])), rounding) : rounding);
+    const share = Math.hypot(w * (q - run.q[i]), (p - run.p[i]) / s.m) / allowed;
+    // what is no number is not equal
+    if (!(share <= worst.share)) worst = { share: Number.isNaN(share) ? Infinity : share, frame: i };
+  }
+  return worst;
+}

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from springcheck.cli import inspect
+from springcheck.figures import charts
 from springcheck.store import Summary
-from springcheck.studies import charts
-from springcheck.text.lines import Lines, Table
+from springcheck.text.lines import Lines, TextTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +37,7 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
             Section(
                 name=study.name,
                 title=study.about[:1].upper() + study.about[1:],
-                blocks=[line for line in lines if isinstance(line, Table) or str(line).strip()],
+                blocks=[line for line in lines if isinstance(line, TextTable) or str(line).strip()],
                 banks=tuple(mine),
             )
         )

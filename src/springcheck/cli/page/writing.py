@@ -88,10 +88,11 @@ def _looks(data: Mapping[str, Any]) -> dict[str, tuple[str, str, int]]:
     )
     names = (*LOOPS, *(run["scheme"] for run in data["runs"]), *(curve["group"] for curve in curves))
     found = {name: looks.look(name) for name in names}
-    return {
+    shown = {
         name: (*looks.ON_SCREEN[look.color], looks.LINES.index(look.linestyle))
         for name, look in found.items()
     }
+    return {**shown, "failed": looks.FAILED_ON_SCREEN}
 
 
 def _json(data: Any) -> Markup:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, by_default, deferred, named
+from springcheck.engines.contract import EVERY_POTENTIAL, Engine, by_default, deferred, named, thermostat
+
+_DRAWS = "NumPy, PCG64"
 
 ENGINE = Engine(
     name="ase",
@@ -11,6 +13,21 @@ ENGINE = Engine(
     methods=named(
         by_default("velocity-verlet", "velocity-verlet", "ase.md.verlet.VelocityVerlet", EVERY_POTENTIAL)
     ),
+    thermostats=named(
+        thermostat(
+            "langevin", "vanden-eijnden-ciccotti", "ase.md.langevin.Langevin", _DRAWS, EVERY_POTENTIAL,
+            scripted=True, rebuilds_velocity=True,
+        ),
+        thermostat(
+            "langevin-baoab", "baoab", "ase.md.langevinbaoab.LangevinBAOAB", _DRAWS, EVERY_POTENTIAL,
+            rebuilds_velocity=True,
+        ),
+        thermostat(
+            "andersen", "andersen-after-kick", "ase.md.andersen.Andersen", _DRAWS, EVERY_POTENTIAL,
+            rebuilds_velocity=True,
+        ),
+    ),
     step_seconds=3e-4,
+    any_axis=True,
     **deferred(f"{__name__}.simulation", "arithmetic"),
-)
+)  # fmt: skip

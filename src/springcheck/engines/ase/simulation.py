@@ -17,6 +17,7 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
+from springcheck.engines.bonds import off_axis
 from springcheck.engines.contract import Label, Method
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
@@ -37,7 +38,7 @@ def arithmetic(label: Label) -> Arithmetic:
 
 
 class Springs(Calculator):  # type: ignore[misc]
-    """The terms of a scene along x, as an ASE calculator.  `length` and `time` are the scene's units."""
+    """The terms of a scene, as an ASE calculator.  `length` and `time` are its units."""
 
     implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
 
@@ -45,6 +46,7 @@ class Springs(Calculator):  # type: ignore[misc]
         super().__init__()
         self.force_calls = 0
         self._system = system
+        self._where = system.scene.where
         self._length = length
         self._of_force = length / time**2
 
@@ -52,12 +54,12 @@ class Springs(Calculator):  # type: ignore[misc]
         self, atoms: Any = None, properties: Any = ("energy",), system_changes: Any = all_changes
     ) -> None:
         super().calculate(atoms, properties, system_changes)
-        x = self.atoms.positions[:, 0]
+        x = self.atoms.positions.reshape(-1)[self._where]
         q = x if self._length == 1.0 else x / self._length
         if "forces" in properties:
             self.force_calls += 1
-            forces = np.zeros((len(q), 3))
-            forces[:, 0] = self._system.force(q, q)
+            forces = np.zeros((len(self.atoms), 3))
+            forces.reshape(-1)[self._where] = self._system.force(q, q)
             if self._of_force != 1.0:
                 forces *= self._of_force
             self.results["forces"] = forces
@@ -66,19 +68,54 @@ class Springs(Calculator):  # type: ignore[misc]
             self.results["energy"] = energy * self._of_force * self._length
 
 
+def _thermostat(
+    name: str, atoms: Atoms, scene: Scene, step: float, time: float, energy: float, seed: Any
+) -> Any:
+    """ASE's dynamics with noise at this thermal energy [eV], of a seed or a generator.
+
+    ASE takes kelvin, and multiplies by its own constant.
+    """
+    assert scene.bath is not None
+    rng = seed if hasattr(seed, "standard_normal") else np.random.default_rng(seed)
+    rate = scene.bath.friction
+    given: dict[str, Any] = {"timestep": step * time, "temperature_K": energy / ase.units.kB, "rng": rng}
+    if name == "langevin":
+        from ase.md.langevin import Langevin
+
+        return Langevin(atoms, friction=rate / time, fixcm=False, **given)
+    if name == "andersen":
+        from ase.md.andersen import Andersen
+
+        return Andersen(atoms, andersen_prob=-np.expm1(-rate * step), fixcm=False, **given)
+    from ase.md.langevinbaoab import LangevinBAOAB
+
+    return LangevinBAOAB(atoms, T_tau=time / rate, **given)
+
+
 class _Dynamics:
     """ASE's dynamics in motion."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float, seed: Any = None) -> None:
         length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
-        positions, momenta = np.zeros((2, scene.n, 3))
-        positions[:, 0] = scene.q * length
-        momenta[:, 0] = scene.p * (length / time)
-        numbers = np.zeros(scene.n, dtype=int)
-        self._atoms = Atoms(numbers=numbers, positions=positions, masses=scene.m, momenta=momenta)
+        positions, momenta, masses = np.zeros((3, scene.particles, 3))
+        positions.reshape(-1)[scene.where] = scene.q * length
+        momenta.reshape(-1)[scene.where] = scene.p * (length / time)
+        masses.reshape(-1)[scene.where] = scene.m
+        self._atoms = Atoms(
+            numbers=np.zeros(scene.particles, dtype=int),
+            positions=positions,
+            masses=np.max(masses, axis=1),
+            momenta=momenta,
+        )
         self._atoms.calc = Springs(scene.system, length, time)
-        self._dynamics = VelocityVerlet(self._atoms, timestep=step * time)
+        if method.generator:
+            energy = scene.thermal * (length / time) ** 2
+            self._dynamics = _thermostat(method.name, self._atoms, scene, step, time, energy, seed)
+        else:
+            self._dynamics = VelocityVerlet(self._atoms, timestep=step * time)
+        self._on_a_line = not method.generator
         self._length, self._momentum = length, length / time
+        self._where, self._elsewhere = scene.where, scene.elsewhere
         self.off_axis = 0.0
 
     @property
@@ -93,12 +130,13 @@ class _Dynamics:
             warnings.simplefilter("ignore", RuntimeWarning)
             for row in range(len(q)):
                 run(every)
-                q[row] = atoms.arrays["positions"][:, 0]
-                p[row] = atoms.arrays["momenta"][:, 0]
+                q[row] = atoms.arrays["positions"].reshape(-1)[self._where]
+                p[row] = atoms.arrays["momenta"].reshape(-1)[self._where]
             if self._length != 1.0:
                 q /= self._length
                 p /= self._momentum
-        self.off_axis = max(self.off_axis, float(np.max(np.abs(atoms.positions[:, 1:]), initial=0.0)))
+        if self._on_a_line:
+            self.off_axis = max(self.off_axis, off_axis(atoms.positions, self._elsewhere))
 
 
 start = _Dynamics

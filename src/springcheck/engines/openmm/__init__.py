@@ -11,9 +11,15 @@ from springcheck.engines.contract import (
     by_name,
     deferred,
     named,
+    thermostat,
 )
 
 _TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL}
+
+_ON_A_LINE = _TERMS - {"morse"}
+"""The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
+
+_DRAWS = "OpenMM, SFMT"
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")
@@ -33,9 +39,10 @@ ENGINE = Engine(
         by_default(
             "leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", _TERMS,
             rebuilds_velocity=True,
-        ),
+            note="velocities half a step early, as documented; openmm#4929"),
         # its growing motion would turn a Morse bond over, of which OpenMM knows only the length
-        by_default("euler", "explicit-euler", "explicit Euler by CustomIntegrator", _TERMS - {"morse"}),
+        by_default("euler", "explicit-euler", "explicit Euler by CustomIntegrator", _TERMS - {"morse"},
+            note="a CustomIntegrator of ours, as a user may write it"),
         by_default(
             "semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator", _TERMS
         ),
@@ -54,8 +61,33 @@ ENGINE = Engine(
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _TERMS,
         ),
     ),
+    thermostats=named(
+        thermostat(
+            "langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities", _DRAWS,
+            _ON_A_LINE, rebuilds_velocity=True,
+        ),
+        thermostat(
+            "langevin-middle-synchronised", "baoab",
+            "LangevinMiddleIntegrator, half a kick added to what is read", _DRAWS, _ON_A_LINE,
+            rebuilds_velocity=True,
+        ),
+        thermostat(
+            "langevin-bath", "baoa", "LangevinIntegrator, as it stores velocities", _DRAWS, _ON_A_LINE,
+            default=False, rebuilds_velocity=True,
+        ),
+        thermostat(
+            "brownian", "brownian", "BrownianIntegrator", _DRAWS, _ON_A_LINE, default=False,
+            rebuilds_velocity=True,
+        ),
+        thermostat(
+            "andersen", "andersen-leapfrog",
+            "VerletIntegrator with AndersenThermostat, as it stores velocities", _DRAWS, _ON_A_LINE,
+            rebuilds_velocity=True,
+        ),
+    ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     step_seconds=8e-7,
+    any_axis=True,
     squares_lengths=True,
     **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

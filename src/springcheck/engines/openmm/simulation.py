@@ -21,6 +21,7 @@ Friction does, and goes forwards only.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -62,6 +63,7 @@ displacement of the step times 1/h, so it does not lose the digits of x' - x as 
 
 
 CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
     "quartic": ("0.25*b*(x-at)^4", ("b", "at")),
     "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave", "at")),
     "morse": ("depth*(1-exp(-steepness*(r-rest)))^2", ("depth", "steepness", "rest")),
@@ -69,7 +71,7 @@ CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or
 multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
-SHIFTED = frozenset({"verlet", "langevin-middle", "langevin"})
+SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
 
 
@@ -109,27 +111,35 @@ def convention(method: Method) -> str:
 
 
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
-    """Particles along x, then one fixed anchor for each rest point; positions (N, 3)."""
+    """Particles, then one fixed anchor for each rest point of a term; positions (N, 3)."""
     system = mm.System()
-    for m in scene.m.tolist():
+    start, masses = np.zeros((2, scene.particles, 3))
+    start.reshape(-1)[scene.where] = scene.q - origins
+    masses.reshape(-1)[scene.where] = scene.m
+    for m in np.max(masses, axis=1).tolist():
         system.addParticle(m)
-    x = (scene.q - origins).tolist()
+    fixed: list[Any] = []
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
     for term in scene.terms:
         group = fast if term.fast else slow
         if isinstance(term, WallSpring):
-            anchors: dict[float, int] = {}
-            for i, k, at in zip(
-                term.i.tolist(), term.k.tolist(), (term.at - origins[term.i]).tolist(), strict=True
-            ):
+            anchors: dict[Any, int] = {}
+            try:
+                joints = bonds.joints(scene, term, origins)
+            except MethodError:
+                # unlike along its axes: no bond, but a potential of each coordinate
+                for force in _custom(scene, term, origins):
+                    force.setForceGroup(int(term.fast))
+                    system.addForce(force)
+                continue
+            for (i,), k, at in joints:
                 if at not in anchors:
                     anchors[at] = system.addParticle(0.0)
-                    x.append(at)
+                    fixed.append(at)
                 group.addBond(anchors[at], i, 0.0, k)
         elif isinstance(term, Spring):
-            rest = bonds.lengths(term, origins).tolist()
-            for a, b, k, length in zip(term.a.tolist(), term.b.tolist(), term.k.tolist(), rest, strict=True):
+            for (a, b), k, length in bonds.joints(scene, term, origins):
                 group.addBond(a, b, length, k)
     for group in (slow, fast):
         if group.getNumBonds():
@@ -137,29 +147,38 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for term in scene.terms:
         if isinstance(term, Morse):
             _stays_right_way_round(scene, term)
-        if term.key in CUSTOM_TERMS:
-            system.addForce(_custom(term, origins))
-    positions = np.zeros((len(x), 3))
-    positions[:, 0] = x
-    return system, positions
+        if term.key in CUSTOM_TERMS and not isinstance(term, WallSpring):
+            for force in _custom(scene, term, origins):
+                system.addForce(force)
+    return system, np.concatenate([start, np.reshape(fixed, (-1, 3))])
 
 
-def _custom(term: Any, origins: Floats) -> mm.Force:
-    """A term as its energy in the coordinate x of a particle, or in the length r of a bond."""
+def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
+    """A term as its energy in a coordinate x, y or z of a particle, or in the length r of a bond."""
     energy, names = CUSTOM_TERMS[term.key]
-    if term.bodies == 1:
-        force, origin = mm.CustomExternalForce(energy), term.at - origins[term.i]
-        name_parameter, add = force.addPerParticleParameter, force.addParticle
-    else:
-        force, origin = mm.CustomBondForce(energy), term.rest - (origins[term.b] - origins[term.a])
-        name_parameter, add = force.addPerBondParameter, force.addBond
-    for name in names:
-        name_parameter(name)
-    columns = [getattr(term, name) for name in names[:-1]] + [origin]
-    ends = (index.tolist() for index in term.particles)
-    for *particles, values in zip(*ends, np.transpose(columns).tolist(), strict=True):
-        add(*particles, values)
-    return force
+    if term.bodies == 2 and scene.places is not None:
+        raise MethodError(
+            f"scene {scene.name!r}: OpenMM knows only the length of a bond, no part along an axis"
+        )
+    first, last = term.particles[0], term.particles[-1]
+    origin = getattr(term, term.origin) - (origins[last] - (origins[first] if term.bodies == 2 else 0))
+    columns = np.transpose([*(getattr(term, name) for name in names[:-1]), origin])
+    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    ends = np.transpose([places[index] // 3 for index in term.particles])
+    along = places[term.particles[0]] % 3
+    for axis in np.unique(along).tolist():
+        if term.bodies == 1:
+            force = mm.CustomExternalForce(energy.replace("(x-", f"({'xyz'[axis]}-"))
+            name_parameter, add = force.addPerParticleParameter, force.addParticle
+        else:
+            force = mm.CustomBondForce(energy)
+            name_parameter, add = force.addPerBondParameter, force.addBond
+        for name in names:
+            name_parameter(name)
+        rows = along == axis
+        for particles, values in zip(ends[rows].tolist(), columns[rows].tolist(), strict=True):
+            add(*particles, values)
+        yield force
 
 
 def _stays_right_way_round(scene: Scene, term: Morse) -> None:
@@ -171,6 +190,30 @@ def _stays_right_way_round(scene: Scene, term: Morse) -> None:
             f"scene {scene.name!r}: a Morse bond may turn over, and OpenMM knows only the length of a bond; "
             "its second end must start to the right of the first, too slow to close the rest length"
         )
+
+
+BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
+"""kT of a kelvin [kJ/mol] as OpenMM has it."""
+
+
+def _thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.System) -> mm.Integrator:
+    """An integrator with noise of this seed, at the thermal energy of the scene.
+
+    MethodError where springs bend under noise across the line.
+    """
+    assert scene.bath is not None
+    temperature, rate = scene.thermal / BOLTZMANN, scene.bath.friction
+    if name == "andersen":
+        made: Any = mm.VerletIntegrator(step)
+        noise: Any = mm.AndersenThermostat(temperature, rate)
+        system.addForce(noise)
+    elif name == "brownian":
+        noise = made = mm.BrownianIntegrator(temperature, rate, step)
+    else:
+        kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
+        noise = made = kind(temperature, rate, step)
+    noise.setRandomNumberSeed(seed)
+    return made
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
@@ -202,6 +245,9 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
     if name not in here:
         raise MethodError(f"{label}: OpenMM has no platform {name} on this machine; it has {', '.join(here)}")
     properties = {"Precision": label.precision} if label.precision else {}
+    if name == "CPU":
+        # each of its threads has a seed of its own
+        properties["Threads"] = "1"
     try:
         # OpenMM's C++ warns on standard output, where results go, that an OpenCL is a processor's; the
         # compiler behind it says on standard error that Ctrl-C has met it
@@ -225,34 +271,42 @@ def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) 
 class _Context:
     """A context in motion.  Reads go to one buffer: the public accessors wrap units, 20 us a frame."""
 
-    def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
+    def __init__(self, scene: Scene, method: Method, label: Label, step: float, seed: int = 0) -> None:
         if step < 0 and scene.system.is_damped:
             raise MethodError(f"{label}: no negative step is taken, so friction runs forwards in time only")
         if arithmetic(label).parameters == "single":
             # the half kicks below must be those of the springs that OpenMM feels
             scene = scene.system.in_single
         self.force_calls, self.off_axis = 0, 0.0
-        origins = bonds.origins(scene, method.scheme)
+        origins = bonds.rests(scene, label) if method.generator else bonds.origins(scene, method.scheme)
         system, positions = _system(scene, origins)
-        self._integrator = _integrator(scene, method.name, step)
+        if method.generator:
+            self._integrator = _thermostat(scene, method.name, step, seed, system)
+        else:
+            self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction
         self._force = scene.system.potential_force
+        self._on_a_line = not method.generator
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
         self._m = np.copysign(scene.m, step)
+        self._where, self._elsewhere = scene.where, scene.elsewhere
         self._x, self._v = np.zeros_like(positions), np.zeros_like(positions)
         velocities = np.zeros_like(positions)
         with np.errstate(all="ignore"):
-            velocities[: scene.n, 0] = (scene.p - self._half_kick * self._force(scene.q, scene.p)) / self._m
-        _warm_up(self._context, self._integrator, positions)
+            started = (scene.p - self._half_kick * self._force(scene.q, scene.p)) / self._m
+        velocities.reshape(-1)[scene.where] = started
+        if not method.generator:
+            # whose numbers begin with its first step
+            _warm_up(self._context, self._integrator, positions)
         self._context.setPositions(positions)
         self._context.setVelocities(velocities)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         take, get = self._integrator.step, self._context.getState
-        x, v = self._x, self._v
-        x_line, v_line = x[: q.shape[1], 0], v[: q.shape[1], 0]
+        x, v, where = self._x, self._v, self._where
+        x_row, v_row = x.reshape(-1), v.reshape(-1)
         positions, velocities = mm.State.Positions, mm.State.Velocities
         row = 0
         try:
@@ -264,15 +318,16 @@ class _Context:
                 state = get(positions=True, velocities=True)
                 state._getVectorAsNumpy(positions, x)
                 state._getVectorAsNumpy(velocities, v)
-                q[row] = x_line
-                p[row] = v_line
+                q[row] = x_row[where]
+                p[row] = v_row[where]
             row += 1
         except mm.OpenMMException as error:
             raise Stopped(row, str(error)) from error
         finally:
             self._synchronise(q[:row], p[:row])
             self.force_calls += every * row
-            self.off_axis = max(self.off_axis, float(np.max(np.abs(x[:, 1:]), initial=0.0)))
+            if self._on_a_line:
+                self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
 
     def _synchronise(self, q: Floats, p: Floats) -> None:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -6,8 +6,19 @@ are there for whoever names them, in a scene's `include` or by `--method`.
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Method, Need, deferred, named
+from springcheck.engines.contract import (
+    EVERY_FORCE,
+    EVERY_POTENTIAL,
+    SPRINGS,
+    Engine,
+    Method,
+    Need,
+    deferred,
+    named,
+    thermostat,
+)
 from springcheck.schemes import SCHEMES, Scheme
+from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
 """Methods named otherwise than their scheme."""
@@ -19,11 +30,14 @@ ABOUT = {
 }
 """The methods that a scene runs unasked, and what to say of them."""
 
+BY_DEFAULT = {"baoab", "baoa", "aboba", "obabo", "oabao", "gj-i", "bbk"}
+"""The thermostats that a scene with a bath runs unasked."""
+
 
 def _requires(scheme: Scheme) -> frozenset[Need]:
-    if scheme.mixes:
+    if scheme.has("mixes"):
         return frozenset({Need.FAST_SPRINGS})
-    return frozenset({Need.DAMPING} if any(kind == "friction" for kind, _ in scheme.stages) else ())
+    return frozenset({Need.DAMPING} if any(kind.friction for kind in scheme.kinds) else ())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -31,7 +45,7 @@ def _method(scheme: Scheme) -> Method:
         name=NAMES.get(scheme.name, scheme.name),
         scheme=scheme.name,
         about=ABOUT.get(scheme.name, scheme.title),
-        terms=SPRINGS | {"damping"} if scheme.implicit else EVERY_FORCE,
+        terms=SPRINGS | {"damping"} if scheme.has("implicit") else EVERY_FORCE,
         kinds=frozenset({"particles", "circuit", "rotor"}),
         requires=_requires(scheme),
         default=scheme.name in ABOUT,
@@ -39,7 +53,7 @@ def _method(scheme: Scheme) -> Method:
 
 
 _SCHEMES = sorted(
-    (scheme for scheme in SCHEMES.values() if scheme.one_step),
+    (scheme for scheme in SCHEMES.values() if scheme.has("one-step")),
     key=lambda scheme: (*ABOUT, scheme.name).index(scheme.name) if scheme.name in ABOUT else len(ABOUT),
 )
 
@@ -49,6 +63,22 @@ ENGINE = Engine(
     methods=named(*map(_method, _SCHEMES)),
     # compiled
     step_seconds=4e-9,
+    any_axis=True,
     convention=lambda method: "positions and momenta belong to the same time",
+    thermostats=named(
+        *(
+            thermostat(
+                one.name,
+                one.name,
+                one.title,
+                "NumPy, PCG64",
+                EVERY_POTENTIAL,
+                scripted=True,
+                kinds=frozenset({"particles", "circuit", "rotor"}),
+                default=one.name in BY_DEFAULT,
+            )
+            for one in THERMOSTATS.values()
+        )
+    ),
     **deferred(f"{__name__}.simulation"),
 )

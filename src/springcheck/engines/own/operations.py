@@ -32,7 +32,10 @@ from springcheck.physics.term import Term
 from springcheck.schemes import Scheme, number
 
 ALL, POTENTIAL, SLOW, FAST = "all", "potential", "slow", "fast"
-_FORCE = {"kick": ALL, "pull": POTENTIAL, "slow": SLOW, "fast": FAST}
+
+
+class NoKernelError(Exception):
+    """A scheme of fixed step that the kernels do not have: its stages, or the equations of its stages."""
 
 
 class Operation(NamedTuple):
@@ -101,44 +104,43 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     """The operations of a step of length h.
 
     Raises:
-        MethodError: a scheme that the kernels do not have: adaptive, or with several implicit stages.
+        MethodError: an adaptive scheme, or a random one.
+        NoKernelError: another one that the kernels do not have.
     """
+    if scheme.has("random") or not scheme.has("one-step"):
+        raise MethodError(f"own: the scheme {scheme.name} has no fixed step that can be repeated")
     if scheme.stages:
         found = _splitting(scheme, h)
-    elif scheme.implicit:
+    elif scheme.has("implicit"):
         found = _implicit(scheme, h)
     elif len(scheme.b) == 1:
         found = (Operation(code=EULER, x=h, y=h, force=ALL),)
-    elif scheme.b:
+    else:
         a = np.zeros((len(scheme.b), len(scheme.b)))
         for i, row in enumerate(scheme.a):
             a[i, : len(row)] = [float(number(c, np.float64) * h) for c in row]
         return Program(a=a, b=np.array([float(number(c, np.float64) * h) for c in scheme.b]))
-    else:
-        raise MethodError(f"own: the scheme {scheme.name} has neither stages nor a tableau to carry out")
     damped = scene.system.is_damped
     if not damped:
         whole = {ALL: POTENTIAL}
         found = tuple(o._replace(force=whole.get(o.force, o.force)) for o in found if o.code != FRICTION)
     forces = tuple(dict.fromkeys(o.force for o in found if o.force))
     if len(forces) > 2:
-        raise MethodError(
-            f"own: the scheme {scheme.name} needs {len(forces)} forces apart, and two are served"
-        )
+        raise NoKernelError(f"{len(forces)} forces apart, where two are served")
     depends = tuple(damped and name in (ALL, SLOW) for name in (*forces, "", "")[:2])
     return Program(operations=found, forces=forces or (ALL,), damped=depends)
 
 
 def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
     found: list[Operation] = []
-    for kind, c in scheme.stages:
+    for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
         x = float(number(c, np.float64) * h)
-        if kind == "friction":
+        if kind.decay:
             found.append(Operation(code=FRICTION, x=x))
-        elif kind in _FORCE:
-            found.append(Operation(code=KICK, x=x, force=_FORCE[kind]))
-        elif kind != "drift":
-            raise MethodError(f"own: the scheme {scheme.name} has a stage that is not served: {kind}")
+        elif kind.evaluates:
+            found.append(Operation(code=KICK, x=x, force=kind.evaluates))
+        elif not kind.drifts:
+            raise NoKernelError(f"a stage that is not served: {kind.name}")
         elif found and found[-1].code == KICK:
             found[-1] = found[-1]._replace(code=KICK_DRIFT, y=x)
         else:
@@ -157,11 +159,11 @@ def _implicit(scheme: Scheme, h: float) -> tuple[Operation, ...]:
         return (*before, Operation(code=IMPLICIT, x=x, y=x, force=POTENTIAL))
     if s == 1 and b[0] == 1 and a[0][0] * 2 == 1:
         return (Operation(code=MIDPOINT, x=x, y=h, force=POTENTIAL),)
-    raise MethodError(f"own: the implicit scheme {scheme.name} has no solver here")
+    raise NoKernelError("implicit stages that are not solved by factors")
 
 
 def terms_of(force: str, scene: Scene) -> tuple[Term, ...]:
     """The terms behind the name of a force."""
     if force == POTENTIAL:
-        return tuple(term for term in scene.terms if term.is_potential)
+        return tuple(term for term in scene.terms if term.kind == "potential")
     return {ALL: scene.terms, SLOW: scene.system.slow, FAST: scene.system.fast}[force]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Label, Method
 from springcheck.engines.own import kernels, layout, solver, tiles, vectors
-from springcheck.engines.own.operations import Program, program, terms_of
+from springcheck.engines.own.operations import NoKernelError, Program, program, terms_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
@@ -63,8 +63,12 @@ def version() -> dict[str, str]:
     return found | ({"numba": sys.modules["numba"].__version__} if "numba" in sys.modules else {})
 
 
-def start(scene: Scene, method: Method, label: Label, step: float) -> Own:
+def start(scene: Scene, method: Method, label: Label, step: float, seed: Any = None) -> Own | Any:
     """Start a run of `scene.steps` steps of length `step`; compiles here where that pays."""
+    if method.generator:
+        from springcheck.engines.own.thermal import Random
+
+        return Random(scene, method.scheme, step, seed)
     return prepare(scene, method.scheme, step)
 
 
@@ -83,7 +87,11 @@ def prepare(
     """
     found = schemes.scheme(scheme) if isinstance(scheme, str) else scheme
     with np.errstate(all="ignore"):
-        plan = program(found, scene, float(step))
+        try:
+            plan = program(found, scene, float(step))
+        except NoKernelError:
+            each = len(found.evaluations)
+            return Own(vectors.Vectors(found, scene, step), (each, each), compiled=False)
         if any(term.key not in layout.KINDS for term in scene.terms):
             return Own(vectors.Vectors(found, scene, step), plan.evaluations, compiled=False)
         job = _one(plan, scene) or _many(plan, scene)

@@ -1,4 +1,4 @@
-"""Explicit schemes by NumPy, for scenes with a term that the compiled loops do not have."""
+"""Any scheme of fixed step by NumPy, where the compiled loops have not all of its stages or of its terms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.physics.scene import Scene
-from springcheck.schemes import Scheme
+from springcheck.schemes import Law, Scheme
 
 
 class Vectors:
@@ -17,7 +17,7 @@ class Vectors:
         system = scene.system
         self._scheme, self._h, self._m = scheme, step, scene.m
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
-        self._rate = system.friction_rates if system.is_damped else None
+        self._law = Law(scheme=scheme, scene=scene, h=step)
         self._force = _kept(system.force, system.is_damped)
         self._parts = _kept(system.parts[0], system.is_damped), _kept(system.parts[1], system.is_damped)
 
@@ -28,7 +28,7 @@ class Vectors:
                 for _ in range(every):
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
-                        rate=self._rate, parts=self._parts,
+                        rate=self._law.rate, parts=self._parts, stiffness=self._law.stiffness,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
                 q[row], p[row] = self._q, self._p

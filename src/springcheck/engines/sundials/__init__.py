@@ -22,5 +22,6 @@ ENGINE = Engine(
         ),
     ),
     step_seconds=6e-5,
+    any_axis=True,
     **deferred(f"{__name__}.simulation", "internal_steps"),
 )  # fmt: skip

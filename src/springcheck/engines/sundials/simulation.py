@@ -106,7 +106,8 @@ def _suits_matrix(scene: Scene) -> bool:
     """Whether the right-hand side may be one matrix product, five times as fast for a few particles."""
     if not scene.system.is_linear or scene.n > 32:
         return False
-    k = np.abs(np.concatenate([term.rigidity for term in scene.terms if term.is_potential] or [np.ones(1)]))
+    held = [term.rigidity for term in scene.terms if term.kind == "potential"]
+    k = np.abs(np.concatenate(held or [np.ones(1)]))
     return bool(np.max(k) <= MOST_ALIKE * np.min(k))
 
 

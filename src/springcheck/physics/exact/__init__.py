@@ -21,6 +21,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.exact.linear import energy_of_doubt
 from springcheck.physics.exact.normal import Modes
 
 if TYPE_CHECKING:
@@ -68,7 +69,10 @@ def uncertainty(scene: Scene, duration: float) -> float:
     dq, dp = system.solution.doubt(duration)
     with np.errstate(all="ignore"):
         # the elongation of a spring is off by what both of its ends are
-        square = np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2
+        square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
+        if system.has_modes and (whole := energy_of_doubt(scene, np.longdouble(duration))) is not None:
+            # errors of all particles together, which are not all as large as each of them may be
+            square = whole
         for group in system.free_groups:
             square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration) if duration else 0
         if square == 0 or system.norm.unit == 0:

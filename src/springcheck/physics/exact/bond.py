@@ -27,7 +27,7 @@ def _bonds(scene: Scene) -> tuple[Morse, _Bond] | None:
 MOST = np.log(np.finfo(np.longdouble).max) - 64
 """Exponents whose exponential, times what stands beside it here, is a number."""
 
-FAR = 64.0
+FAR_OUT = 64.0
 """A phase whose exponential leaves nothing of 1 in any precision that is used here."""
 
 
@@ -136,8 +136,8 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     root, bound, edge = np.sqrt(bond.energy), bond.excess < 0, bond.excess == 0
     phase = bond.rate * t + bond.start
     turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
-    far = np.abs(run) > FAR
-    endless, run = np.where(far, run, FAR), np.where(far, 0, run)
+    far = np.abs(run) > FAR_OUT
+    endless, run = np.where(far, run, FAR_OUT), np.where(far, 0, run)
     half, whole = (
         np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
         np.where(bound, np.sin(turn), np.sinh(run)),

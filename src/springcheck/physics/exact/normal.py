@@ -28,7 +28,7 @@ class Start:
     """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
     turn, the shares of exp(slow t) and exp(fast t) in its motion (see `_split`).
 
-    `sizes` are those whose last digits these four are known to.
+    `sizes` are those whose last digits these four are known to; of waves beside those of their transform.
     """
 
     u: Extended
@@ -174,7 +174,7 @@ def _start(system: System, modes: Modes) -> Start:
     centre = modes.centre()
     u = y - centre
     slow, fast, size = _split(u, v, modes.w2, modes.rate)
-    if modes.vectors is not None or modes.waves:
+    if modes.vectors is not None:
         whole = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) for x in (y, v))
         size_u, size_v = next(whole) + np.abs(centre), next(whole)
     else:

@@ -15,6 +15,9 @@ from springcheck.errors import SceneError, nearest
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import building, tables
 
+LONGEST_TEXT = 1 << 25
+"""Characters of a scene: parsing so many takes ten seconds and a gigabyte of memory."""
+
 
 def folder() -> Path:
     """Where the shipped scenes lie: inside the installed package, or in a checkout's data folder."""
@@ -53,7 +56,8 @@ def _read(name_or_path: str | Path) -> tuple[Path, str]:
                 f"shipped are {', '.join(names())}; the name of a file of your own ends in .toml"
             )
     try:
-        text = path.read_text(encoding="utf-8-sig")  # some editors put a mark in front
+        with path.open(encoding="utf-8-sig") as file:  # some editors put a mark in front
+            text = file.read(LONGEST_TEXT + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text, as a scene in TOML is"
         raise SceneError(f"{path}: cannot be read: {reason}") from error
@@ -63,6 +67,10 @@ def _read(name_or_path: str | Path) -> tuple[Path, str]:
 def parse(text: str, *, name: str, where: str | None = None) -> Scene:
     """The scene that a TOML text describes; `where` is named in messages.  Raises SceneError."""
     where = where or name
+    if len(text) > LONGEST_TEXT:
+        raise SceneError(
+            f"{where}: more than {LONGEST_TEXT / 1e6:.0f} MB of text: join alike particles to a [chain]"
+        )
     try:
         data = tomllib.loads(text)
     except RecursionError as error:

@@ -10,7 +10,8 @@ import numpy as np
 
 from springcheck.errors import SceneError
 from springcheck.physics import builders
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene, Units
 from springcheck.physics.scenefile import tables
 from springcheck.physics.terms import Column, Damping, Spring, Term, WallSpring
@@ -29,14 +30,40 @@ class _Bodies:
     p: Floats
     name: str
     terms: tuple[Term, ...] = ()
+    axes: tuple[str, ...] = ()
+    """The axes of each particle, where one of them has more than x."""
+
+    @property
+    def places(self) -> Integers | None:
+        """Of each coordinate, as `Scene.places`."""
+        return np.array([3 * i + "xyz".index(x) for i, x in self._coordinates]) if self.axes else None
+
+    @property
+    def _coordinates(self) -> list[tuple[int, str]]:
+        return [(i, x) for i, axes in enumerate(self.axes) for x in axes]
 
     def number(self, value: int, field: str) -> int:
         """The number of a body, as a field of the file gives it.  MistakeError where there is none."""
-        n = len(self.m)
+        n = len(self.axes) or len(self.m)
         if not 0 <= value < n:
             several = tables.BODIES[self.name].several
             raise MistakeError(f"{field} = {value}: there are {n} {several}, numbered 0 to {n - 1}")
         return value
+
+    def along(self, field: str, axis: str | None, *bodies: int) -> list[tuple[int, ...]]:
+        """The coordinates of these bodies along an axis, or along each that they have.  MistakeError."""
+        numbers = [self.number(value, field) for value in bodies]
+        if not self.axes:
+            if axis not in (None, "x"):
+                raise MistakeError(f"{field}: axis = {axis!r}, but everything moves along x")
+            return [tuple(numbers)]
+        shared = [self.axes[i] for i in numbers]
+        if axis is None and len({frozenset(axes) for axes in shared}) > 1:
+            raise MistakeError(f"{field}: the two move along {' and '.join(shared)}; say along which axis")
+        if any(axis not in axes for axes in shared if axis):
+            raise MistakeError(f"{field}: axis = {axis!r}, along which it cannot move")
+        at = {coordinate: j for j, coordinate in enumerate(self._coordinates)}
+        return [tuple(at[i, x] for i in numbers) for x in (axis or shared[0])]
 
 
 PLACES = {
@@ -65,6 +92,7 @@ def scene(table: Any, *, name: str) -> Scene:
     units: Units = table.units or ("si" if kind == "circuit" else "reduced")
     terms = tuple(_terms(table, bodies))
     try:
+        bath = table.bath and Bath(temperature=table.bath.temperature, friction=table.bath.friction)
         return Scene(
             name=name,
             title=table.title,
@@ -74,7 +102,9 @@ def scene(table: Any, *, name: str) -> Scene:
             m=bodies.m,
             q=bodies.q,
             p=bodies.p,
+            places=bodies.places,
             terms=terms,
+            bath=bath,
             step=time.step,
             steps=time.steps,
             every=table.record.every or time.every or 1,
@@ -101,8 +131,38 @@ def _bodies(table: Any) -> _Bodies:
         made = _chain(table.chain)
         return _Bodies(m=made.m, q=made.q, p=made.p, name=name, terms=made.terms)
     columns = tables.BODIES[name].columns
+    if name == "particle":
+        return _particles(table.particle)
     m, q, p = (np.array([getattr(row, column) for row in getattr(table, name)]) for column in columns)
     return _Bodies(m=m, q=q, p=p, name=name)
+
+
+def _particles(rows: Sequence[Any]) -> _Bodies:
+    """Particles, each along its own axes."""
+    axes: list[str] = []
+    m: list[float] = []
+    q: list[float] = []
+    p: list[float] = []
+    for j, row in enumerate(rows):
+        given = {"position": row.position, "momentum": row.momentum}
+        lengths = {name: len(x) for name, x in given.items() if isinstance(x, tuple)}
+        along = row.axes or "xyz"[: max(lengths.values(), default=1)]
+        if len(set(along)) < len(along):
+            raise MistakeError(f"particle[{j}].axes = {along!r}: each axis once")
+        for name, length in lengths.items():
+            if length != len(along):
+                raise MistakeError(f"particle[{j}].{name}: {length} numbers for the axes {along}")
+        start = [x if isinstance(x, tuple) else (x,) * len(along) for x in given.values()]
+        for name, x in given.items():
+            if name not in lengths and x and len(along) > 1:
+                raise MistakeError(f"particle[{j}].{name} = {x:g}: a number for each of {along} is needed")
+        axes.append(along)
+        m += [row.mass] * len(along)
+        q += start[0]
+        p += start[1]
+    several = any(one != "x" for one in axes)
+    along_each = tuple(axes) if several else ()
+    return _Bodies(name="particle", axes=along_each, m=np.array(m), q=np.array(q), p=np.array(p))
 
 
 def _chain(table: Any) -> Scene:
@@ -143,23 +203,34 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
     rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, spring in enumerate(springs):
         field = f"spring[{j}].ends"
-        for end in spring.ends:
-            if end != "wall":
-                bodies.number(end, field)
+        numbers = [bodies.number(end, field) for end in spring.ends if end != "wall"]
         match spring.ends:
             case ("wall", "wall"):
                 raise MistakeError(f"{field}: a spring between two walls moves nothing")
-            case ("wall", int(particle)):
-                row: tuple[float, ...] = (particle, spring.stiffness, spring.wall + spring.rest)
-            case (int(particle), "wall"):
-                row = (particle, spring.stiffness, spring.wall - spring.rest)
+            case ("wall", int()):
+                rest = spring.wall + spring.rest
+            case (int(), "wall"):
+                rest = spring.wall - spring.rest
             case (int(one), int(other)):
                 _two_ends(one, other, field)
                 if spring.wall:
                     raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
-                row = (one, other, spring.stiffness, spring.rest)
-        rows.setdefault((WallSpring if len(row) == 3 else Spring, spring.fast), []).append(row)
+                rest = spring.rest
+        ends = bodies.along(field, spring.axis, *numbers)
+        _one_axis(f"spring[{j}]", {"rest": spring.rest, "wall": spring.wall}, ends)
+        kind = rows.setdefault((WallSpring if len(numbers) == 1 else Spring, spring.fast), [])
+        kind += [(*one, spring.stiffness, rest) for one in ends]
     yield from _of_rows(rows)
+
+
+def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:
+    """MistakeError where a row along several axes is at rest anywhere but in 0, which is one number."""
+    for name, value in places.items():
+        if value and len(ends) > 1:
+            raise MistakeError(
+                f"{row}.{name} = {value:g} along {len(ends)} axes: what is the same along each rests in 0; "
+                "give one row for each axis, with axis"
+            )
 
 
 def _of_rows(rows: Mapping[tuple[type[Term], bool], Sequence[tuple[float, ...]]]) -> Iterator[Term]:
@@ -201,12 +272,21 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Iterator[Ter
             values = [getattr(row, tables.identifier(column.name)) for row in rows]
         fields[column.field] = np.array(values)
     ends: list[tuple[int, ...]] = []
+    given: list[int] = []
     for j, row in enumerate(rows):
+        where = f"{term.key}[{j}]"
         if len(term.ends) == 1:
-            ends.append((bodies.number(row.particle, f"{term.key}[{j}].particle"),))
+            found = bodies.along(f"{where}.particle", row.axis, row.particle)
+            origin = next((c.name for c in term.columns if c.field == term.origin), None)
+            _one_axis(where, {origin: getattr(row, tables.identifier(origin))} if origin else {}, found)
         else:
-            ends.append(tuple(bodies.number(end, f"{term.key}[{j}].ends") for end in row.ends))
-            _two_ends(row.ends[0], row.ends[1], f"{term.key}[{j}].ends")
+            found = bodies.along(f"{where}.ends", row.axis, *row.ends)
+            _two_ends(row.ends[0], row.ends[1], f"{where}.ends")
+            if len(found) > 1:
+                raise MistakeError(f"{where}: its law holds along a line; say which by axis")
+        ends += found
+        given += [j] * len(found)
+    fields = {name: values[given] for name, values in fields.items()}
     yield term(**dict(zip(term.ends, map(np.array, zip(*ends, strict=True)), strict=True)), **fields)
 
 

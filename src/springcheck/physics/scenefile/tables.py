@@ -14,21 +14,27 @@ Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 Count = Annotated[int, msgspec.Meta(ge=1)]
 End = int | Literal["wall"]
+Axis = Literal["x", "y", "z"]
+PerAxis = Annotated[tuple[float, ...], msgspec.Meta(min_length=1, max_length=3)]
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
+class SceneTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """A table of a scene file: what is not a field of it is refused."""
 
 
-class ParticleTable(Table, frozen=True):
-    """mass [M], position [L] and momentum [M L/T] at the start."""
+class ParticleTable(SceneTable, frozen=True):
+    """mass [M], position [L] and momentum [M L/T] at the start: numbers, or one for each axis.
+
+    `axes` names the axes of these numbers, "x", "xy" or "xyz" where it is left out.
+    """
 
     mass: Positive
-    position: float = 0.0
-    momentum: float = 0.0
+    position: float | PerAxis = 0.0
+    momentum: float | PerAxis = 0.0
+    axes: Annotated[str, msgspec.Meta(pattern="^[xyz]{1,3}$")] | None = None
 
 
-class RotorTable(Table, frozen=True):
+class RotorTable(SceneTable, frozen=True):
     """A body that turns: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
 
     inertia: Positive
@@ -36,7 +42,7 @@ class RotorTable(Table, frozen=True):
     momentum: float = 0.0
 
 
-class InductorTable(Table, frozen=True):
+class InductorTable(SceneTable, frozen=True):
     """The inductor of a loop: inductance [H], charge that has gone round [C] and flux [Wb] at the start."""
 
     inductance: Positive
@@ -44,24 +50,25 @@ class InductorTable(Table, frozen=True):
     flux: float = 0.0
 
 
-class CapacitorTable(Table, frozen=True):
+class CapacitorTable(SceneTable, frozen=True):
     """A capacitor in one loop, or between two loops that go through it in opposite directions [F]."""
 
     loops: Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=2)]
     capacitance: Positive
 
 
-class ResistorTable(Table, frozen=True):
+class ResistorTable(SceneTable, frozen=True):
     """A resistor of one loop [Ohm]."""
 
     loop: int
     resistance: NonNegative
 
 
-class SpringTable(Table, frozen=True):
+class SpringTable(SceneTable, frozen=True):
     """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L].
 
-    `fast` springs are taken in the short step of a method of multiple time steps.
+    `fast` springs are taken in the short step of a method of multiple time steps.  Where particles move along
+    several axes it acts along `axis`, or alike along all of them.
     """
 
     ends: tuple[End, End]
@@ -69,23 +76,25 @@ class SpringTable(Table, frozen=True):
     rest: float = 0.0
     wall: float = 0.0
     fast: bool = False
+    axis: Axis | None = None
 
 
-class DampingTable(Table, frozen=True):
-    """Friction of one particle: force -coefficient p/mass, coefficient [M/T]."""
+class DampingTable(SceneTable, frozen=True):
+    """Friction of one particle, along `axis` or all of its axes: force -coefficient p/mass, in M/T."""
 
     particle: int
     coefficient: NonNegative
+    axis: Axis | None = None
 
 
-class WaveTable(Table, frozen=True):
+class WaveTable(SceneTable, frozen=True):
     """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
 
     mode: Count
     amplitude: float
 
 
-class ChainTable(Table, frozen=True):
+class ChainTable(SceneTable, frozen=True):
     """Equal masses [M] between two walls, neighbours joined by equal springs [M/T2].
 
     Positions count from the rest of each mass; the start is a sum of standing waves, or the position and
@@ -100,7 +109,7 @@ class ChainTable(Table, frozen=True):
     momentum: tuple[float, ...] = ()
 
 
-class TimeTable(Table, frozen=True):
+class TimeTable(SceneTable, frozen=True):
     """Step [T], number of steps, and the relative tolerance per step of adaptive solvers."""
 
     step: float
@@ -109,13 +118,20 @@ class TimeTable(Table, frozen=True):
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
-class MethodsTable(Table, frozen=True):
+class BathTable(SceneTable, frozen=True):
+    """A heat bath: temperature [K, or kT where units are reduced], and its friction rate [1/T]."""
+
+    temperature: float
+    friction: float
+
+
+class MethodsTable(SceneTable, frozen=True):
     """Labels or globs of the methods to run; all that can serve the scene when left out."""
 
     include: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] = ("*",)
 
 
-class RecordTable(Table, frozen=True):
+class RecordTable(SceneTable, frozen=True):
     """Every how many steps a frame is kept, and what of it."""
 
     every: Count | None = None
@@ -131,7 +147,7 @@ class Body(NamedTuple):
 
 
 BODIES = {
-    "particle": Body("particles", "particles", ParticleTable.__struct_fields__),
+    "particle": Body("particles", "particles", ("mass", "position", "momentum")),
     "rotor": Body("rotor", "rotors", RotorTable.__struct_fields__),
     "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
@@ -139,7 +155,7 @@ BODIES = {
 """What moves, by the name of its table."""
 
 
-class SceneBase(Table, frozen=True):
+class SceneBase(SceneTable, frozen=True):
     """A scene file without the tables of the terms that need no more than their columns."""
 
     title: str
@@ -155,6 +171,7 @@ class SceneBase(Table, frozen=True):
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
     damping: tuple[DampingTable, ...] = ()
+    bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
 
@@ -162,8 +179,8 @@ class SceneBase(Table, frozen=True):
 _SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": NonNegative}
 
 
-def _of_term(term: Any) -> type[Table]:
-    """The table of a term: the particle or the two ends on which it acts, and its columns."""
+def _of_term(term: Any) -> type[SceneTable]:
+    """The table of a term: the particle or the two ends on which it acts, its axis, and its columns."""
     fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     names = {}
     for column in term.columns:
@@ -175,10 +192,11 @@ def _of_term(term: Any) -> type[Table]:
             fields += [(name, kind | None, None), (column.field, kind | None, None)]
             continue
         fields.append((name, kind) if column.default is None else (name, kind, column.default))
+    fields.append(("axis", Axis | None, None))
     table = msgspec.defstruct(
-        f"{term.__name__}Table", fields, bases=(Table,), frozen=True, kw_only=True, rename=names
+        f"{term.__name__}SceneTable", fields, bases=(SceneTable,), frozen=True, kw_only=True, rename=names
     )
-    return cast(type[Table], table)
+    return cast(type[SceneTable], table)
 
 
 def identifier(name: str) -> str:
@@ -190,13 +208,13 @@ OTHERWISE = ("wall-spring", "spring", "damping")
 """Terms that have tables of their own."""
 
 
-def of_terms() -> dict[str, tuple[Any, type[Table]]]:
+def of_terms() -> dict[str, tuple[Any, type[SceneTable]]]:
     """The terms that are read by their columns alone, with their tables."""
     return _of_terms(tuple(terms.known().values()))
 
 
 @lru_cache(maxsize=8)
-def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, type[Table]]]:
+def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, type[SceneTable]]]:
     return {term.key: (term, _of_term(term)) for term in known if term.key not in OTHERWISE}
 
 
@@ -229,7 +247,7 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, TimeTable, MethodsTable, RecordTable,
+        DampingTable, BathTable, TimeTable, MethodsTable, RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
     found |= {key: table for key, (_, table) in of_terms().items()}

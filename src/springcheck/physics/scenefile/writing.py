@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,23 +25,43 @@ def text(scene: Scene) -> str:
     head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
     lines = [_assigned(head)]
     is_chain = (
-        scene.kind == "particles" and scene.n > 1 and scene.system.is_uniform_chain and _rests_at_0(scene)
+        scene.places is None
+        and scene.kind == "particles"
+        and scene.n > 1
+        and scene.system.is_uniform_chain
+        and _rests_at_0(scene)
     )
     if is_chain:
         lines += _chain(scene)
     else:
         table, names = next((name, of.columns) for name, of in BODIES.items() if of.kind == scene.kind)
-        for row in zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True):
-            lines.append(_table(f"[[{table}]]", zip(names, row, strict=True)))
+        lines += [_table(f"[[{table}]]", row) for row in _bodies(scene, names)]
     for term in scene.terms:
         if not (is_chain and isinstance(term, WallSpring | Spring)):
             lines += _rows(scene, term)
+    if scene.bath:
+        given = {"temperature": scene.bath.temperature, "friction": scene.bath.friction}
+        lines.append(_table("[bath]", given.items()))
     time = {"step": scene.step, "steps": scene.steps, "tolerance": scene.tolerance}
     lines.append(_table("[time]", time.items()))
     lines.append(_table("[methods]", [("include", list(scene.include))]))
     record = {"every": scene.every, "quantities": list(scene.quantities)}
     lines.append(_table("[record]", record.items()))
     return "\n".join(lines) + "\n"
+
+
+def _bodies(scene: Scene, names: Sequence[str]) -> Iterator[Iterable[tuple[str, Any]]]:
+    """The rows of what moves: one number for each column, or for each of its axes."""
+    rows = list(zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True))
+    if scene.places is None:
+        yield from (zip(names, row, strict=True) for row in rows)
+        return
+    places = scene.places.tolist()
+    for _, several in itertools.groupby(zip(places, rows, strict=True), lambda one: one[0] // 3):
+        at, own = zip(*several, strict=True)
+        m, q, p = zip(*own, strict=True)
+        along = "".join("xyz"[place % 3] for place in at)
+        yield zip((*names, "axes"), (m[0], list(q), list(p), along), strict=True)
 
 
 def _rests_at_0(scene: Scene) -> bool:
@@ -91,12 +111,20 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
             yield _table("[[capacitor]]", [("loops", loops), ("capacitance", 1 / k)])
     elif isinstance(term, WallSpring):
         for i, k, at in term.rows():
-            yield _spring(["wall", i], k, 0.0, at, fast=term.fast)
+            yield _spring(scene, ["wall"], [i], k, 0.0, at, fast=term.fast)
     elif isinstance(term, Spring):
         for a, b, k, rest in term.rows():
-            yield _spring([a, b], k, rest, 0.0, fast=term.fast)
+            yield _spring(scene, [], [a, b], k, rest, 0.0, fast=term.fast)
     else:
-        yield from _by_columns(term)
+        yield from _by_columns(scene, term)
+
+
+def _ends(scene: Scene, coordinates: Sequence[int]) -> tuple[list[int], dict[str, str]]:
+    """The particles of these coordinates, and their axis where that is not x for all."""
+    if scene.places is None:
+        return list(coordinates), {}
+    particles, axes = np.divmod(scene.places[list(coordinates)], 3)
+    return particles.tolist(), {"axis": "xyz"[axes[0]]}
 
 
 def _are_capacitors(term: WallSpring | Spring) -> bool:
@@ -107,16 +135,21 @@ def _are_capacitors(term: WallSpring | Spring) -> bool:
     return bool(np.all(exact)) and not (term.fast or np.any(getattr(term, term.origin)))
 
 
-def _spring(ends: Sequence[Any], k: float, rest: float, wall: float, *, fast: bool) -> str:
-    row: dict[str, Any] = {"ends": ends, "stiffness": k}
+def _spring(
+    scene: Scene, walls: Sequence[str], at: Sequence[int], k: float, rest: float, wall: float, *, fast: bool
+) -> str:
+    ends, axis = _ends(scene, at)
+    row: dict[str, Any] = {"ends": [*walls, *ends], "stiffness": k, **axis}
     row |= {"rest": rest} if rest else {}
     row |= {"wall": wall} if wall else {}
     return _table("[[spring]]", (row | ({"fast": True} if fast else {})).items())
 
 
-def _by_columns(term: Term) -> Iterator[str]:
-    for j, ends in enumerate(zip(*(index.tolist() for index in term.particles), strict=True)):
-        row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": list(ends)}
+def _by_columns(scene: Scene, term: Term) -> Iterator[str]:
+    for j, at in enumerate(zip(*(index.tolist() for index in term.particles), strict=True)):
+        ends, axis = _ends(scene, at)
+        row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": ends}
+        row |= axis
         for column in term.columns:
             value = float(getattr(term, column.field)[j])
             inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from springcheck.studies import team
-from springcheck.studies.study import Study, store_arguments
+from springcheck.studies.arguments import argument, repeatable, store_arguments
+from springcheck.studies.study import Study
 
 STUDY = Study(
     name="census",
     about="which integrator every installed engine really runs, by its states",
-    arguments=(*team.arguments(), *store_arguments("census.h5")),
+    arguments=(
+        *team.arguments(),
+        *store_arguments("census.h5"),
+        argument("--page", metavar="FILE.html", help="write the table of engines as one page"),
+        argument("--csv", metavar="FILE.csv", help="write it as CSV"),
+        argument("--against", metavar="OLD.json", help="what changed since an earlier census --json"),
+        repeatable("--add", "OTHER.json", "rows of another census --json, made elsewhere"),
+    ),
 )

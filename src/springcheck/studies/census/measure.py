@@ -20,10 +20,12 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
+from springcheck.studies.census import table
+from springcheck.studies.census.limit import first_limit
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import How, Keeper, each
-from springcheck.studies.study import Progress
 
 EVERY = "*:*"
 """Every method of every engine; of an engine that has default ones, those."""
@@ -89,7 +91,21 @@ def record(path: str | Path, methods: Sequence[str] = (), **how: Unpack[How]) ->
 
 def perform(options: Namespace, progress: Progress | None) -> Census:
     """What `springcheck census` does."""
-    return record(options.output or "census.h5", options.method, **keeper.how(options, progress))
+    for path, beginning in ((options.page, table.MARK), (options.csv, table.HEAD)):
+        if path is not None:
+            table.free(path, beginning)
+    old = table.load(options.against) if options.against is not None else None
+    added = [table.load(path) for path in options.add]
+    found = record(options.output or "census.h5", options.method, **keeper.how(options, progress))
+    documents = [found.document(), *added]
+    rows = table.rows(*documents)
+    if options.page:
+        table.write(options.page, table.html(rows, documents))
+    if options.csv:
+        table.write(options.csv, table.as_csv(rows))
+    if old is None:
+        return found
+    return replace(found, changes=tuple(table.changes(table.rows(old), rows)))
 
 
 @keeper.restoring("census")
@@ -108,11 +124,14 @@ def entry(label: Label) -> Entry:
     orbit, run = simulate.run(blog, label), simulate.run(uneven, label)
     method = engines.method(label)
     found = None if method.adaptive else _identified(uneven, run)
+    limit = np.nan if method.adaptive else first_limit(uneven, label)
     name = "adaptive" if method.adaptive else _name(uneven, run, found)
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
     return Entry(
         method=str(label),
+        about=method.about,
+        note=method.note,
         version=", ".join(f"{key} {value}" for key, value in engines.load(label.engine).version().items()),
         claimed=method.scheme,
         found=name,
@@ -122,6 +141,8 @@ def entry(label: Label) -> Entry:
         area=np.nan if method.adaptive else float(np.linalg.det(_map(run))) - 1,
         friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
+        limit=limit,
+        bounded=bool(np.isinf(limit)),
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
         force_calls=run.force_calls / steps,
         seconds=np.nan,
@@ -192,7 +213,7 @@ def _agrees(scene: Scene, claimed: str, found: str) -> bool:
     except MethodError:
         # several that nothing tells apart, or an adaptive solver
         return found == "adaptive" or claimed in found.split(" or ") or claimed == "unknown"
-    if not (one.one_step and other.one_step):
+    if not (one.has("one-step") and other.has("one-step")):
         return True
     maps = [schemes.matrix(x, h=scene.step, m=m, k=k)[0] for x in (one, other)]
     return bool(np.allclose(maps[0], maps[1], rtol=1e-14, atol=1e-14))

@@ -1,11 +1,11 @@
-"""The census in the report page: the orbits of the blog's spring."""
+"""The chart of a census, in figures and in the report page: the orbits of the blog's spring."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.studies.census.result import Census, Entry
-from springcheck.studies.charts import Bank, Chart, Curve, Scale
 from springcheck.text.wording import few
 
 MOST_NAMES = 2
@@ -37,4 +37,8 @@ def banks(census: Census) -> list[Bank]:
         curves=[exact, *curves],
         equal=True,
     )
-    return [Bank(title="Orbits drawn", charts=[chart], on=["exact", *on])]
+    heading = (
+        f"The blog's spring by {len(census.entries)} methods: how it is attached decides the scheme "
+        "(m = k = 1, h = 0.1, 200 steps)"
+    )
+    return [Bank(name="census", title="Orbits drawn", heading=heading, charts=[chart], on=["exact", *on])]

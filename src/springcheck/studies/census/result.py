@@ -10,7 +10,7 @@ from typing import Any
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.tables import Record
+from springcheck.studies.tables import RecordForm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -18,6 +18,10 @@ class Entry:
     """One method of one engine.  Numbers that the states do not give are NaN, names empty."""
 
     method: str
+    about: str
+    """What of the library is called."""
+    note: str
+    """What its authors would want to be said beside it, and the thread that asked."""
     version: str
     claimed: str
     """The scheme that the engine is declared with here."""
@@ -34,6 +38,10 @@ class Entry:
     friction: float
     """Friction c/m that nobody asked for, with the stiffness as stated [1/T]."""
     precision: str
+    limit: float
+    """The least h omega at which the measured map grows; 0: it always does; NaN: not known, or adaptive."""
+    bounded: bool
+    """Whether no map up to h omega = 4 grows; `limit` is infinity then."""
     amplitude: float
     """Of the blog's spring after its 200 steps; 1 is exact."""
     force_calls: float
@@ -47,7 +55,7 @@ class Entry:
     p: Floats
 
 
-ENTRIES: Record[Entry] = Record(kind=Entry, beginning="census/", signal="p", axes=("q",))
+ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal="p", axes=("q",))
 """A table for each method: the orbit, and everything else as attributes."""
 
 
@@ -59,6 +67,8 @@ class Census:
     left_out: tuple[LeftOut, ...]
     resumed: int = 0
     path: Path | None = None
+    changes: tuple[str, ...] | None = None
+    """What is not as it was in an earlier census; None where none was named."""
 
     @property
     def partners(self) -> Mapping[str, tuple[str, ...]]:
@@ -78,10 +88,10 @@ class Census:
 
     @property
     def status(self) -> int:
-        """1 where an engine is declared with another scheme than its states show, 2 where nothing was run."""
+        """1: states are not those of a declared scheme, or a row is not what it was; 2: nothing was run."""
         if not self.entries:
             return 2
-        return 0 if all(entry.agrees for entry in self.entries) else 1
+        return 0 if all(entry.agrees for entry in self.entries) and not self.changes else 1
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the orbits are in the tables of the store."""
@@ -91,4 +101,5 @@ class Census:
             {**{name: getattr(x, name) for name in names}, "partners": partners[x.method]}
             for x in self.entries
         ]
-        return keeper.document(entries=rows, left_out=self.left_out)
+        more = {} if self.changes is None else {"changes": self.changes}
+        return keeper.document(entries=rows, left_out=self.left_out, **more)

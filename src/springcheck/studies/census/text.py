@@ -9,11 +9,12 @@ import numpy as np
 from springcheck.figures.looks import title
 from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.text import left_out, resumed
-from springcheck.text.lines import Lines, Row, plain, table
+from springcheck.text.lines import Lines, Row, hanging, plain, table
 from springcheck.text.wording import few, seconds
 
 TITLES = (
-    "method", "amplitude", "det - 1", "velocity", "friction", "arithmetic", "forces", "time", "same bits as"
+    "method", "amplitude", "det - 1", "velocity", "friction", "limit", "arithmetic", "forces", "time",
+    "same bits as"
 )  # fmt: skip
 
 
@@ -36,6 +37,13 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
         for x in census.entries
         if not x.agrees
     ]
+    versions = {x.method.partition(":")[0]: x.version for x in census.entries}
+    out += [plain(), *hanging("Versions: ", "; ".join(dict.fromkeys(versions.values())))]
+    notes = dict.fromkeys(f"{x.method}: {x.note}" for x in census.entries if x.note)
+    out += [line for note in notes for line in hanging("  note: ", note)]
+    if census.changes is not None:
+        out += [plain(), plain("Changes" if census.changes else "Nothing has changed", "bold")]
+        out += [line for one in census.changes for line in hanging("  ", one)]
     out += left_out(census.left_out)
     return out
 
@@ -47,6 +55,7 @@ def _row(x: Entry, partners: tuple[str, ...]) -> Row:
         _number(x.area, 1e-13),
         "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
         _number(x.friction, 1e-9),
+        "-" if np.isnan(x.limit) else "none" if np.isinf(x.limit) else f"{x.limit:.3f}",
         x.precision,
         f"{x.force_calls:.3g}",
         seconds(x.seconds),

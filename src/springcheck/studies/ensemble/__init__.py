@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from springcheck.studies import team
-from springcheck.studies.study import SCENE, Study, argument, repeatable, store_arguments
+from springcheck.studies.arguments import SCENE, argument, repeatable, store_arguments
+from springcheck.studies.study import Study
 
 VARY = (
     repeatable(
@@ -13,7 +14,7 @@ VARY = (
     argument(
         "--samples", type=int, metavar="N", help="N random scenes, each FIELD=LOW:HIGH[:log] drawn evenly"
     ),
-    argument("--seed", type=int, default=0, metavar="S", help="of the samples (default 0)"),
+    argument("--seed", type=int, metavar="S", help="of the samples (default 0), or of random methods"),
 )  # fmt: skip
 """What is varied."""
 

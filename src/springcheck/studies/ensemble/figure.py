@@ -28,7 +28,7 @@ from springcheck.studies.ensemble.shown import (
     parts,
 )  # fmt: skip
 
-FAR = 1e6
+CLIPPED = 1e6
 """Where a line that leaves it is drawn to."""
 
 UNKNOWN = "#bbbbbb"
@@ -63,7 +63,7 @@ def _lines(shown: Mapping[str, Line], choice: Choice) -> Figure:
         look = looks.look(scheme)
         for j, method in enumerate(methods):
             one, sign = shown[method], looks.mark(looks.engine(method))[0]
-            low, y, high = (np.clip(values, -FAR, FAR) for values in (one.low, one.y, one.high))
+            low, y, high = (np.clip(values, -CLIPPED, CLIPPED) for values in (one.low, one.y, one.high))
             if j == 0 and not np.array_equal(low, high, equal_nan=True):
                 axes.fill_between(one.x, low, high, color=look.color, alpha=0.2, linewidth=0)
             axes.plot(

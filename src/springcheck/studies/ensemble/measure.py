@@ -22,12 +22,12 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import choose
 from springcheck.studies.ensemble.result import CELLS, Columns, Ensemble, Tally
 from springcheck.studies.ensemble.vary import GRID, Plan, Varied, plan, together
 from springcheck.studies.extremes.running import raw
 from springcheck.studies.keeper import How, Piece
-from springcheck.studies.study import Progress
 
 NUMBERS = 1 << 17
 """Numbers per array of a run: memory does not grow with the number of cells."""
@@ -39,7 +39,7 @@ def perform(options: Namespace, progress: Progress | None) -> Ensemble:
     """What `springcheck ensemble` and `springcheck run --vary` do."""
     scene = scenefile.load_scene(options.scene)
     text = scenefile.text_of(options.scene)
-    cells = plan(options.vary, options.samples, options.seed, text=text)
+    cells = plan(options.vary, options.samples, options.seed or 0, text=text)
     path = options.output or f"{scene.name}-ensemble.h5"
     return record(scene, cells, path, options.method, **keeper.how(options, progress))
 
@@ -171,7 +171,7 @@ def _energies(many: Scene, q: Reals, p: Reals, copies: int) -> Reals:
     """Energy of each copy (f, copies)."""
     energy = _of_copies(0.5 * (p * p) / many.m, copies)
     for term in many.terms:
-        if term.is_potential:
+        if term.kind == "potential":
             energy = energy + _of_copies(term.potential(term.elongation(q), *term.parameters), copies)
     return energy
 
@@ -230,7 +230,7 @@ def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     for term in many.terms:
         du = term.stretch(dq)
         size = size + 0.5 * _of_copies(term.rigidity * du * du, copies)
-        if term.is_potential:
+        if term.kind == "potential":
             start = term.potential(term.elongation(many.q.astype(np.longdouble)[None]), *term.parameters)
             unit = unit + np.abs(_of_copies(start, copies))
     return np.asarray(np.where(size == 0, 0, np.sqrt(size) / np.sqrt(unit)), np.float64)

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles
 from springcheck.figures.looks import scheme_of
 from springcheck.physics.arrays import Floats
-from springcheck.studies.charts import Bank, Chart, Curve, Scale, Tiles
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.ensemble.shown import (
     MOST,

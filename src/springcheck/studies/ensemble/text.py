@@ -28,6 +28,7 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
             "error: largest distance from the exact solution; energy: (H - H0)/|H0| where it is largest",
             "dim",
         ),
+        plain("no cell is judged: `springcheck run SCENE --set FIELD=NUMBER` judges one of them", "dim"),
         *left_out(found.left_out),
     ]
     return out

@@ -19,6 +19,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
 from springcheck.studies.extremes import grid, refusals, running, solving
 from springcheck.studies.extremes.judging import Cell
@@ -26,7 +27,6 @@ from springcheck.studies.extremes.planes import decade
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, Piece, each
 from springcheck.studies.stability import propagators
-from springcheck.studies.study import Progress
 
 
 def everything() -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from springcheck.studies.charts import Bank, Chart, Scale, Tiles
+from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.studies.extremes.planes import Plane, planes
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
 

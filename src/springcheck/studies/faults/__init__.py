@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 
 from springcheck.studies import team
-from springcheck.studies.study import FORCE, JSON, QUIET, Study, argument
+from springcheck.studies.arguments import FORCE, JSON, QUIET, argument
+from springcheck.studies.study import Study
 
 STUDY = Study(
     name="faults",

@@ -18,12 +18,12 @@ from springcheck.physics.terms import Spring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
+from springcheck.studies.arguments import Progress
 from springcheck.studies.faults import clean, steppers
 from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import Keeper, Piece
-from springcheck.studies.study import Progress
 from springcheck.studies.tables import Documents
 
 
@@ -43,6 +43,9 @@ def scene(where: Where) -> Scene:
             steps=200,
             name=where,
         )
+    if where == "orbit":
+        q, p = [0.3, -0.5, 0.8], [0.7, 1.1, -0.4]
+        return spring(m=3.7, k=2.9, q=q, p=p, places=np.arange(3), name=where, title="")
     steps = 2100 if where == "long spring" else 200
     return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
 
@@ -152,7 +155,7 @@ def clean_engine(run: Run, label: str, seed: int) -> Clean:
 _FIXED = tuple(
     name
     for name, scheme in schemes.SCHEMES.items()
-    if scheme.one_step and not scheme.flow and not scheme.mixes
+    if scheme.has("one-step") and not scheme.has("flow") and not scheme.has("mixes")
 )
 _QUICK = tuple(check for check in checks.THOROUGH if check.name not in SLOW)
 

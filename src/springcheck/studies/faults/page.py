@@ -1,8 +1,10 @@
-"""Faults against checks in the report page."""
+"""Faults against checks, and how small a fault each check sees, in figures and in the report page."""
 
 from __future__ import annotations
 
-from springcheck.studies.charts import Bank, Chart, Scale, Tiles
+from collections.abc import Sequence
+
+from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles
 from springcheck.studies.faults.result import FaultReport, Result
 
 KINDS = (
@@ -32,7 +34,34 @@ def banks(found: FaultReport) -> list[Bank]:
             notes=[[_said(one, name) for name in checks] for one in results],
         ),
     )
-    return [Bank(title="Faults and checks", charts=[chart])]
+    return [
+        Bank(name="faults-checks", title="Faults and checks", charts=[chart]),
+        *([_limits(results)] if any(one.limits for one in results) else []),
+    ]
+
+
+def _limits(results: Sequence[Result]) -> Bank:
+    """A row a fault, a mark for each check that sees it, where it begins to."""
+    shown = [one for one in results if one.limits]
+    checks = dict.fromkeys(name for one in shown[::-1] for name in one.limits)
+    curves = [
+        Curve(
+            name=name,
+            group=name,
+            x=[one.limits[name] for one in shown if name in one.limits],
+            y=[float(j) for j, one in enumerate(shown) if name in one.limits],
+            line=False,
+            marks=True,
+        )
+        for name in checks
+    ]
+    chart = Chart(
+        title="How small a fault is seen: one spring, h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps.",
+        x=Scale(name="smallest relative size that the check rejects", log=True),
+        y=Scale(name="fault", names=[one.name for one in shown]),
+        curves=curves,
+    )
+    return Bank(name="faults", title="Checks", charts=[chart])
 
 
 def _kind(one: Result, check: str) -> int:

@@ -19,7 +19,7 @@ from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
 Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
-Where: TypeAlias = Literal["spring", "chain", "long spring"]
+Where: TypeAlias = Literal["spring", "chain", "long spring", "orbit"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +297,7 @@ def unpaired(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     def force(q: Reals, p: Reals) -> Reals:
         out = right(q, p)
         for term in scene.terms:
-            if term.is_potential:
+            if term.kind == "potential":
                 np.subtract.at(out, term.particles[-1], size * term.pull(q))
         return out
 

@@ -25,31 +25,19 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
     """The scheme's own step in double precision, with the scene's force or another."""
     pull = force or scene.system.force
     m, h = scene.m, scene.step
-    if scheme.stages and {kind for kind, _ in scheme.stages} <= {"kick", "drift"}:
-        stages = [(kind == "kick", float(schemes.number(c, np.float64)) * h) for kind, c in scheme.stages]
-
-        def split(i: int, q: Floats, p: Floats) -> State:
-            for kick, ch in stages:
-                if kick:
-                    p = np.asarray(p + ch * pull(q, p), np.float64)
-                else:
-                    q = q + ch * (p / m)
-            return q, p
-
-        return split
     stiff: Reals | Slope | None = None
-    if scheme.implicit:
+    if scheme.has("implicit"):
         constant = scene.system.hessian(scene.q).astype(np.float64)
         linear = scene.system.is_linear
         stiff = constant if linear else lambda q: (scene.system.hessian(q), True)
     parts = scene.system.parts
     rate = scene.system.friction_rates if scene.system.is_damped else None
 
-    def tableau(i: int, q: Floats, p: Floats) -> State:
+    def one(i: int, q: Floats, p: Floats) -> State:
         a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate)
         return np.asarray(a, np.float64), np.asarray(b, np.float64)
 
-    return tableau
+    return one
 
 
 def record(

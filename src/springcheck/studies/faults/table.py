@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.studies.faults import seeded
+from springcheck.studies.faults import seeded, space
 from springcheck.studies.faults.seeded import Fault
 
 STEP = ("step-defect", "propagator")
@@ -167,6 +167,52 @@ REPORTS = (
           ("grid",), seeded.reporting(seeded.given_up, again=False)),
 )  # fmt: skip
 
+SPACE = ("step-defect", "closed-form", "angular-momentum")
+
+AXES = (
+    Fault("stiff-y", "forces along y are too large",
+          SPACE, seeded.moving(space.stiffer("y")), size=1e-11,
+          scene="orbit"),
+    Fault("stiff-z-alone",
+          "forces along z are too large, along which nothing moves until the scene is turned",
+          ("orientation",), seeded.moving(space.stiffer("z")), size=1e-12),
+    Fault("heavy-y", "the mass along y is too large, as in a mass matrix that is not isotropic",
+          SPACE, seeded.moving(space.heavier("y")), size=1e-11,
+          scene="orbit"),
+    Fault("flat", "forces along z are left out",
+          SPACE, seeded.stepping(space.along("z", lambda f: 0 * f)),
+          scene="orbit"),
+    Fault("flat-turned", "forces along y are left out, along which nothing moves until the scene is turned",
+          ("orientation",), seeded.stepping(space.along("y", lambda f: 0 * f))),
+    Fault("mirrored-y", "the force along y has the wrong sign",
+          SPACE, seeded.stepping(space.along("y", lambda f: -f)),
+          scene="orbit"),
+    Fault("single-z", "forces along z in single precision",
+          ("step-defect", "closed-form"),
+          seeded.stepping(space.along("z", lambda f: f.astype(np.float32).astype(np.float64))),
+          scene="orbit"),
+    Fault("swapped-axes", "the force along y acts along z, and that along z along y",
+          SPACE, seeded.stepping(space.swapped_axes), scene="orbit"),
+    Fault("velocity-order", "the momenta are written in the order y, x, z",
+          ("start", "step-defect", "angular-momentum"), seeded.reporting(space.momenta_swapped),
+          scene="orbit"),
+    Fault("torque", "a force at right angles to the position turns the orbit",
+          ("step-defect", "angular-momentum"), seeded.stepping(space.torque), size=1e-11, scene="orbit"),
+    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame",
+          ("step-defect", "closed-form"), seeded.following(space.rotated), size=1e-12, scene="orbit"),
+    Fault("wrapped", "positions along y are wrapped into a box",
+          ("step-defect", "closed-form"), seeded.reporting(space.wrapped), scene="orbit"),
+    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves",
+          ("step-defect", "closed-form"), seeded.stepping(space.nearest_image), scene="orbit"),
+    Fault("late-z", "the momentum along z is that of half a step before",
+          ("step-defect", "closed-form"), seeded.reporting(space.late_z), scene="orbit"),
+    Fault("still-z", "the position along z is written as it was at the start",
+          SPACE, seeded.reporting(space.still_z), scene="orbit"),
+    Fault("planar-friction", "momenta along x and y lose a fraction at every step, along z they do not",
+          ("step-defect", "angular-momentum"), seeded.following(space.planar_friction), size=1e-12,
+          scene="orbit"),
+)  # fmt: skip
+
 ADAPTIVE = (
     Fault("deaf-to-tolerance", "an adaptive solver whose error does not follow its tolerance",
           ("convergence", "tolerance"),
@@ -175,4 +221,4 @@ ADAPTIVE = (
           ("tolerance",), seeded.adaptive(lambda tolerance, size: size * tolerance), size=1e6, scheme="bdf"),
 )  # fmt: skip
 
-FAULTS: tuple[Fault, ...] = PARAMETERS + FORCES + STEPS + ARITHMETIC + REPORTS + ADAPTIVE
+FAULTS: tuple[Fault, ...] = PARAMETERS + FORCES + STEPS + ARITHMETIC + REPORTS + AXES + ADAPTIVE

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from springcheck.studies import team
-from springcheck.studies.study import SCENE, Study, argument, store_arguments
+from springcheck.studies.arguments import SCENE, argument, store_arguments
+from springcheck.studies.study import Study
 
 STUDY = Study(
     name="precision",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from springcheck import schemes
-from springcheck.checks.steps import CONTRACTED
+from springcheck.checks.requires import CONTRACTED
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
@@ -185,7 +185,7 @@ def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None
 
     None for an adaptive solver, and without a closed form that rounds less than the engine.
     """
-    if not WIDE or not scheme.one_step or scheme.mixes or not scene.system.has_modes:
+    if not WIDE or not scheme.has("one-step") or scheme.has("mixes") or not scene.system.has_modes:
         return None
     modes = scene.system.modes
     if np.any((modes.w2 == 0) & (modes.pull != 0)):
@@ -195,7 +195,7 @@ def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None
     if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
         return None
     start = modes.about_centres(scene.q, scene.p)
-    symplectic = scheme.symplectic and not scene.system.is_damped
+    symplectic = scheme.has("symplectic") and not scene.system.is_damped
     return lambda steps: modes.from_centres(
         *schemes.propagate(matrices, *start, steps, area_preserving=symplectic)
     )

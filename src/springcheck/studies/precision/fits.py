@@ -26,7 +26,7 @@ ABOVE_FLOOR = 100.0
 FITTED = 8
 """The finest points that a fit takes, where there are more: the steps span a factor of 128."""
 
-FEWEST = 4
+FEWEST_FITTED = 4
 """Points below which no order is claimed."""
 
 
@@ -64,7 +64,7 @@ def order(points: Sequence[Point]) -> Fit | None:
             else point.error >= ABOVE_FLOOR * point.rounding
         )
     ][-FITTED:]
-    if len(chosen) < FEWEST:
+    if len(chosen) < FEWEST_FITTED:
         return None
     found = line(np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen]))
     return Fit(
@@ -109,7 +109,7 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     their own eps, whatever the step.
     """
     scheme = schemes.scheme(method.scheme)
-    if not scheme.one_step or angle <= 0:
+    if not scheme.has("one-step") or angle <= 0:
         return None
     eps = 2 * max(arithmetic.state, 2.0**-53)
     if arithmetic.parameters == "single" and arithmetic.force < 2.0**-24:
@@ -119,7 +119,7 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     if method.rebuilds_velocity:
         why = "each step rounds the position, and the velocity is rebuilt from it over h"
         return Condition(name="N**1.5/(w T)", why=why, eps=eps, angle=angle)
-    if scheme.implicit:
+    if scheme.has("implicit"):
         why = "one rounded divisor is used in every step"
         return Condition(name="N", why=why, eps=eps, angle=angle)
     why = "each step rounds the state once, up or down: a random walk"

@@ -30,6 +30,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import fits
@@ -46,7 +47,6 @@ from springcheck.studies.precision.sweeps import (
     to_time,
 )
 from springcheck.studies.precision.timing import Clock, take_turns, tick
-from springcheck.studies.study import Progress
 from springcheck.text.wording import count
 
 BUDGET = 75.0
@@ -93,7 +93,10 @@ def study(
             kept.progress(min(perf_counter() - began, budget), budget, what)
 
     while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
+        now = perf_counter()
         _level(ready, known, tell, ahead)
+        if perf_counter() < now:
+            raise SpringcheckError("the clock of this machine runs backwards: nothing can be timed by it")
         for sweep in ready:
             form = points_of(scene)
             kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)

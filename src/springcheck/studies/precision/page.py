@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.looks import scheme_of
-from springcheck.studies.charts import Bank, Chart, Curve, Scale
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.text.wording import seconds

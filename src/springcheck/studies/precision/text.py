@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
-from springcheck.text.lines import Lines, Row, Table, plain, table
+from springcheck.text.lines import Lines, Row, TextTable, plain, table
 from springcheck.text.wording import count, duration, seconds
 
 
@@ -51,7 +51,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     return out
 
 
-def _methods(methods: Sequence[MethodSummary]) -> Table:
+def _methods(methods: Sequence[MethodSummary]) -> TextTable:
     rows = [
         (
             m.method,
@@ -65,7 +65,7 @@ def _methods(methods: Sequence[MethodSummary]) -> Table:
     return table(("method", "order", "floor", "/eps*cond", "step", "step, read", "start"), rows)
 
 
-def _cheapest(answers: Sequence[Answer]) -> Table:
+def _cheapest(answers: Sequence[Answer]) -> TextTable:
     rows = [
         (f"{answer.target:.0e}", "none reaches it")
         if answer.point is None
@@ -88,7 +88,7 @@ def _where(point: Point) -> str:
     return "-" if point.step is None else f"step {point.step:.3g}"
 
 
-def _points(points: Sequence[Point]) -> Table:
+def _points(points: Sequence[Point]) -> TextTable:
     rows: list[Row] = []
     for point in points:
         where, found = _where(point).replace("tolerance ", "tol "), point.accuracy

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from springcheck.studies import team
+from springcheck.studies.arguments import SCENE, argument, repeatable, store_arguments
 from springcheck.studies.ensemble import VARY
-from springcheck.studies.study import SCENE, Study, argument, repeatable, store_arguments
+from springcheck.studies.study import Study
 
 _SCENE = argument(*SCENE[0], **SCENE[1], nargs="?")
 
 STUDY = Study(
     name="run",
-    about="run a scene by every method, compare, store, judge",
+    about="run a scene by its default methods or all, compare, store, judge",
     arguments=(
         _SCENE,
         *store_arguments(),
+        argument("--all", action="store_true", help="by every method, not the default ones alone"),
         argument("--step", type=float, metavar="H", help="another step than the scene's"),
+        argument("--temperature", metavar="T", help="a heat bath: kelvin, or kT where units are reduced"),
+        argument("--friction", type=float, metavar="G", help="its friction rate (default 0.1/step)"),
         argument("--steps", type=int, metavar="N", help="another number of steps"),
         repeatable(
             "--set", "FIELD=NUMBER", "another number in a field of the scene file, as spring.0.stiffness=2"

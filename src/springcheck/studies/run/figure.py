@@ -3,14 +3,14 @@ of a chain also its modes and its wave."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from matplotlib.figure import Figure
 
 from springcheck.figures import chain, energies, portraits
 from springcheck.figures.motion import Exact, true_motion
 from springcheck.figures.overlay import Runs
-from springcheck.figures.views import views
+from springcheck.figures.views import paths, views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import Stored
@@ -19,7 +19,8 @@ from springcheck.studies.run.result import Stored
 def pictures(found: Stored, *, particle: int | None = None) -> dict[str, Figure]:
     """The figures of the trajectories of a store, or of the motion of one particle, by name."""
     shown = found.drawable
-    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle)
+    failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
+    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed)
 
 
 def of_runs(
@@ -28,15 +29,17 @@ def of_runs(
     followed: Mapping[str, Trajectory],
     *,
     particle: int | None = None,
+    failed: Collection[str] = (),
 ) -> dict[str, Figure]:
     """The figures by name, none where no run has more than its start.
 
     `followed`: the parts of the runs in which the motion itself is shown; `particle`: this one's motion
-    alone.  SpringcheckError where there is no such particle.
+    alone; `failed`: labels of runs that some verdict rejects, drawn in red.  SpringcheckError where
+    there is no such particle.
     """
     if not any(len(run.t) > 1 for run in runs.values()):
         return {}
-    usable, parts = Runs(scene, runs), Runs(scene, followed)
+    usable, parts = Runs(scene, runs, failed), Runs(scene, followed, failed)
     exact = Exact(scene)
     shown = views(scene, particle)
     truth = true_motion(scene, parts.every)
@@ -45,6 +48,8 @@ def of_runs(
         f"phase-portrait{ending}": portraits.phase_portraits(parts, shown, truth),
         f"position{ending}": portraits.positions(parts, shown, truth),
     }
+    if particle is None and (planes := paths(scene)):
+        out["path"] = portraits.phase_portraits(parts, planes, truth, what="path")
     if particle is None:
         out["energy"] = energies.energy(usable, exact)
         if exact.known:

@@ -17,14 +17,14 @@ from springcheck import checks, engines, interrupts, simulate
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import exact, memory, scenefile
-from springcheck.physics.arrays import Floats
+from springcheck.physics import memory, scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
+from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
-from springcheck.studies.choose import LeftOut, choose
-from springcheck.studies.run.result import FAULT, MethodRun, Repeat, Repeats, Report, Stored
-from springcheck.studies.study import Progress
+from springcheck.studies.arguments import Progress
+from springcheck.studies.choose import LeftOut, choose, others
+from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
+from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -38,11 +38,16 @@ PIECE = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
 
 MOST_PIECES = 16
-"""Pieces of a long run that are judged: the first, the last, and some between at equal distances."""
+"""Pieces of a long run that are judged where a closed form tells what became of it between them: the first,
+the last, and some between at equal distances."""
+
+MOST_NUMBERS = 1 << 24
+"""Numbers per array of each run that are judged where none does: 17 s for many particles, which take 1 us a
+number, two minutes for a single one.  Of a longer run pieces are judged, and no pass is made of them."""
 
 LONG_PIECE = PIECE // 4
 """Numbers per array in each of them.  Judging takes 8 us a frame, a hundred times as long as making it: two
-seconds in all.  A slip between two pieces shows in the closed form of every piece after it, however short."""
+seconds in all."""
 
 
 def perform(options: Namespace, progress: Progress | None) -> Report | Repeats | Ensemble:
@@ -51,10 +56,8 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         raise SpringcheckError(
             "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
         )
-    if not options.vary and (
-        options.samples is not None or options.seed or options.workers > 1 or options.cluster
-    ):
-        raise SpringcheckError("--samples, --seed, --workers and --cluster go with --vary")
+    if not options.vary and (options.samples is not None or options.workers > 1 or options.cluster):
+        raise SpringcheckError("--samples, --workers and --cluster go with --vary")
     if options.vary and (options.source is not None or options.thorough or options.verdicts):
         raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
     changes = bool(options.set) or options.step is not None or options.steps is not None
@@ -66,20 +69,23 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    if changes:
+    if changes or options.temperature is not None or options.friction is not None:
         from springcheck.studies.run.changes import changed
 
         scene = changed(options)
     else:
         scene = scenefile.load_scene(options.scene)
+    if options.seed is not None and not scene.bath:
+        raise SpringcheckError("--seed goes with --vary, or with a scene that has a bath: --temperature")
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
-        methods=options.method,
+        methods=["*"] if options.all else options.method,
         force=options.force,
         thorough=options.thorough,
         faults=options.fault,
         progress=progress,
+        seed=options.seed,
     )
 
 
@@ -100,16 +106,19 @@ def run(
     thorough: bool = False,
     faults: Sequence[str] = (),
     progress: Progress | None = None,
+    seed: int | None = None,
 ) -> Report:
     """Run, compare, store, judge.  Work that an interrupted call has stored is reused.
 
     `thorough` adds the experiments, whose runs are made on the side and not stored; `faults` engines broken
-    on purpose, as NAME or NAME=SIZE.
+    on purpose, as NAME or NAME=SIZE; `seed` is that of the random methods, drawn where it is left out.
 
     Raises SpringcheckError for everything that a user can mend; what is finished then stays in the
-    journal, and an existing file stays as it was.
+    journal, and an existing file stays as it was.  So it does where a method that was asked for fails beside
+    others: their report has it under `broke`.
     """
     path = Path(path)
+    seeds = {"seed": simulate.checked_seed(seed)} if scene.bath else {}
     labels, left = choose(scene, methods)
     wrong: list[Broken] = []
     if faults:
@@ -121,8 +130,15 @@ def run(
         f"scene {scene.name}: judging {scene.n} particles by {len(labels)} methods would",
         "fewer particles, or one --method at a time, take less",
     )
+    broke: dict[str, str] = {}
     bar = _Bar(progress, len(labels) * (1 + thorough))
-    command = keeper.command("run", labels, scene.digest, *(f"{x.label}, {x.about}" for x in wrong))
+    command = keeper.command(
+        "run",
+        labels,
+        scene.digest,
+        *(f"{x.label}, {x.about}" for x in wrong),
+        *(() if seed is None else (f"seed {seed}",)),
+    )
     with keeper.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
         keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))
@@ -132,14 +148,17 @@ def run(
             try:
                 with journal.draft(str(label), scene) as draft:
                     told = bar.of(label, scene.steps)
-                    made = simulate.play(scene, label, draft.append, progress=told)
+                    made = simulate.play(scene, label, draft.append, progress=told, **seeds)
                     draft.finish(keeper.attributes(made))
             except MethodError as error:
                 # what only shows as an engine starts; a method that was asked for by name must not go missing
-                if str(label) in methods or len(labels) == 1:
+                if len(labels) == 1:
                     raise
                 labels.remove(label)
-                left.append(LeftOut(method=str(label), reason=str(error)))
+                if str(label) in methods:
+                    broke[str(label)] = str(error)
+                else:
+                    left.append(LeftOut(method=str(label), reason=str(error)))
         for one in wrong:
             if one.label not in resumed:
                 with journal.draft(one.label, scene) as draft:
@@ -147,9 +166,18 @@ def run(
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
-        report = replace(report, faults={one.label: one.about for one in wrong})
-        if thorough:
+        rest = () if methods else others(scene, labels)
+        report = replace(report, faults={one.label: one.about for one in wrong}, others=rest)
+        if thorough and scene.bath:
+            for label in labels:
+                more = checks.judge_seeds(scene, str(label), seeds["seed"])
+                report = replace(report, verdicts=(*report.verdicts, *more))
+        elif thorough:
             report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
+        report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
+        if broke:
+            journal.fail()
+            return replace(report, broke=broke)
         journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
     return report
 
@@ -194,14 +222,10 @@ def judge(
     resumed: Sequence[str] = (),
 ) -> Report:
     """The report on stored trajectories, read in pieces of bounded size."""
-    rows = max(2, PIECE // scene.n)
-    if scene.frames - 1 > MOST_PIECES * rows:
-        rows = max(2, LONG_PIECE // scene.n)
-    pieces_in_all = -(-(scene.frames - 1) // rows)
-    stride = max(1, -(-pieces_in_all // MOST_PIECES))
+    rows, stride = _pieces(scene, sources)
     judged_frames = 0
     verdicts: dict[str, list[list[Verdict]]] = {name: [] for name in sources}
-    tallies = {name: _Tally(scene) for name in sources}
+    tallies = {name: Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last: dict[str, Trajectory] = {}
     failed: dict[str, Trajectory] = {}
@@ -221,10 +245,18 @@ def judge(
             nothing = np.full_like(parts[-1].max_difference, np.nan)
             parts.append(replace(parts[-1], max_difference=nothing))
     comparison = compare.merge(parts)
-    runs = tuple(_line(last[name], tallies[name]) for name in sources)
+    runs = tuple(line(last[name], tallies[name]) for name in sources)
     worst = {name: checks.worst(verdicts[name]) for name in sources}
+    if stride > 1:
+        worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
+    if scene.bath:
+        # what states show is said of deterministic motion
+        failed = {}
+    if failed:
+        from springcheck.identify import files
+
     for name, piece in failed.items():
-        worst[name] = _explained(scene, piece, worst[name])
+        worst[name] = checks.explained(scene, piece, worst[name], files.shown)
     return Report(
         scene=scene,
         path=path,
@@ -232,31 +264,49 @@ def judge(
         left_out=tuple(left),
         verdicts=tuple(v for name in sources for v in worst[name]),
         comparison=comparison,
-        same=tuple(compare.same_motions(scene, last, comparison)),
-        judged_frames=min(judged_frames, scene.frames),
+        same=() if scene.bath else tuple(compare.same_motions(scene, last, comparison)),
+        temperatures=() if not scene.bath else tuple(tallies[name].heat.line(name) for name in sources),
+        judged_frames=min(judged_frames, scene.frames) if stride > 1 else scene.frames,
         resumed=tuple(name for name in resumed if name in sources),
     )
 
 
+def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
+    """Frames of a piece of the stored runs, and of how many pieces one is judged."""
+    rows = max(2, PIECE // scene.n)
+    if scene.frames - 1 <= MOST_PIECES * rows:
+        return rows, 1
+    first = (next(keeper.windows(source, name, rows)) for name, source in sources.items())
+    # draws are judged in each piece by itself
+    bridged = scene.bath is not None or all(
+        checks.bridges(checks.Case(trajectory=one, scene=scene)) for one in first
+    )
+    if not bridged and scene.frames * scene.n <= MOST_NUMBERS:
+        return rows, 1
+    rows = max(2, LONG_PIECE // scene.n)
+    return rows, max(1, -(-(scene.frames - 1) // (rows * MOST_PIECES)))
+
+
+def _bridged(worst: Sequence[Verdict], pieces: Sequence[Sequence[Verdict]], frames: int) -> list[Verdict]:
+    """The verdicts on a run of which so many frames were judged: none passes on its motion unless the closed
+    form did so in every piece, and so tells what happened between them."""
+    closed = [v for piece in pieces for v in piece if v.check == checks.closed_form.name]
+    if all(v.passed is not None for v in closed):
+        return list(worst)
+    why = (
+        f"pieces of {frames} frames in all were looked at, and no closed form tells what happened between "
+        "them: fewer steps, or a larger record.every"
+    )
+    return [
+        replace(v, passed=None, value=np.nan, bound=np.nan, unit="", why=why, sees=NOT_KNOWN)
+        if v.passed and v.check in checks.TELLING
+        else v
+        for v in worst
+    ]
+
+
 def _tells(verdict: Verdict) -> bool:
     return verdict.passed is False and verdict.check in checks.TELLING
-
-
-def _explained(scene: Scene, piece: Trajectory, verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The verdicts on a method, the first that failed with what the states of its first bad piece are."""
-    first = next(v for v in verdicts if _tells(v))
-    if not scene.system.is_linear:
-        # the sentences are about springs
-        return list(verdicts)
-    from springcheck.identify import files
-
-    springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= files.MOST_OSCILLATORS else None
-    alone = springs is not None and not np.any(springs - np.diag(np.diag(springs)))
-    about = checks.first_off(checks.Case(trajectory=piece, scene=scene)) or 0
-    stiffness = np.diag(springs) if springs is not None and alone else None
-    said = files.sentence(piece, scene.m, stiffness, about=about)
-    why = f"{first.why}. What the states show: {said}" if said else first.why
-    return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
 def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str, Trajectory]]:
@@ -268,54 +318,6 @@ def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str,
         if not pieces:
             return
         yield pieces
-
-
-class _Tally:
-    """Error and energy over all pieces of a trajectory."""
-
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._norm = scene.system.norm
-        self._known = exact.has_true_motion(scene)
-        self._start = float(scene.system.energy(scene.q, scene.p))
-        self.error = 0.0 if self._known else np.nan
-        self.drift = 0.0
-
-    def add(self, piece: Trajectory) -> None:
-        """Take a piece into account."""
-        scene, right = self._scene, np.asarray(self._start)
-        if self._known:
-            steps = checks.Case(trajectory=piece, scene=scene).steps
-            q, p = exact.true_motion(scene, steps, piece.step)
-            if scene.system.is_damped:
-                right = np.asarray(scene.system.energy(q, p), np.float64)
-            # not max(), which leaves out what is no number
-            here = np.max(self._norm(piece.q - q, piece.p - p))
-            # nothing below what is known of the exact solution is reported as an error
-            known = exact.uncertainty(scene, float(steps[-1]) * piece.step)
-            self.error = float(np.maximum(np.maximum(self.error, here), known))
-        with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - right
-        worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
-        if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
-            self.drift = worst
-
-
-def _line(piece: Trajectory, tally: _Tally) -> MethodRun:
-    # a run that left no frame but the start has no error: that of the start is nothing
-    ended = piece.outcome.status != "complete" and piece.outcome.step == 0
-    return MethodRun(
-        method=piece.label,
-        scheme=piece.scheme,
-        outcome=piece.outcome.status,
-        steps=piece.outcome.step,
-        message=piece.outcome.message,
-        max_error=np.nan if ended else tally.error,
-        energy_drift=np.nan if ended else tally.drift,
-        start_seconds=piece.timing.start,
-        run_seconds=piece.timing.run,
-        force_calls=piece.force_calls,
-    )
 
 
 def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None = None) -> list[Repeat]:
@@ -351,7 +353,9 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 quantities = ("q", "p", "energy") if "energy" in known[name].quantities else ("q", "p")
                 mine = replace(scene, quantities=quantities)
                 with journal.draft(name, mine) as draft:
-                    record = simulate.play(mine, label, draft.append, progress=bar.of(label, scene.steps))
+                    told = bar.of(label, scene.steps)
+                    seed = int(str(before["origin.seed"])) if scene.bath else None
+                    record = simulate.play(mine, label, draft.append, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
                 source = journal.sources()[name]
                 found.append(

@@ -14,7 +14,6 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
-from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable
@@ -35,12 +34,29 @@ class MethodRun:
     message: str
     max_error: float
     """Largest distance from the exact solution (`Norm`); NaN where that is not known."""
+    error_below: bool
+    """Whether the error is only known to be below `max_error`: the exact solution is no better known."""
     energy_drift: float
     """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0.  With friction
     H - H of the exact solution in the place of H - H0, where that is known."""
     start_seconds: float
     run_seconds: float
     force_calls: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heated:
+    """Temperatures of a run over that of its bath: measured, with standard errors, and as its scheme has
+    them exactly; NaN where there is no law."""
+
+    method: str
+    scheme: str
+    configurational: float
+    configurational_error: float
+    configurational_law: float
+    kinetic: float
+    kinetic_error: float
+    kinetic_law: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +72,13 @@ class Report:
     same: tuple[Same, ...]
     judged_frames: int
     """Frames of each run that were judged: all of them, unless the run is very long."""
+    temperatures: tuple[Heated, ...] = ()
+    """Of every run in a bath: its temperatures, and those of its scheme."""
     resumed: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+    """Methods that could have served the scene and were not among those that run by default."""
+    broke: Mapping[str, str] = field(default_factory=dict)
+    """Methods that were asked for and failed, and why: then nothing is stored."""
     faults: Mapping[str, str] = field(default_factory=dict)
     """What is wrong with each run of an engine that is broken on purpose."""
 
@@ -67,15 +89,12 @@ class Report:
     @property
     def counts(self) -> str:
         """How many verdicts passed and failed, in words."""
-        passed = sum(verdict.passed is True for verdict in self.verdicts)
-        failed = sum(verdict.passed is False for verdict in self.verdicts)
-        rest = len(self.verdicts) - passed - failed
-        return f"{count(passed, 'verdict')} passed, {failed} failed, {rest} not applicable"
+        return checks.summary(self.verdicts)
 
     @property
     def status(self) -> Literal[0, 1, 2]:
-        """Exit status of these verdicts."""
-        return checks.status(self.verdicts)
+        """Exit status of these verdicts; 2 where a method that was asked for failed."""
+        return 2 if self.broke else checks.status(self.verdicts)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
@@ -95,6 +114,9 @@ class Report:
             comparison=self.comparison,
             same_motion=self.same,
             faults=dict(self.faults),
+            broke=dict(self.broke),
+            others=self.others,
+            **({"temperatures": self.temperatures} if self.temperatures else {}),
         )
 
 

@@ -17,7 +17,7 @@ from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
-from springcheck.text.lines import Lines, Row, Table, plain, table
+from springcheck.text.lines import Lines, Row, TextTable, plain, table
 from springcheck.text.wording import count, seconds
 
 
@@ -42,14 +42,18 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
     return out
 
 
+BELOW = "the exact solution is known no better than this, and the run is no further from it"
+
+
 def _report(report: Report) -> Lines:
     """The whole report of `springcheck run`."""
     scene = report.scene
-    size = "" if scene.n == 1 else f", {scene.n} particles"
+    size = "" if scene.n == 1 else f", {scene.size}"
     head = f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}"
     out: Lines = [plain(head, "bold"), plain(), _runs(report.runs)]
     out += [
         plain("error: largest distance from the exact solution, over the initial energy norm", "dim"),
+        *[plain(f"<: {BELOW}", "dim") for run in report.runs[:1] if any(x.error_below for x in report.runs)],
         plain(f"energy: {_energy(report.scene)}", "dim"),
     ]
     out += [
@@ -58,16 +62,41 @@ def _report(report: Report) -> Lines:
         if run.outcome != "complete" or run.message
     ]
     out += _same_motions(report)
+    out += _temperatures(report)
     out += _fractions(report.verdicts, "Is the engine right?  ")
     out += failures(v for v in report.verdicts if v.method not in report.faults)
     out += _faults(report)
-    out += unjudged(report.verdicts)
+    out += _beyond(report)
     out += left_out(report.left_out)
+    if report.others:
+        names = ", ".join(report.others)
+        out.append(plain(f"Left out {names}: not among the default methods; --all runs every one"))
     if report.judged_frames < report.scene.frames:
         share = f"{report.judged_frames} of {report.scene.frames} frames"
-        out.append(plain(f"Judged on {share}: pieces at equal distances, the first and the last"))
-    out += [plain(), *_summary(report)]
+        out.append(
+            plain(
+                f"Judged on {share}: pieces at equal distances, the first and the last; error, energy and "
+                "same motion are of these"
+            )
+        )
+    out += [plain(), *unjudged(report.verdicts), *_summary(report)]
     return out
+
+
+def _beyond(report: Report) -> Lines:
+    """The methods for which the step is too long: their motion grows without bound, whoever runs them."""
+    from springcheck.studies.stability.longest import too_long
+
+    out: Lines = []
+    for scheme in dict.fromkeys(run.scheme for run in report.runs):
+        limit = too_long(scheme, report.scene)
+        if limit is not None:
+            names = ", ".join(run.method for run in report.runs if run.scheme == scheme)
+            said = (
+                f"h = {report.scene.step:g} is beyond the limit of {schemes.title(scheme)} here, {limit:.4g}"
+            )
+            out.append(plain(f"{said}: {names}", "bold yellow"))
+    return [plain(), *out] if out else []
 
 
 def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
@@ -81,7 +110,7 @@ def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
     ]
 
 
-def _runs(runs: Sequence[MethodRun]) -> Table:
+def _runs(runs: Sequence[MethodRun]) -> TextTable:
     """One line a method, under the scheme that it runs."""
     rows: list[Row] = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
@@ -89,7 +118,7 @@ def _runs(runs: Sequence[MethodRun]) -> Table:
         rows += [
             (
                 f"  {run.method}",
-                _error(run.max_error),
+                f"{'<' if run.error_below else ''}{_error(run.max_error)}",
                 f"{run.energy_drift:+.1e}",
                 seconds(run.start_seconds),
                 seconds(run.run_seconds),
@@ -122,13 +151,46 @@ def _same_motions(report: Report) -> Lines:
     """Which trajectories are one motion, and how closely."""
     if not report.same:
         return []
-    out: Lines = [plain(), plain("The same motion, to rounding or tolerance:")]
+    out: Lines = []
+    titles = {"rounding": "The same motion, to rounding:", "tolerance": "As near as a tolerance allows:"}
     for same in report.same:
+        title = plain(titles[same.within])
+        out += [] if title in out else [plain(), title]
         names = " = ".join("exact solution" if label == "exact" else label for label in same.labels)
         out.append(plain(f"  {names}"))
-        far = f"differ by at most {same.difference:.1e} (rounding or tolerance allow {same.allowed:.1e})"
+        far = f"differ by at most {same.difference:.1e} ({same.within} allows {same.allowed:.1e})"
         out.append(plain(f"    {far if same.difference else 'equal bit for bit'}"))
     return out
+
+
+def _temperatures(report: Report) -> Lines:
+    """The temperatures of runs in a bath, each beside what its scheme has exactly."""
+    if not report.temperatures:
+        return []
+    rows: list[Row] = [
+        (
+            one.method,
+            _law(one.configurational_law), _measured(one.configurational, one.configurational_error),
+            _law(one.kinetic_law), _measured(one.kinetic, one.kinetic_error),
+        )
+        for one in report.temperatures
+    ]  # fmt: skip
+    titles = ("method", "configurational", "measured", "kinetic", "measured ")
+    return [
+        plain(),
+        plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
+        table(titles, rows, left=("method",)),
+    ]
+
+
+def _law(x: float) -> str:
+    return "-" if np.isnan(x) else f"{x:.6f}"
+
+
+def _measured(x: float, error: float) -> str:
+    if np.isnan(x):
+        return "-"
+    return f"{x:.4f}" if np.isnan(error) else f"{x:.4f} +- {error:.4f}"
 
 
 def ratio(verdict: Verdict) -> float:
@@ -141,7 +203,8 @@ def ratio(verdict: Verdict) -> float:
 def matrices(verdicts: Sequence[Verdict]) -> Lines:
     """The checks of the recorded states, and below them the experiments where there are any."""
     tried = {check.name for check in checks.THOROUGH}
-    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], _names("motion"))]
+    short = _names("motion") | {one.name: one.short for one in checks.RANDOM if one.family == "noise"}
+    out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], short)]
     for title, short, exact in (("steps", _names("map"), _names("repeat")), ("laws", _names("law"), {})):
         mine = [v for v in verdicts if v.check in short or v.check in exact]
         if any(v.passed is not None for v in mine):
@@ -154,7 +217,7 @@ def _names(family: str) -> dict[str, str]:
     return {check.name: check.short for check in checks.ALL if check.family == family}
 
 
-def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> Table:
+def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> TextTable:
     """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
     named = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
     shown = [c for c in named if any(v.check == c and v.passed is not None for v in verdicts)]
@@ -214,8 +277,12 @@ def _faults(report: Report) -> Lines:
 
 
 def unjudged(verdicts: Sequence[Verdict]) -> Lines:
-    """Every method of whose scheme no check could tell, and why the checks could not."""
+    """Every method of whose scheme no check could tell, and why the checks could not; and of the others what
+    could not be judged in them."""
     out: Lines = []
+    for v in verdicts:
+        said = [part for part in v.why.split("; ") if part.endswith(checks.BLIND)] if v.passed else []
+        out += [plain(f"{v.method}: {part}", "bold yellow") for part in said]
     for method in checks.not_judged(verdicts):
         why = dict.fromkeys(
             v.why for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING
@@ -233,7 +300,7 @@ def verdict_line(v: Verdict) -> str:
     return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.reason}"
 
 
-def verdicts_table(verdicts: Iterable[Verdict]) -> Table:
+def verdicts_table(verdicts: Iterable[Verdict]) -> TextTable:
     """Every verdict in full."""
     words = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}
     titles = ("method", "check", "verdict", "value, bound, ratio, why")
@@ -260,14 +327,30 @@ def _summary(report: Report) -> Lines:
     taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
     name = shlex.quote(str(report.path))
     look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
+    if report.broke:
+        # why stands in the message
+        names = " and ".join(report.broke)
+        return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
     return [
+        *([] if failed else _not_covered(report.scene)),
         plain(f"{report.counts}{taken}", look),
         plain(f"Stored in {report.path}", look),
         plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"),
     ]
 
 
-def _comparison(comparison: Comparison) -> Table:
+def _not_covered(scene: Scene) -> Lines:
+    """What an engine that passes here may still have wrong, because this scene does not exercise it."""
+    if scene.kind != "particles":
+        return []
+    missing = [axis for axis in "xyz" if axis not in scene.axes]
+    left = [f"motion along {' and '.join(missing)}"] if missing else []
+    left += ["periodic boxes", "constraints"]
+    left += [] if scene.system.is_damped or scene.bath else ["friction"]
+    return [plain(f"Not exercised here: {', '.join(left)}", "dim")]
+
+
+def _comparison(comparison: Comparison) -> TextTable:
     rows = [
         (f"{i} {label}", *(_short(x) for x in comparison.max_difference[i, : i + 1]))
         for i, label in enumerate(comparison.labels)

@@ -88,7 +88,7 @@ def step_for(found: Scene, label: Label) -> float:
     if np.isfinite(scheme.limit):
         fastest = float(np.sqrt(np.max(found.system.modes.w2)))
         held = min(held, (scheme.limit / 2 or 0.1) / fastest)
-        if not schemes.FRICTION & {kind for kind, _ in scheme.stages} and found.system.is_damped:
+        if not any(kind.friction for kind in scheme.kinds) and found.system.is_damped:
             # friction in the force of an explicit method: h c/m < 2
             held = min(held, 0.5 / float(np.max(found.system.friction_rates)))
     return held

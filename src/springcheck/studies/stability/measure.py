@@ -20,11 +20,12 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import costs, limits, propagators, regions, resonance
-from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability, fastest
-from springcheck.studies.study import Progress
+from springcheck.studies.stability.longest import fastest
+from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability
 from springcheck.studies.tables import Form
 
 
@@ -44,7 +45,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         absent = engines.absence(label.engine)
         if absent or propagators.has_one_step(label):
             return absent or propagators.absence(label)
-        adaptive = not scheme(engines.method(label).scheme).one_step
+        adaptive = not scheme(engines.method(label).scheme).has("one-step")
         return "it has no fixed step and no limit" if adaptive else "it moves no springs"
 
     usable, left_out = sorted_out(chosen, why)

@@ -1,4 +1,4 @@
-"""Limits, regions, resonances and costs in the report page."""
+"""Charts of limits, regions, resonances and costs, in figures and in the report page."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
-from springcheck.studies.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.stability.result import Stability
@@ -23,19 +24,44 @@ def banks(study: Stability) -> list[Bank]:
     """What was measured."""
     found = []
     if study.limits:
-        found.append(Bank(title="Schemes (lines) and methods (marks)", charts=[_limits(study.limits)]))
+        chart = _limits(study.limits, abs(study.scene.step) * fastest(study.scene))
+        found.append(
+            Bank(
+                name="stability-limits",
+                title="Schemes (lines) and methods (marks)",
+                heading="Stable where the spectral radius of one step is at most 1",
+                charts=[chart],
+            )
+        )
     if study.regions:
-        charts = [_region(x) for x in study.regions]
-        found.append(Bank(title="Damped springs: where a method is stable", charts=charts))
+        of = f"{study.regions[0].points:,} points each"
+        wrong = sum(x.wrong for x in study.regions)
+        found.append(
+            Bank(
+                name="stability-regions",
+                title="Damped springs: where a method is stable",
+                heading=f"Damped springs, {of}: {wrong} against theory.  The line is critical damping",
+                charts=[_region(x) for x in study.regions],
+            )
+        )
     if study.resonances:
         charts = [_resonance(x) for x in study.resonances]
-        found.append(Bank(title="Multiple time steps: where they resonate", charts=charts))
+        found.append(
+            Bank(name="stability-resonances", title="Multiple time steps: where they resonate", charts=charts)
+        )
     if study.costs:
-        found.append(Bank(title="Methods drawn", charts=_costs(study.costs)))
+        found.append(
+            Bank(
+                name=f"stability-costs-{study.scene.name}",
+                title="Methods drawn",
+                heading=f"{study.scene.name}: what stiffness costs (hollow: estimates of runs too long)",
+                charts=_costs(study.costs),
+            )
+        )
     return found
 
 
-def _limits(limits: Sequence[Limit]) -> Chart:
+def _limits(limits: Sequence[Limit], here: float) -> Chart:
     theories: dict[str, Curve] = {}
     measured = []
     for x in limits:
@@ -54,7 +80,11 @@ def _limits(limits: Sequence[Limit]) -> Chart:
         x=Scale(name=TURN, log=True),
         y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
         curves=[*theories.values(), *measured],
-        rules=[Rule(axis="y", at=1.0, look="one"), *(Rule(axis="x", at=x, name=f"{x:.4g}") for x in edges)],
+        rules=[
+            Rule(axis="y", at=1.0, look="one"),
+            *(Rule(axis="x", at=x, name=f"{x:.4g}") for x in edges),
+            *([Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here")] if here > 0.05 else []),
+        ],
     )
 
 
@@ -68,11 +98,15 @@ KINDS = (
 
 def _region(x: Region) -> Chart:
     kinds = np.where(x.stable, np.where(x.stable_predicted, 0, 2), np.where(x.stable_predicted, 3, 1))
+    critical = float(np.interp(0.0, np.log(x.damping_ratio), np.arange(len(x.damping_ratio))))
     return Chart(
         title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",
         x=Scale(name=TURN, values=x.h_w.tolist()),
         y=Scale(name="damping ratio, c / 2\N{SQUARE ROOT}(k m)", values=x.damping_ratio.tolist()),
         tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
+        # by the number of its row: critical damping
+        rules=[Rule(axis="y", at=critical, look="one")],
+        short=f"{x.method}: {x.wrong} against theory",
     )
 
 
@@ -88,6 +122,7 @@ def _resonance(x: Resonance) -> Chart:
             Curve(name=x.method, group=group, x=x.h_w, y=x.radius - 1, line=False, marks=True),
         ],
         rules=[Rule(axis="x", at=float(np.pi), name="\N{GREEK SMALL LETTER PI}")],
+        short=f"{x.method} grows from {bands}",
     )
 
 
@@ -105,7 +140,17 @@ def _costs(costs: Sequence[Cost]) -> list[Chart]:
             mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0 and shown(x)]
             x, y = [x.ratio for x in mine], [float(getattr(x, name)) for x in mine]
             notes = [x.outcome for x in mine]
-            curves.append(Curve(name=method, group=scheme_of(method), x=x, y=y, marks=True, notes=notes))
+            left = [x.outcome != "complete" for x in mine]
+            curves.append(
+                Curve(
+                    name=method, group=scheme_of(method), x=x, y=y, marks=True, notes=notes,
+                    open=left,
+                )
+            )  # fmt: skip
         scales = Scale(name=ratio, log=True), Scale(name=title.partition(";")[0], log=True)
-        charts.append(Chart(title=f"What stiffness costs: {title}.", x=scales[0], y=scales[1], curves=curves))
+        charts.append(
+            Chart(
+                title=f"What stiffness costs: {title}.", short=title, x=scales[0], y=scales[1], curves=curves
+            )
+        )
     return charts

@@ -173,7 +173,7 @@ def bounded(matrices: Floats | Extended, rounding: float) -> np.ndarray:
 def has_one_step(label: Label) -> bool:
     """Whether a method has a one-step map and moves particles on springs."""
     method = engines.method(label)
-    return schemes.scheme(method.scheme).one_step and "wall-spring" in method.terms
+    return schemes.scheme(method.scheme).has("one-step") and "wall-spring" in method.terms
 
 
 def absence(label: Label) -> str | None:

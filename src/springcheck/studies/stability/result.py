@@ -8,17 +8,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.errors import SceneError
+from springcheck import engines, schemes
+from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.physics.system import MOST_DENSE
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
+from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
-from springcheck.studies.tables import Record, Rows
+from springcheck.studies.tables import RecordForm, Rows
 from springcheck.text.wording import count
 
 GROWTH = 1e-6
@@ -76,6 +77,19 @@ class Stability:
                 out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
         return out
 
+    def largest(self, found: Limit) -> float:
+        """The largest step of a method on this scene [T]: see `longest`.  NaN where it cannot serve it."""
+        try:
+            label = engines.parse(found.method)
+            scheme = schemes.scheme(engines.method(label).scheme)
+        except MethodError:
+            return np.nan
+        if engines.refusal(self.scene, label):
+            return np.nan
+        # of a method whose limit is not where theory puts it: as much less
+        wrong = 1.0 if found.agrees or not 0 < found.theory < np.inf else found.limit / found.theory
+        return wrong * longest(scheme, self.scene)
+
     @property
     def sentences(self) -> list[str]:
         """What was found beside the table of limits, in sentences."""
@@ -97,7 +111,7 @@ class Stability:
             passed=self.passed,
             fastest=fastest(self.scene),
             h_w=abs(self.scene.step) * fastest(self.scene),
-            methods=[_limit(limit) for limit in self.limits],
+            methods=[_limit(x) | {"largest_step": self.largest(x)} for x in self.limits],
             regions=[
                 {
                     "stable": np.count_nonzero(x.stable),
@@ -128,29 +142,6 @@ def _limit(x: Limit) -> dict[str, Any]:
     }
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def fastest(scene: Scene) -> float:
-    """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
-
-    That of small oscillations about the start; of more particles than a matrix is kept for the bound of
-    Gershgorin.  SceneError where forces overflow there.
-    """
-    system = scene.system
-    if system.has_modes:
-        largest = float(np.max(system.modes.w2))
-    elif system.is_separate:
-        largest = float(np.max(system.hessian_diagonal(scene.q) / scene.m))
-    elif scene.n <= MOST_DENSE:
-        root = np.sqrt(scene.m)
-        scaled = np.asarray(system.hessian(scene.q), np.float64) / root[:, None] / root
-        largest = float(np.linalg.eigvalsh(scaled)[-1])
-    else:
-        largest = float(np.max(system.gershgorin(scene.q) / scene.m))
-    if not np.isfinite(largest):
-        raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
-    return float(np.sqrt(max(largest, 0.0)))
-
-
 def growth_allowed(limit: Limit) -> float:
     """Relative difference allowed between measured and predicted growth above the limit.
 
@@ -167,7 +158,7 @@ def _apart(x: Resonance) -> float:
     return float(np.max(np.abs(a - b))) if a.shape == b.shape and a.size else float("nan")
 
 
-LIMITS: Record[Limit] = Record(
+LIMITS: RecordForm[Limit] = RecordForm(
     kind=Limit,
     beginning="stability/limits/",
     signal="radius",
@@ -175,7 +166,7 @@ LIMITS: Record[Limit] = Record(
     auxiliary=("radius_predicted",),
     log=("h_w", "radius"),
 )
-REGIONS: Record[Region] = Record(
+REGIONS: RecordForm[Region] = RecordForm(
     kind=Region,
     beginning="stability/regions/",
     signal="radius",
@@ -185,7 +176,7 @@ REGIONS: Record[Region] = Record(
     # H5Web draws every image on even axes
     extra=lambda x: {"log10_damping_ratio": np.log10(x.damping_ratio), "log10_h_w": np.log10(x.h_w)},
 )
-RESONANCES: Record[Resonance] = Record(
+RESONANCES: RecordForm[Resonance] = RecordForm(
     kind=Resonance,
     beginning="stability/resonances/",
     signal="radius",

@@ -6,7 +6,9 @@ from argparse import Namespace
 
 import numpy as np
 
-from springcheck.studies.stability.result import Stability, fastest
+from springcheck.physics.exact import has_true_motion
+from springcheck.studies.stability.longest import fastest
+from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 
@@ -33,7 +35,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
                 *places,
                 f"{off:.0e}",
                 *grown,
-                _largest_step(x.theory if x.agrees else x.limit, fastest(study.scene)),
+                _largest_step(study.largest(x)),
             )
             rows.append([plain(cell, style) for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
@@ -55,26 +57,34 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
 
 def _of_scene(study: Stability) -> Lines:
     """The scene's fastest motion, its step, and the methods for which that is too long."""
-    if not fastest(study.scene):
-        return [
-            plain("  nothing in this scene oscillates at its start: no step is too long for its stability")
-        ]
-    turn = abs(study.scene.step) * fastest(study.scene)
-    beyond = [x.method for x in study.limits if x.limit < turn]
-    said = f"its step h = {study.scene.step:g} makes h w = {turn:.4g}"
+    scene, w = study.scene, fastest(study.scene)
+    if not w and scene.system.is_linear and not scene.system.is_damped:
+        return [plain("  nothing in this scene oscillates: no step is too long for its stability")]
+    if not w and not scene.system.is_damped:
+        return [plain("  nothing in this scene oscillates at its start, which says nothing of where it goes")]
+    where = "" if scene.system.is_linear else ", where its motion is stiffest"
+    if where and not has_true_motion(scene):
+        where = ", at its start"
+    friction = ", without its friction" if scene.system.is_damped else ""
     out: Lines = [
         plain(
-            f"  fastest angular frequency of this scene, at its start: w = {fastest(study.scene):.6g}; {said}"
+            f"  fastest angular frequency of this scene{where}{friction}: w = {w:.6g}; "
+            f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
         )
     ]
+    beyond = [x.method for x in study.limits if study.largest(x) < abs(scene.step)]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
     elif study.limits:
         out.append(plain("  within the limit of every method measured here"))
+    if not scene.system.is_linear:
+        out.append(
+            plain("  limits of small oscillations there; an anharmonic motion may be lost below them", "dim")
+        )
     return out
 
 
-def _largest_step(limit: float, fastest: float) -> str:
-    if limit == 0:
-        return "none"
-    return "any" if np.isinf(limit) or not fastest else f"{limit / fastest:.4g}"
+def _largest_step(h: float) -> str:
+    if np.isnan(h):
+        return "-"
+    return "none" if h == 0 else "any" if np.isinf(h) else f"{h:.4g}"

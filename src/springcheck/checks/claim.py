@@ -1,0 +1,93 @@
+"""What is claimed of a trajectory: the scene and the scheme that made it, and the law that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.physics.arrays import Extended, Floats, Force, Reals
+from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
+from springcheck.physics.term import Term
+from springcheck.physics.trajectory import Trajectory
+from springcheck.schemes import Law
+from springcheck.schemes.stepping import Slope
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Claim:
+    """A trajectory, or a piece of it, and the scene that it is said to be of."""
+
+    trajectory: Trajectory
+    scene: Scene
+
+    @property
+    def label(self) -> str:
+        """The label of the method."""
+        return self.trajectory.label
+
+    @property
+    def scheme(self) -> schemes.Scheme:
+        """The scheme that the method claims to run."""
+        return schemes.scheme(self.trajectory.scheme)
+
+    @cached_property
+    def judged(self) -> Scene:
+        """The scene with its parameters as the engine's arithmetic keeps them."""
+        arithmetic = self.trajectory.arithmetic
+        scene = self.scene.system.in_single if arithmetic.parameters == "single" else self.scene
+        return scene.system.scaled(1 + arithmetic.excess) if arithmetic.excess else scene
+
+    @property
+    def system(self) -> System:
+        """What follows from that scene."""
+        return self.judged.system
+
+    @cached_property
+    def law(self) -> Law:
+        """What follows from the scheme on that scene."""
+        return Law(scheme=self.scheme, scene=self.judged, h=self.trajectory.step)
+
+    def step(
+        self,
+        q: Extended,
+        p: Extended,
+        *,
+        near: Extended | None = None,
+        forces: Callable[[Iterable[Term]], Force] | None = None,
+        met: list[Reals] | None = None,
+        slope: Slope | None = None,
+    ) -> tuple[Extended, Extended]:
+        """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
+
+        `slope` stands for the scene's own where the states are not positions.  `near` is where an engine
+        came to: of several solutions of an implicit step, the one there is the scheme's.
+        """
+        with np.errstate(all="ignore"):
+            a, b = self.law.step(q, p, near=near, forces=forces, met=met, slope=slope)
+        return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
+
+    @property
+    def placed(self) -> bool:
+        """Whether it matters for rounding at which positions a step evaluates the force."""
+        return not self.law.has("linear") or self.law.has("implicit")
+
+    @cached_property
+    def origins(self) -> Floats:
+        """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
+        have their rest lengths, or from the nearest place to which a term of its own ties a particle."""
+        rest = self.system.rest_positions
+        zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
+        for term in self.judged.terms:
+            if term.bodies == 1 and term.origin:
+                np.minimum.at(sites, term.particles[0], np.abs(term.elongation(zero)))
+        return np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
+
+    @property
+    def roundings(self) -> int:
+        """Roundings along one step."""
+        return self.law.roundings

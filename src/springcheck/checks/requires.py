@@ -1,0 +1,147 @@
+"""What a check may require of its subject, and the sentence that says what is missing: each once.
+
+A subject is a `Case` or a `Bench`; both have a scene, a scheme and a `law`.  Requirements are looked at in
+the order of this table, so each may rely on those before it that a check requires as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.checks.bench import LARGEST
+from springcheck.physics import exact
+from springcheck.physics.system import MOST_JOINED
+
+CONTRACTED = 1e-3
+"""Determinant of a step below which its powers are not formed: as the difference of two products it has
+lost 3 of the 19 digits of the reference there."""
+
+Lacks: TypeAlias = Callable[[Any], str | None]
+"""A subject -> why the requirement is not met, or None."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """One row: its name, how `list` and `explain` call it, and why a subject lacks it."""
+
+    name: str
+    word: str
+    lacks: Lacks
+
+
+def _unless(has: Callable[[Any], bool], otherwise: str) -> Lacks:
+    """`otherwise`, with the {title} of the scheme in it, unless the subject has what is required."""
+    return lambda subject: None if has(subject) else otherwise.format(title=subject.scheme.title)
+
+
+def _trait(name: schemes.Trait, otherwise: str) -> Lacks:
+    return _unless(lambda subject: subject.law.has(name), otherwise)
+
+
+def _too_long(subject: Any) -> str | None:
+    """An implicit step so long that neither engine nor reference keep a digit of it."""
+    if not subject.scheme.has("implicit"):
+        return None
+    scene = subject.law.scene
+    w = np.sqrt(np.max(scene.system.gershgorin(scene.q.astype(np.longdouble)) / scene.m))
+    turn = float(abs(scene.step) * w)
+    return None if turn < 2.0**53 else f"a step of h w = {turn:.1e} is beyond the digits of a double"
+
+
+def _no_phase(case: Any) -> str | None:
+    if np.any((case.system.modes.w2 == 0) & (case.system.modes.pull != 0)):
+        return "a mode under a constant force has no closed form here"
+    determinant = schemes.rotation(case.matrices).determinant
+    if not np.all(np.isfinite(determinant)):
+        return "the equation of an implicit step has no solution here"
+    if np.any(determinant <= 0):
+        return "the step reverses orientation (det <= 0): it has no phase"
+    if np.any(determinant < CONTRACTED):
+        return "friction contracts area more in one step than the reference has digits for"
+    products = np.abs(case.matrices[:, 0, 0] * case.matrices[:, 1, 1])
+    if not case.area_preserving and np.any(products * CONTRACTED > determinant):
+        return "what a step leaves of an area is a difference that the reference has no digits for"
+    return None
+
+
+_ALL = (
+    Requirement("start", "the first frame", _unless(
+        lambda case: not case.piece or case.steps[0] == 0, "this piece does not hold the start")),
+    Requirement("three-dimensions", "an engine in three dimensions", _unless(
+        lambda x: x.trajectory.off_axis is not None,
+        "the engine is given coordinates, not points in space")),
+    Requirement("energies", "energies that are asked for", _unless(
+        lambda case: case.trajectory.energy is not None, "the scene keeps no energies")),
+    Requirement("unheld", "nothing that holds a particle", _unless(
+        lambda x: all(term.bodies > 1 for term in x.scene.terms),
+        "walls and fixed potentials take up momentum")),
+    Requirement("alike", "two axes along which the same springs act", _unless(
+        lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
+    Requirement("named", "a scheme that is named", _trait(
+        "named", "its scheme is not known; --scheme NAME states it")),
+    Requirement("one-step", "a fixed step", _trait(
+        "one-step", "an adaptive solver has no one-step map; it is judged by its tolerance")),
+    Requirement("tolerance", "a tolerance", _unless(
+        lambda x: not x.law.has("one-step") and x.tolerance is not None,
+        "a method of fixed step has no tolerance")),
+    Requirement("convergence", "a known law of its tolerance", _unless(
+        lambda x: x.scheme.convergence is not None, "no law is known for {title}")),
+    Requirement("every-step", "every step recorded", _unless(
+        lambda case: case.trajectory.every == 1 and len(case.trajectory.t) > 4,
+        "states further apart than a step, or fewer than five, leave no draw to be told")),
+    Requirement("company", "two particles", _unless(lambda x: x.scene.n > 1, "there is one particle")),
+    Requirement("two-frames", "two frames", _unless(
+        lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
+    Requirement("solution", "an exact solution", _unless(
+        lambda x: exact.has_true_motion(x.scene), "the exact solution of this scene has no closed form")),
+    Requirement("undamped", "no friction", _trait(
+        "undamped", "friction contracts area and lets a phase decay, and going back does not undo it")),
+    Requirement("one-area", "modes that lose area at one rate", _unless(
+        lambda x: x.area_preserving or x.scene.system.is_separate,
+        "modes that lose area at rates of their own share it")),
+    Requirement("explicit", "an explicit scheme", _trait(
+        "explicit", "what is solved, or exponentiated, may round otherwise")),
+    Requirement("splitting", "a splitting", _trait(
+        "splitting", "only a splitting keeps a shadow energy that its own arithmetic does not solve for")),
+    Requirement("symplectic", "a symplectic scheme", _trait(
+        "symplectic", "{title} does not claim to be symplectic")),
+    Requirement("reversible", "a scheme that undoes its steps", _unless(
+        lambda x: x.scheme.has("reversible") or len(x.scheme.stages) == 2,
+        "{title} is not its own adjoint: only another scheme undoes its steps")),
+    Requirement("double", "double precision", _unless(
+        lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.state <= 2.0**-53,
+        "the rounding of its forces hides that of its steps")),
+    Requirement("linear", "a linear scene", _trait(
+        "linear", "an anharmonic scene's step is no matrix; the step defect judges it")),
+    Requirement("unmixed", "springs that act at one time", _unless(
+        lambda x: not x.law.has("mixes"),
+        "slow and fast springs act at different times: no normal mode stays by itself")),
+    Requirement("modes", "normal modes", _unless(
+        lambda x: x.scene.system.has_modes,
+        "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
+        f"or more than {MOST_JOINED} particles are joined")),
+    Requirement("few", f"{LARGEST} particles at most", _unless(
+        lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),
+    Requirement("resolved", "a step that doubles resolve", _too_long),
+    Requirement("phase", "a step that turns", _no_phase),
+)  # fmt: skip
+
+REQUIREMENTS = {one.name: one for one in _ALL}
+
+MAP = frozenset({"named", "one-step", "two-frames"})
+"""What a check of recorded steps requires."""
+
+CLOSED = MAP | {"unmixed", "modes", "phase"}
+"""What the closed form of the discrete motion requires."""
+
+
+def missing(subject: Any, requires: Iterable[str]) -> str | None:
+    """Why a check of these requirements does not apply to a subject, or None."""
+    wanted = frozenset(requires)
+    reasons = (one.lacks(subject) for one in _ALL if one.name in wanted)
+    return next((reason for reason in reasons if reason), None)

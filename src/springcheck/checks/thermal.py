@@ -1,0 +1,132 @@
+"""Checks of random schemes: the map and the direction of their noise to rounding, their draws by chance.
+
+A draw is what a state must have taken to come from the one before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from springcheck.checks.case import Case
+from springcheck.checks.check import Chance, Finding, check
+from springcheck.physics.arrays import Floats
+from springcheck.text.wording import count
+from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal.draws import Reading, law_of, read
+
+
+def reading(case: Case) -> Reading:
+    """What the frames say of the draws behind them."""
+    return case.once(_reading)
+
+
+def _reading(case: Case) -> Reading:
+    run = case.trajectory
+    scheme = THERMOSTATS[run.scheme]
+    # where a draw acts in two steps, that of the start is not in the record
+    skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
+    q, p = run.q[skipped:], run.p[skipped:]
+    unit = max(run.arithmetic.state, run.arithmetic.force)
+    with np.errstate(all="ignore"):
+        return read(scheme, case.judged, q, p, unit=unit, rebuilt=run.rebuilds_velocity)
+
+
+@check("across", family="noise", requires={"every-step"})
+def noise_direction(case: Case) -> Finding | str:
+    """Each step is the scheme's own map and some draws: what no draw can explain is rounding.
+
+    The draw follows from one number of the state, and predicts the other; a draw that acts in two steps
+    follows from each; a step without a collision has none.  Any temperature, any potential.
+    """
+    found = reading(case)
+    if found.across is None:
+        return "two fresh draws a step reach every state: their covariance is judged"
+    worst = np.where(np.isfinite(found.across), found.across, np.inf).max(axis=1)
+    off = np.flatnonzero(~(worst <= found.roundings))
+    where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
+    why = f"roundings along one step of {case.scheme.title}; does not grow with the run{where}"
+    return Finding(float(np.max(worst)), found.roundings, "roundings", why)
+
+
+def _draws(case: Case) -> tuple[Floats, Reading] | str:
+    """Draws (f, n) as standard normal numbers."""
+    found = reading(case)
+    scheme, x = THERMOSTATS[case.trajectory.scheme], found.draws
+    if scheme.uniform:
+        x = chance.normal_scores(x)
+    if found.hits is not None:
+        x = x[found.hits][:, None]
+    return (x, found) if x.size >= 2 else "there were no draws"
+
+
+def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Floats], str]) -> Chance | str:
+    found = _draws(case)
+    if isinstance(found, str):
+        return found
+    return Chance(probability(found[0]), f"{value(found[0])}, of {count(found[0].size, 'draw')}")
+
+
+@check("mean", family="noise", requires={"every-step"})
+def draws_mean(case: Case) -> Chance | str:
+    """The draws have mean 0."""
+    return _of(case, chance.mean, lambda x: f"mean {np.mean(x):+.2e}")
+
+
+@check("var", family="noise", requires={"every-step"})
+def draws_variance(case: Case) -> Chance | str:
+    """The draws have variance 1: the temperature of the bath, the masses and the friction are right."""
+    return _of(case, chance.variance, lambda x: f"variance {np.mean(x * x):.6f}")
+
+
+@check("shape", family="noise", requires={"every-step"})
+def draws_shape(case: Case) -> Chance | str:
+    """The draws have the tails of their distribution, as their fourth moment shows.
+
+    Judged by the fourth Legendre polynomial of their ranks, which no single draw decides.
+    """
+    return _of(case, chance.shape, lambda x: f"fourth moment {np.mean(x**4) / np.mean(x * x) ** 2:.4f}")
+
+
+@check("lag 1", family="noise", requires={"every-step"})
+def draws_neighbours(case: Case) -> Chance | str:
+    """The draws of one step say nothing of those of the next."""
+    return _of(case, chance.neighbours, lambda x: f"correlation {np.mean(x[1:] * x[:-1]):+.2e}")
+
+
+@check("repeat", family="noise", requires={"every-step"})
+def draws_repeat(case: Case) -> Chance | str:
+    """The draws of one step do not come again, nor opposite, any number of steps later."""
+    if len(case.trajectory.t) < 1010:
+        return "fewer than a thousand steps"
+    return _of(case, chance.repeats, lambda x: "largest correlation of all lags")
+
+
+@check("apart", family="noise", requires={"company", "every-step"})
+def draws_particles(case: Case) -> Chance | str:
+    """The draws of one particle say nothing of those of the next."""
+    if THERMOSTATS[case.trajectory.scheme].collides:
+        return "there are no draws of two particles side by side"
+    return _of(
+        case, lambda x: chance.neighbours(x.T), lambda x: f"correlation {np.mean(x[:, 1:] * x[:, :-1]):+.2e}"
+    )
+
+
+@check("hits", family="noise", requires={"every-step"})
+def collisions(case: Case) -> Chance | str:
+    """Collisions come with their chance, 1 - exp(-friction h)."""
+    found = reading(case)
+    if found.hits is None:
+        return "it has no collisions"
+    if case.scene.places is not None:
+        return "the axes of one particle may collide together"
+    p = law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
+    hits, n = int(np.count_nonzero(found.hits)), found.hits.size
+    return Chance(chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")
+
+
+DRAWN = (
+    noise_direction, draws_mean, draws_variance, draws_shape, draws_neighbours, draws_repeat, draws_particles,
+    collisions,
+)  # fmt: skip

@@ -1,0 +1,244 @@
+"""What a job of continuous integration reads: a JUnit report, a badge, and a summary in Markdown.
+
+All three are made from the JSON document of a command, so that nothing is decided twice.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springcheck import interrupts
+from springcheck.errors import SpringcheckError, plain
+from springcheck.studies.arguments import argument
+from springcheck.text.wording import count
+
+COMMANDS = ("run", "judge", "identify")
+"""Those that judge something, and take these options."""
+
+ARGUMENTS = (
+    argument("--junit", metavar="FILE.xml", help="write a JUnit report, as every CI shows it"),
+    argument("--badge", metavar="FILE.json", help="write a badge, the JSON of a shields.io endpoint"),
+    argument(
+        "--summary", metavar="FILE.md", help="append a summary in Markdown, as for $GITHUB_STEP_SUMMARY"
+    ),
+)
+
+FORMS = ("junit", "badge", "summary")
+
+HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
+OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
+"""How the files that are written anew begin: one that begins otherwise is somebody's, and is left alone."""
+
+COLOURS = {0: "brightgreen", 1: "red", 2: "lightgrey"}
+
+WORDS = {0: "passed", 1: "failed", 2: "nothing judged"}
+
+MOST_CASES = 20
+"""Cases in a summary; the report has all."""
+
+_NOT_IN_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One thing that was judged."""
+
+    subject: str
+    """Method, trajectory or file."""
+    name: str
+    passed: bool | None
+    """None where nothing could be judged."""
+    why: str
+    error: bool = False
+    """Not judged because of a mistake that a user can mend."""
+
+
+def check_paths(options: Namespace) -> None:
+    """SpringcheckError where a report cannot be written, or would take the place of a file that is none."""
+    given = {name: getattr(options, name, None) for name in FORMS}
+    read = [getattr(options, name, None) for name in ("file", "source", "scene", "output")]
+    others = [str(x) for x in (*read, *(getattr(options, "files", None) or ())) if x]
+    for name, path in given.items():
+        if path is None:
+            continue
+        said = f"--{name} {path}"
+        if not path:
+            raise SpringcheckError(f"--{name}: a name is needed, not an empty one")
+        place = Path(path)
+        if place.is_dir():
+            raise SpringcheckError(f"{said}: it is a folder, a file is needed")
+        if not place.parent.is_dir():
+            raise SpringcheckError(f"{said}: there is no folder {place.parent}")
+        taken = [*others, *(str(x) for key, x in given.items() if x and key != name)]
+        if any(place.resolve() == Path(x).resolve() for x in taken):
+            raise SpringcheckError(f"{said}: the command reads or writes that file otherwise; name another")
+        begins = OURS.get(name)
+        if begins and place.is_file() and place.stat().st_size:
+            with place.open("rb") as file:
+                if file.read(len(begins)) != begins:
+                    raise SpringcheckError(f"{said}: it is there and no such report; name another")
+
+
+def asked(options: Namespace) -> bool:
+    """Whether a command line asks for any of the three."""
+    return any(getattr(options, name, None) for name in FORMS)
+
+
+def report(options: Namespace, document: dict[str, Any], status: int) -> None:
+    """Write what was asked for of a command's JSON document and exit status."""
+    if asked(options):
+        _write(options, list(cases(options.name, document, status)), status)
+
+
+def failed(options: Namespace, error: BaseException) -> None:
+    """Write what was asked for of a command that ended in a mistake."""
+    if asked(options):
+        _write(
+            options, [Case(subject=options.name, name="input", passed=None, why=str(error), error=True)], 2
+        )
+
+
+def cases(command: str, document: dict[str, Any], status: int) -> Iterator[Case]:
+    """Everything that a JSON document says was judged."""
+    for one in document.get("files", [document]):
+        for found in one.get("identifications", [one]):
+            yield from _identified(found, one.get("file", ""))
+        subject = one.get("file") or document.get("scene") or command
+        for verdict in one.get("verdicts", ()):
+            yield Case(
+                subject=str(verdict.get("method", subject)),
+                name=verdict["check"],
+                passed=verdict["passed"],
+                why=_reason(verdict),
+            )
+        for repeat in one.get("repeats", ()):
+            why = "" if repeat["equal"] else f"differs by {_number(repeat['difference'])} of its size"
+            yield Case(subject=repeat["method"], name="repetition", passed=repeat["equal"], why=why)
+        for doubt in one.get("not_trusted", ()):
+            yield Case(
+                subject=str(subject), name=f"integrity of {doubt['place']}", passed=False, why=doubt["what"]
+            )
+    if not any(x in document for x in ("files", "identifications", "verdict", "verdicts", "repeats")):
+        yield Case(subject=command, name="exit status", passed=(True, False, None)[status], why=WORDS[status])
+
+
+def _identified(found: dict[str, Any], file: str) -> Iterator[Case]:
+    if "error" in found:
+        yield Case(subject=file, name="scheme", passed=None, why=found["error"], error=True)
+    elif "statement" in found:
+        label = found["trajectory"]
+        subject = file if file and label == Path(file).name else ", ".join(filter(None, (file, label)))
+        right = found["fits"] or found["verdict"] == "adaptive"
+        passed = True if right else None if found["undecided"] else False
+        first = found["explanations"][:1]
+        why = f"{first[0]['cause']}. What to do: {first[0]['remedy']}" if first else found["statement"]
+        if found.get("unlike"):
+            passed, why = False, found["unlike"]
+        yield Case(subject=subject, name="scheme", passed=passed, why=why)
+
+
+def _reason(verdict: dict[str, Any]) -> str:
+    if verdict["passed"] is None:
+        return str(verdict["why"])
+    size = f"{_number(verdict['value'])} of {_number(verdict['bound'])} {verdict['unit']}".strip()
+    return f"{size}; {verdict['why']}"
+
+
+def _number(x: float | None) -> str:
+    return "unknown" if x is None else f"{x:.3g}"
+
+
+def sentence(found: Sequence[Case], status: int) -> str:
+    """The first sentence of a summary: what is wrong, or that nothing is."""
+    wrong = [x for x in found if x.passed is False] or [x for x in found if x.error]
+    if wrong:
+        named = "" if wrong[0].name in ("scheme", "input") else f", {wrong[0].name}"
+        return f"{wrong[0].subject}{named}: {wrong[0].why}"
+    if status == 2:
+        return (
+            found[0].why
+            if len(found) == 1
+            else "Nothing was judged: no check that applies could tell a scheme."
+        )
+    schemes = [x for x in found if x.name == "scheme"]
+    if len(schemes) == 1:
+        return f"{schemes[0].subject}: {schemes[0].why}"
+    return f"{count(sum(x.passed is True for x in found), 'check')} passed, none failed."
+
+
+def junit(command: str, found: Sequence[Case]) -> bytes:
+    """A JUnit report, of one suite."""
+    from xml.etree import ElementTree
+
+    suite = ElementTree.Element("testsuite", name=f"springcheck {command}", tests=str(len(found)))
+    numbers = {"failures": 0, "errors": 0, "skipped": 0}
+    for x in found:
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=_text(x.subject), name=_text(x.name), time="0"
+        )
+        if x.passed:
+            continue
+        kind, key = ("failure", "failures") if x.passed is False else ("skipped", "skipped")
+        kind, key = ("error", "errors") if x.error else (kind, key)
+        numbers[key] += 1
+        ElementTree.SubElement(case, kind, message=_text(x.why)).text = _text(x.why)
+    suite.attrib.update({key: str(number) for key, number in numbers.items()})
+    root = ElementTree.Element("testsuites", {"name": "springcheck", "tests": str(len(found))})
+    root.append(suite)
+    ElementTree.indent(root)
+    body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return body + b"\n"
+
+
+def badge(found: Sequence[Case], status: int) -> bytes:
+    """The JSON of a shields.io endpoint."""
+    wrong = sum(x.passed is False for x in found)
+    judged = sum(x.passed is not None for x in found)
+    message = f"{wrong} of {judged} failed" if wrong else f"{judged} passed" if not status else WORDS[status]
+    data = {"schemaVersion": 1, "label": "springcheck", "message": message, "color": COLOURS[status]}
+    return json.dumps(data, separators=(",", ":")).encode() + b"\n"
+
+
+def summary(command: str, found: Sequence[Case], status: int) -> str:
+    """A summary in Markdown; its first sentence is the cause."""
+    wrong = [x for x in found if x.passed is False or x.error]
+    lines = [f"### springcheck {command}: {WORDS[status]}", "", _cell(sentence(found, status)), ""]
+    if len(wrong) > 1:
+        lines += ["| what | check | why |", "|---|---|---|"]
+        lines += [f"| {_cell(x.subject)} | {_cell(x.name)} | {_cell(x.why)} |" for x in wrong[:MOST_CASES]]
+        lines += ["", f"and {len(wrong) - MOST_CASES} more", ""] if len(wrong) > MOST_CASES else [""]
+    passed, skipped = (sum(x.passed is value and not x.error for x in found) for value in (True, None))
+    lines += [f"{count(passed, 'check')} passed, {len(wrong)} failed, {skipped} not applicable.", ""]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    """Text that Markdown shows as it is."""
+    return re.sub(r"([\\|<>`*_\[\]])", r"\\\1", plain(text))
+
+
+def _text(text: str) -> str:
+    return _NOT_IN_XML.sub("?", text)
+
+
+def _write(options: Namespace, found: list[Case], status: int) -> None:
+    if options.junit:
+        _put(options.junit, "wb", junit(options.name, found))
+    if options.badge:
+        _put(options.badge, "wb", badge(found, status))
+    if options.summary:
+        _put(options.summary, "ab", summary(options.name, found, status).encode())
+
+
+def _put(path: str, mode: str, data: bytes) -> None:
+    try:
+        with interrupts.held(), open(path, mode) as file:
+            file.write(data)
+    except OSError as error:
+        raise SpringcheckError(f"cannot write {path}: {error.strerror}") from error

@@ -1,0 +1,128 @@
+"""Charts as plain data: what a study shows in figures (`render`) and in the report page beside its text.
+
+A study's folder may hold `page.banks(result)`.  Numbers are the stored doubles; `plain` makes of a bank
+what JSON can hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from typing import Any, Literal
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """One axis: its name with the unit."""
+
+    name: str
+    log: bool = False
+    values: Sequence[float] = ()
+    """Of tiles: what stands at 0, 1, 2 ..."""
+    names: Sequence[str] = ()
+    """The same in words, all of which are written."""
+    shown: tuple[float, float] | None = None
+    """From and to at first; left out: what the curves fill."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """Points of one name; curves of one name are switched on and off together."""
+
+    name: str
+    group: str
+    """The scheme: it has one colour in the whole page."""
+    x: Sequence[float] | Floats
+    y: Sequence[float] | Floats
+    line: bool = True
+    marks: bool = False
+    notes: Sequence[str] = ()
+    """What is said of each point beside its numbers."""
+    open: Sequence[bool] = ()
+    """Which points are estimates: their marks are hollow, and full of the others."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tiles:
+    """A map of kinds over two axes of values: a row of numbers of kinds for each y; -1 is none."""
+
+    kinds: Sequence[tuple[str, str]]
+    """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""
+    rows: Sequence[Sequence[int]]
+    notes: Sequence[Sequence[str]] = ()
+    """What is said of each tile beside its kind; left out: nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """A line across a chart."""
+
+    axis: Literal["x", "y"]
+    at: float
+    name: str = ""
+    look: Literal["limit", "one", "here"] = "limit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chart:
+    """Curves or tiles over two axes."""
+
+    title: str
+    x: Scale
+    y: Scale
+    curves: Sequence[Curve] = ()
+    tiles: Tiles | None = None
+    rules: Sequence[Rule] = ()
+    short: str = ""
+    """What tells it from the other charts of its bank."""
+    equal: bool = False
+    """Whether a unit is of one length on both axes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bank:
+    """Charts with one legend: of their curves, or of themselves where they are tiles."""
+
+    title: str
+    charts: Sequence[Chart]
+    name: str = ""
+    """Of its figure's file; left out: the page alone shows it."""
+    heading: str = ""
+    """Of its figure; left out: the title of its first chart."""
+    on: Sequence[str] | None = None
+    """What is drawn at first; left out: everything."""
+
+
+def plain(bank: Bank) -> dict[str, Any]:
+    """For JSON: numbers that are none are words, rows of tiles are runs of one kind, [count, kind]."""
+    names = [x.name for chart in bank.charts for x in chart.curves]
+    titles = [chart.title for chart in bank.charts if chart.tiles]
+    found = asdict(bank) | {"on": list(dict.fromkeys([*names, *titles] if bank.on is None else bank.on))}
+    for chart in found["charts"]:
+        for axis in (chart["x"], chart["y"]):
+            said = list(axis.pop("names"))
+            axis |= {"named": bool(said), "values": said or numbers(axis["values"])}
+        for curve in chart["curves"]:
+            curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
+            del curve["open"]
+        if tiles := chart["tiles"]:
+            texts = list(dict.fromkeys(note for row in tiles["notes"] for note in row if note))
+            at = {"": -1} | {text: i for i, text in enumerate(texts)}
+            tiles |= {
+                "rows": [[[len(list(run)), kind] for kind, run in groupby(row)] for row in tiles["rows"]],
+                "texts": texts,
+                "notes": [[at[note] for note in row] for row in tiles["notes"]],
+            }
+    return found
+
+
+def numbers(values: Sequence[float] | Floats) -> list[float | str]:
+    """Doubles as JSON reads them back bit for bit, and words for those that JSON has not."""
+    words = {math.inf: "Infinity", -math.inf: "-Infinity"}
+    return [x if math.isfinite(x) else words.get(x, "NaN") for x in np.asarray(values, np.float64).tolist()]

@@ -1,0 +1,176 @@
+"""Files that libraries read: ASE, MDAnalysis, pandas, SciPy.  In a process of their own (see `store.apart`).
+
+Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Amber's in Angstrom and ps.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import import_module
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from springcheck.errors import StoreError, plain
+from springcheck.formats.columns import States
+from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.formats.molecular import of_frames, times
+from springcheck.formats.numbers import states_of
+from springcheck.formats.tables import roundoff
+
+MOST_FRAMES = 1 << 20
+LONGEST_JSON = 1 << 25
+"""Bytes: as plain objects it takes some twenty times as much."""
+
+
+@contextmanager
+def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
+    """Whatever a library raises as a StoreError of one line that names it, and how it is installed."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except StoreError:
+        raise
+    except ImportError as error:
+        how = f", which is not installed: python -m pip install {install or name}"
+        raise StoreError(f"{path}: {name} reads it{how} ({plain(error, 100)})") from error
+    except Exception as error:
+        said = plain(" ".join(str(error).split()), 200)
+        raise StoreError(f"{path}: {name} cannot read it: {said or type(error).__name__}") from error
+
+
+def read_ase(path: Path, step: float | None) -> States:
+    """What ASE reads: extended XYZ with velocities or momenta, and .traj."""
+    with _library(path, "ASE", "ase"):
+        import ase.io
+        from ase import units
+
+        with path.open("rb") as file:
+            kind = "traj" if file.read(4) == b"- of" else "extxyz"
+        found = ase.io.read(str(path), index=f":{MOST_FRAMES}", format=kind)
+        if len({len(atoms) for atoms in found}) != 1:
+            raise StoreError(f"{path}: the number of atoms changes")
+        v = []
+        for atoms in found:
+            bare = atoms.arrays.get("velocities", atoms.arrays.get("vel"))
+            if bare is not None or atoms.has("momenta"):
+                v.append(bare if bare is not None else atoms.get_velocities() * units.fs)
+        named = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
+        t = named if all(x is not None for x in named) else times(path, range(len(found)), step)
+        written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
+        moving = v if len(v) == len(found) else None
+        q = [atoms.positions for atoms in found]
+        return of_frames(path, t, q, moving, found[0].get_masses(), written)
+
+
+def _written(lines: list[str]) -> float:
+    """How finely an extended XYZ file is written, whose atoms are rows of a name and numbers."""
+    rows: list[list[str]] = []
+    i = 0
+    while i < len(lines) and lines[i].strip():
+        n = int(lines[i])
+        rows += [line.split() for line in lines[i + 2 : i + 2 + n]]
+        i += n + 2
+    if len({len(row) for row in rows}) != 1:
+        return 2.0**-53
+    return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell])
+
+
+def read_trr(path: Path) -> States:
+    """A GROMACS .trr file, in single precision, by MDAnalysis."""
+    with _analysed(path, "lib.formats.libmdaxdr", "TRRFile") as file:
+        both = (frame for frame in file if frame.hasx and frame.hasv)
+        found = [(frame.time, np.array(frame.x), np.array(frame.v)) for frame in islice(both, MOST_FRAMES)]
+    if not found:
+        raise StoreError(f"{path}: has no frame with both positions and velocities")
+    t, q, v = zip(*found, strict=True)
+    return of_frames(path, t, q, v, None, 2.0**-24)
+
+
+def read_xtc(path: Path) -> States:
+    """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
+    with _analysed(path, "lib.formats.libmdaxdr", "XTCFile") as file:
+        found = [(frame.time, np.array(frame.x)) for frame in islice(file, MOST_FRAMES)]
+    return of_frames(path, [t for t, _ in found], [q for _, q in found], None, None, 2.0**-24)
+
+
+def read_dcd(path: Path) -> States:
+    """A DCD file by MDAnalysis: positions alone [Angstrom], in single precision, as is its time step [ps]."""
+    with _analysed(path, "coordinates.DCD", "DCDReader") as file:
+        found = [(frame.time, np.array(frame.positions)) for frame in islice(file, MOST_FRAMES)]
+    at = np.array([t for t, _ in found]).astype(np.float32)
+    return of_frames(path, at, [q for _, q in found], None, None, 2.0**-24)
+
+
+@contextmanager
+def _analysed(path: Path, module: str, name: str) -> Iterator[Any]:
+    """A file opened by a class of MDAnalysis."""
+    with (
+        _library(path, "MDAnalysis", "'springcheck[md]'"),
+        getattr(import_module(f"MDAnalysis.{module}"), name)(str(path)) as file,
+    ):
+        yield file
+
+
+def read_amber(path: Path) -> States:
+    """An Amber trajectory in NetCDF 3 by SciPy: Angstrom and ps, in single precision; frames of atoms."""
+    with _library(path, "SciPy", "scipy"):
+        from scipy.io import netcdf_file
+
+        with netcdf_file(str(path), "r", mmap=False, maskandscale=True) as file:
+            known: dict[str, Any] = file.variables
+            found = {name: np.ma.filled(one[:], np.nan) for name, one in known.items()}
+            kinds = [known[name].data.dtype for name in ("coordinates", "velocities") if name in found]
+    if not {"time", "coordinates"} <= found.keys():
+        raise StoreError(f"{path}: NetCDF without time and coordinates, which Amber's trajectories have")
+    v = found.get("velocities")
+    return of_frames(
+        path, found["time"], found["coordinates"], v, None, max(np.finfo(x).eps / 2 for x in kinds)
+    )
+
+
+def read_mat(path: Path, columns: list[str]) -> States:
+    """Arrays of a MATLAB file up to version 7 by SciPy."""
+    with _library(path, "SciPy", "scipy"):
+        from scipy.io import loadmat
+
+        found = {name: np.asarray(x) for name, x in loadmat(str(path)).items() if not name.startswith("__")}
+    return states_of(path, found, columns)
+
+
+def read_json(path: Path, columns: list[str]) -> States:
+    """An object of lists by name, or a list of objects, one for each row."""
+    if path.stat().st_size > LONGEST_JSON:
+        raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
+    with _library(path, "msgspec", "msgspec"):
+        found = msgspec.json.decode(path.read_bytes())
+    if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
+        found = {name: [row.get(name) for row in found] for name in found[0]}
+    if not isinstance(found, dict):
+        raise StoreError(f"{path}: neither an object of lists nor a list of objects")
+    arrays = {}
+    for name, values in found.items():
+        if isinstance(values, list):
+            try:
+                arrays[str(name)] = np.asarray(values, np.float64)
+            except (ValueError, TypeError):
+                continue
+    return states_of(path, arrays, columns)
+
+
+def read_pandas(path: Path, columns: list[str], call: str) -> States:
+    """A table that pandas reads by this function, its columns named in the file."""
+    with _library(path, "pandas", "'springcheck[tables]'"):
+        pandas = import_module("pandas")
+
+        table = getattr(pandas, call)(str(path))
+        if table.size > MOST_NUMBERS:
+            raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers: choose among the columns")
+        found: Mapping[str, Any] = {str(name): table[name].to_numpy() for name in table.columns}
+    return states_of(path, found, columns)

@@ -1,0 +1,69 @@
+"""Lines of a text file, gzipped or not, one by one: no more of them than a trajectory may have."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+
+from springcheck.errors import StoreError
+
+LONGEST_LINE = 1 << 24
+"""Characters."""
+MOST_NUMBERS = 1 << 24
+"""Numbers of one trajectory."""
+
+
+class Lines:
+    """A cursor over the lines of a text; StopIteration at its end."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as raw:
+            zipped = raw.read(2) == b"\x1f\x8b"
+        self.path, self.number, self._numbers = path, 0, 0
+        self._file = (
+            gzip.open(path, "rt", encoding="utf-8-sig") if zipped else path.open(encoding="utf-8-sig")  # noqa: SIM115
+        )
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = self._file.readline(LONGEST_LINE)
+        if not line:
+            raise StopIteration
+        self.number += 1
+        if len(line) == LONGEST_LINE:
+            raise self.wrong(f"is longer than {LONGEST_LINE >> 20} MiB")
+        return line.rstrip("\r\n")
+
+    def wrong(self, what: str) -> StoreError:
+        """An error that names file and line."""
+        return StoreError(f"{self.path}, line {self.number}: {what}")
+
+    def count(self, numbers: int) -> None:
+        """So many numbers more are read.  StoreError where they are more than a trajectory may have."""
+        self._numbers += numbers
+        if self._numbers > MOST_NUMBERS:
+            raise self.wrong(
+                f"more than {MOST_NUMBERS:,} numbers: keep fewer frames, or choose among the columns"
+            )
+
+    def __enter__(self) -> Lines:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+
+def number(cell: str) -> float:
+    """The number in a cell, with Fortran's exponents (1.5D+00) too.  ValueError where there is none."""
+    try:
+        return float(cell)
+    except ValueError:
+        if len(cell) < 64 and not {"d", "D"}.isdisjoint(cell):
+            return float(cell.replace("d", "e").replace("D", "e"))
+        raise

@@ -1,0 +1,134 @@
+"""The interval between recorded states, from times that are rounded, added up, or written with few digits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from springcheck.errors import IdentificationError
+from springcheck.identify.storage import Storage, single_of, storage
+from springcheck.physics.arrays import Extended, Floats
+
+ROUNDING = 2.0**-53
+
+FEWEST_STATES = 5
+"""Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
+
+ADDED_UP = 64
+"""Roundings of a clock that adds up its steps from frame to frame, half of one for each."""
+
+MOST_ADDED = 100
+"""Steps to a frame at which a clock that adds up is looked for."""
+
+SHORT_STEP = 9
+"""Digits of a step that a program was given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Clock:
+    """The interval [T] of recorded times, and how well they show it."""
+
+    interval: np.longdouble
+    jitter: float
+    """Relative uncertainty of the interval."""
+    quantum: float
+    """Rounding of the times, in intervals."""
+    slips: Extended | None
+    """Relative excess (f - 1,) of each recorded interval, where double precision shows it."""
+
+
+def clock_of(t: Floats) -> Clock:
+    """The clock of times (f,).  Raises IdentificationError where their interval is not constant."""
+    wide = t.astype(np.longdouble)
+    span = wide[-1] - wide[0]
+    interval = span / (len(t) - 1)
+    if interval == 0:
+        raise IdentificationError("all times are equal: the interval between the states is unknown")
+    off = np.abs(np.diff(wide) - interval)
+    worst = int(np.argmax(off))
+    even = float(np.max(np.spacing(np.abs(t))))
+    written = storage(t)
+    # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal, and those of a
+    # float32 clock are not text: the finest of the grids that the times lie on explains them
+    single = single_of(t) or (written.name == "single" and single_of(t, SHORT_STEP))
+    grids = [even]
+    grids += [float(np.max(Storage(name="single").quantum(t)))] if single else []
+    grids.append(float(np.max(written.quantum(t))))
+    # two rounded times make a difference, and a clock that adds its step up rounds once more each time
+    quantum = next((x for x in grids if off[worst] <= 4 * x), None)
+    if quantum is None:
+        quantum = next((x for x in grids[: 1 + single] if off[worst] <= ADDED_UP * x), None)
+    if quantum is None:
+        raise IdentificationError(
+            f"the states are not at a constant interval: frames {worst} and {worst + 1} are "
+            f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
+            "give a part of the trajectory with one interval"
+        )
+    jitter = quantum / abs(float(span)) + ROUNDING
+    binary = quantum in grids[: 1 + single]
+    mean, line = interval, wide - wide[0] - np.arange(len(t)) * interval
+    # a sum of steps, each rounded: its mean is off by as much as they differ
+    step = _added(t, interval, quantum) if binary and not _even(t, interval, quantum) else None
+    if step is not None:
+        interval = step
+        jitter += float(abs(interval / mean - 1)) + (2.0**-24 if quantum != even else 0.0)
+    elif binary and float(np.max(np.abs(line))) > 2 * quantum:
+        jitter += float(off[worst] / abs(mean))
+    elif quantum != even:
+        # a program's step is a short decimal, and a coarse clock leaves room for it; what was written may
+        # have been a sum of steps, each of which rounds by half an ulp
+        room = jitter + (len(t) - 1) * even / 2 / abs(float(span))
+        near = (float(f"{float(interval):.{digits}g}") for digits in range(1, 8))
+        close = (x for x in near if abs(x / float(interval) - 1) <= room)
+        interval = np.longdouble(next(close, float(interval)))
+        jitter += float(abs(interval / mean - 1))
+    slips = None
+    if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
+        slips = np.asarray(np.diff(wide) / interval - 1)
+    return Clock(
+        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), slips=slips,
+    )  # fmt: skip
+
+
+def _width(t: Floats, quantum: float) -> type[np.floating[Any]]:
+    """Of the numbers of a clock whose times have this rounding [T]."""
+    return np.float32 if quantum > float(np.max(np.spacing(np.abs(t)))) else np.float64
+
+
+def _even(t: Floats, interval: np.longdouble, quantum: float) -> bool:
+    """Whether the times are multiples of a step, each rounded once."""
+    width = _width(t, quantum)
+    n, times = np.arange(len(t)), t.astype(width)
+    steps = (float(interval), float(t[1] - t[0]), float(f"{float(interval):.{SHORT_STEP}g}"))
+    return any(np.array_equal((t[0] + n * h).astype(width), times) for h in steps)
+
+
+def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble | None:
+    """The interval of the steps whose sum, t += h, is t to the last bit; None where none is found.  `quantum`
+    is the rounding of t [T]."""
+    width = _width(t, quantum)
+    times = t.astype(width)
+    for steps, h in _steps(t, float(interval), quantum):
+        summed = np.full(steps * (len(t) - 1) + 1, h, width)
+        summed[0] = t[0]
+        # the first frames refute most
+        if all(
+            np.array_equal(np.cumsum(summed[: n * steps + 1])[::steps], times[: n + 1])
+            for n in (2, len(t) - 1)
+        ):
+            return np.longdouble(h) * steps
+    return None
+
+
+def _steps(t: Floats, interval: float, quantum: float) -> Iterator[tuple[int, float]]:
+    """Numbers of steps to a frame and steps that the times may be sums of: the first, or short decimals."""
+    if t[0] == 0:
+        yield 1, float(t[1])
+    for steps in range(1, MOST_ADDED + 1):
+        # each of them rounds by half a quantum at most
+        room = steps * quantum / 2
+        short = (float(f"{interval / steps:.{digits}g}") for digits in range(1, SHORT_STEP + 1))
+        yield from ((steps, h) for h in short if abs(h * steps - interval) <= room)

@@ -1,0 +1,280 @@
+"""Hypotheses held against measured maps: one Gauss-Newton for all of them, chi-squared, number of unknowns.
+
+A hypothesis is a family of one-step maps, a number of steps to a frame and of whole turns that frames do not
+show.  The roots of a measured map are the steps that it may be the power of; the phase of each gives a first
+guess of (h w)**2 for every family, its determinant one of friction, and the four entries decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck.identify.families import Family
+from springcheck.identify.fit import Map
+from springcheck.identify.guesses import (
+    FLOW_TURNS,
+    Guesses,
+    Roots,
+    first,
+    least_squares,
+    polished,
+    roots_of_map,
+)
+from springcheck.identify.hypothesis import Joint, Match, Terms, most
+from springcheck.identify.maps import MapTable, table
+from springcheck.physics.arrays import Floats, Reals
+
+WHOLE = 2
+"""Roundings of a step that act on a whole state and not on what a step adds to it."""
+
+COARSE_ERROR = 1e-9
+"""Error of a map's entries from which their prediction needs no more than double precision."""
+
+
+class Target:
+    """A measured map, and the errors of its entries: those of the fit, of the scale of velocities, of coarse
+    forces, and of coefficients that are rounded once, a multiple of 1."""
+
+    def __init__(self, found: Map, terms: Terms) -> None:
+        self.found, self.terms = found, terms
+        self.observed = found.entries.reshape(4)
+        self.ratio = found.size[1] / found.size[0]
+        self.largest = max(1.0, float(np.max(np.abs(self.observed))))
+        shear = terms.jitter * self.observed.astype(np.float64) * [0, 1, -1, 0]
+        bias = terms.bias * np.repeat(found.residual, 2)
+        values, self.axes = np.linalg.eigh(found.covariance + np.outer(shear, shear) + np.diag(bias**2))
+        self.variance = np.maximum(values, 1e-15 * values[-1])
+
+    def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
+        """1 over the errors (4, c) along the axes.
+
+        No number of pairs averages the rounding of h k or h/m away: an entry of the map over s steps is
+        uncertain by the roundings of its path times what s steps add to a state, whatever the fit says.
+        """
+        added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
+        whole = (every.path[x.which] * added + WHOLE) * s * self.largest * self.terms.rounding
+        return np.asarray(1 / np.sqrt(self.variance[:, None] + whole**2))
+
+    def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:
+        a, g, log_mass = values
+        if self.terms.log_stiffness is not None:
+            log_mass = self.terms.log_stiffness - 2 * np.log(s) - np.log(np.abs(a))
+        elif self.terms.scales:
+            log_mass = log_mass + np.array(self.terms.scales, values.dtype)[s.astype(int)]
+        return np.asarray(every.frame(x.which, a, g, log_mass, s, np.full(len(s), self.ratio, values.dtype)))
+
+
+class PositionTarget(Target):
+    """The recurrence of positions alone: 1 + det - trace and 1 - det of a map, with their covariance."""
+
+    def __init__(self, numbers: tuple[np.longdouble, np.longdouble], covariance: Floats) -> None:
+        self.terms = Terms()
+        self.observed = np.array(numbers)
+        # two numbers of very unlike size: eigenvectors of double precision do not part them
+        size = np.sqrt(np.diag(covariance))
+        values, axes = np.linalg.eigh(covariance / size[:, None] / size)
+        self.axes, self.variance = axes / size[:, None], values
+
+    def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
+        return np.asarray(1 / np.sqrt(self.variance[:, None]) * np.ones(len(s)))
+
+    def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:
+        ones = np.ones(len(s), np.longdouble)
+        out = every.frame(x.which, values[0], values[1], 0 * ones, s, ones)
+        return np.stack(recurrence_of(out.T.reshape(-1, 2, 2)))
+
+
+def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
+    """1 + det - trace and 1 - det of maps (c, 2, 2)."""
+    # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation
+    one, other, product = 1 - m[:, 0, 0], 1 - m[:, 1, 1], m[:, 0, 1] * m[:, 1, 0]
+    alpha = one * other - product
+    return alpha, one + other - alpha
+
+
+def of_positions(
+    numbers: tuple[np.longdouble, np.longdouble],
+    covariance: Floats,
+    phase: float,
+    log_det: float,
+    families: tuple[Family, ...],
+    strides: Iterable[int],
+) -> list[Match]:
+    """Families whose positions obey q[n+1] - T q[n] + D q[n-1] = c, `numbers` being 1 + D - T and 1 - D, each
+    number of steps and of unseen turns: without velocities turns to the left and to the right look alike.
+    """
+    every = table(families)
+    ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
+    s, i = np.array(ways, np.float64).T
+    turns = (i + 1) // 2
+    phases = (np.where(i % 2, -1.0, 1.0) * phase + 2 * np.pi * turns) / s
+    keep = (phases > 0) & ((phases <= np.pi) | (s == 1))
+    s, turns, phases = s[keep], turns[keep], phases[keep]
+    each = log_det / s
+    det, trace = np.exp(each), 2 * np.exp(each / 2) * np.cos(phases)
+    ones = np.ones_like(s)
+    step = np.stack([trace - 1, ones, trace - 1 - det, ones], axis=1).reshape(-1, 2, 2)
+    roots = Roots(s, turns, phases, each, step, 0.0, {})
+    with np.errstate(all="ignore"):
+        x = first(every, roots, growing=False, free_scale=True, far=True)
+        if not every.damped:
+            # the area of a frame is known, and that of a scheme without friction beside it
+            own = np.log(np.abs(np.linalg.det(every.unit(x.which, x.a, x.g)))) * s[x.root]
+            room = 0.02 * np.abs(own) + 1e-4 + 100 * math.sqrt(covariance[1, 1])
+            near = np.flatnonzero(np.abs(own - log_det) <= room)
+            x = x[near]
+        if not len(x.a):
+            return []
+        return _matched(every, PositionTarget(numbers, covariance), roots, x, far=False, every_turn=True)
+
+
+def matches(
+    found: Map, terms: Terms, families: tuple[Family, ...], strides: Iterable[int], *, far: bool = False
+) -> list[Match]:
+    """The best match of each family and stride with a map, of those that may be accepted; with `far` all."""
+    every = table(families)
+    with np.errstate(all="ignore"):
+        asked = "roots", tuple(strides)
+        if asked not in found.found:
+            found.found[asked] = roots_of_map(found, asked[1])
+        roots = replace(found.found[asked])
+        if not len(roots.s):
+            return []
+        # the scale of velocities is as uncertain as the interval, and where it is known, that of a number in
+        # single precision
+        roots.error += terms.jitter + terms.bias * float(np.max(found.residual))
+        roots.error += terms.rounding * 20 * float(np.max(roots.s))
+        roots.error += float(np.max(np.abs(terms.scales), initial=0.0))
+        free_scale = terms.mass_unknown
+        x = polished(
+            every,
+            roots,
+            first(every, roots, growing=terms.growing, free_scale=free_scale, far=far),
+            free_scale=free_scale,
+            far=far,
+        )
+        if not len(x.a):
+            return []
+        return _matched(every, Target(found, terms), roots, x, far=far)
+
+
+def _matched(
+    every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool, every_turn: bool = False
+) -> list[Match]:
+    terms = target.terms
+    free = [0, 1] if every.damped else [0]
+    if terms.mass_unknown and terms.log_stiffness is None:
+        free.append(2)
+    freedom = len(target.observed) - len(free)
+    s = roots.s[x.root]
+    values = np.stack([x.a, x.g, np.zeros_like(x.a)])
+    if roots.error < COARSE_ERROR:
+        values = values.astype(np.longdouble)
+    if 2 in free:
+        predicted = target.entries(every, x, s, values)
+        scale = np.abs(predicted[1] / target.observed[1] * target.observed[2] / predicted[2])
+        values[2] = np.nan_to_num(np.log(scale) / 2)
+    weight = target.weight(every, x, s)
+
+    def left(values: Reals) -> tuple[Reals, Floats]:
+        entries = target.entries(every, x, s, values)
+        off = (target.observed[:, None] - entries).astype(np.float64)
+        return entries, target.axes.T @ off * weight
+
+    entries, r = left(values)
+    chi2 = np.sum(r**2, axis=0)
+    best = values, entries, chi2
+    errors = np.zeros((3, len(s)))
+    for _ in range(8):
+        slopes = []
+        for i in free:
+            d = np.abs(values[0]) * 1e-8 if i == 0 else np.full(len(s), 1e-8, values.dtype)
+            moved = values.copy()
+            moved[i] += d
+            slopes.append((r - left(moved)[1]) / d.astype(np.float64))
+        step, variance = least_squares(np.array(slopes), r)
+        errors[free] = np.sqrt(np.abs(variance))
+        limit = 0.5 * np.abs(values[0].astype(np.float64))
+        step[0] = np.clip(step[0], -limit, limit)
+        values = values.copy()
+        values[free] += step
+        entries, r = left(values)
+        new = np.sum(r**2, axis=0)
+        better = new < best[2]
+        gain = np.max((best[2] - new)[better] / (1 + new[better]), initial=0.0)
+        best = (np.where(better, values, best[0]), np.where(better, entries, best[1]),
+                np.where(better, new, best[2]))  # fmt: skip
+        if not gain > 1e-6:
+            break
+    values, entries, chi2 = best
+    good = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=0)
+    good &= (chi2 <= most(freedom)) | far
+    if every.damped and not terms.growing:
+        good &= (values[1] > 0) | every.held[x.which]
+    kept: dict[tuple[int, int, int], tuple[float, float, int]] = {}
+    for i in np.flatnonzero(good).tolist():
+        key = int(x.which[i]), int(s[i]), int(roots.turns[x.root[i]]) if every_turn else 0
+        # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
+        close = abs(float(values[0, i])) if free[-1] == 2 and freedom <= 2 else float(chi2[i])
+        turns = float(roots.turns[x.root[i]])
+        rank = (0.0 if far else turns), close, i
+        kept[key] = min(kept.get(key, rank), rank)
+    out = []
+    for (which, stride, _), (_, _, i) in kept.items():
+        a, g, log_mass = (float(y) for y in values[:, i])
+        if terms.log_stiffness is not None:
+            log_mass = terms.log_stiffness - 2 * math.log(stride) - math.log(abs(a))
+        elif terms.scales:
+            log_mass += terms.scales[stride]
+        out.append(
+            Match(
+                family=every.families[which].name, stride=stride, turns=int(roots.turns[x.root[i]]),
+                a=a,
+                a_error=float(errors[0, i]), g=g, g_error=float(errors[1, i]), log_mass=log_mass,
+                mass_error=float(errors[2, i]), chi2=float(chi2[i]), freedom=max(freedom, 1),
+                predicted=tuple(entries[:, i].astype(np.longdouble)),
+            )
+        )  # fmt: skip
+    return out
+
+
+def compare(
+    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
+) -> list[Joint]:
+    """Families and strides that all oscillators may be of, the plainest first; what fails one is not tried on
+    the others."""
+    steps = list(strides)
+    parts: list[dict[tuple[str, int], Match]] = []
+    for found, what in zip(maps, terms, strict=True):
+        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps)}
+        parts.append(fitting)
+        families = tuple(f for f in families if any(f.name == name for name, _ in fitting))
+        steps = sorted({s for _, s in fitting})
+        if not families:
+            return []
+    joints = [
+        Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts))
+        for key in parts[0]
+        if all(key in x for x in parts)
+    ]
+    return sorted(joints, key=lambda x: x.plainness)
+
+
+def nearest(
+    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
+) -> list[Joint]:
+    """Families and strides at their best, whether or not they may be accepted."""
+    steps = list(strides)
+    parts = [
+        {(x.family, x.stride): x for x in matches(found, what, families, steps, far=True)}
+        for found, what in zip(maps, terms, strict=True)
+    ]
+    return [
+        Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts))
+        for key in parts[0]
+        if all(key in x for x in parts)
+    ]

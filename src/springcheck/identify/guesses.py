@@ -1,0 +1,393 @@
+"""First guesses of the families' unknowns: steps that a map may be the power of, and what has them.
+
+Without friction a family is a curve over the phase of its step.  Each root of a measured map has a phase, so
+that its entries and those of every curve there are compared at once; what comes near is followed by
+Gauss-Newton.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Any
+
+import numpy as np
+
+from springcheck.identify.families import FAMILIES, Family
+from springcheck.identify.fit import Map
+from springcheck.identify.hypothesis import STRIDES
+from springcheck.identify.maps import MapTable, table, unit
+from springcheck.identify.record import ROUNDING
+from springcheck.physics.arrays import Floats, Integers
+from springcheck.schemes import rotation
+
+NEAR = 1e-11, 30.0
+"""Distance of the entries of one step, and how many of its errors, within which a family is worth an exact
+comparison: what Gauss-Newton in double precision leaves of the right one."""
+
+FAR = 3.0
+"""The same where the nearest is wanted, whether or not it may be accepted."""
+
+LOST = 3.0
+"""The same of a first guess, and as long as steps are long."""
+
+CURVED, QUOTIENT, FARTHEST = 30.0, 1e-5, 0.3
+"""What a step of relative length 1 may leave over beside what further steps take away, in units of its
+square: 8.4 at most in the right families of 11,600 maps of up to 0.9 of the critical damping; the same in
+units of the step, because slopes are difference quotients; and the length from which a step says nothing."""
+
+FLOW_TURNS = 8
+"""Turns between two frames that the exact flow, which has no step, is looked for at."""
+
+CELLS, LARGEST_PHASE = 2048, 1.15 * math.pi
+"""Cells of the phase of a step in which it is tabulated, and the largest: RK4 turns by more than a half."""
+
+GLANCE = 3e-6
+"""Distance of the entries of one step from a tabulated one, over the root of the determinant and beside what
+the table bends, within which a guess is followed."""
+
+DAMPING = 2.0
+"""The same in units of g, where there is friction.  Measured on 2,900 maps of up to 0.9 of the critical
+damping: 1.7."""
+
+END = 0.02
+"""Phase beside the largest one in which a table says little."""
+
+FOLDED = 0.7
+"""Share of the largest phase of a step from which friction may take it beyond that."""
+
+FOLDS = 0.6, 0.75, 0.9, 1.05, 1.2
+"""Shares of the h w of the largest phase that are tried there."""
+
+LARGEST = 30.0
+"""h w that implicit schemes, which have no limit, are looked for at."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curves:
+    """Steps without friction over their phase, where it rises and where it falls: the family of each curve,
+    its first and last phase, and at `CELLS` + 1 phases h w, log of the determinant, M11 and M12 over its
+    root, and how far these bend within a cell."""
+
+    family: Integers
+    low: Floats
+    high: Floats
+    rows: Floats
+
+    @property
+    def apart(self) -> float:
+        return LARGEST_PHASE / CELLS
+
+
+@lru_cache(maxsize=64)
+def _curves(families: tuple[str, ...]) -> _Curves:
+    each = [_curve(name) for name in families]
+    of = np.repeat(np.arange(len(each)), [len(x.low) for x in each])
+    low, high, rows = (np.concatenate([getattr(x, name) for x in each]) for name in ("low", "high", "rows"))
+    return _Curves(of, low, high, rows)
+
+
+@cache
+def _curve(name: str) -> _Curves:
+    family = FAMILIES[name]
+    highest = family.limit * (1 - 1e-12) if 0 < family.limit < 100 else LARGEST
+    x = np.unique(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(1e-4, min(0.1, highest), 200),
+                                  np.linspace(0.1, highest, 2000),
+                                  np.linspace(0.1, min(3.5, highest), 2000)]))  # fmt: skip
+    with np.errstate(all="ignore"):
+        m = np.asarray(unit(family, np.square(x), np.zeros_like(x)), np.float64)
+        found = rotation(m.astype(np.longdouble))
+        phase = np.where(m[:, 0, 1] < 0, 2 * np.pi - found.angle, found.angle)
+        loss = np.log(np.abs(np.asarray(found.determinant, np.float64)))
+        rows = np.array([x, loss, *(m[:, 0].T * np.exp(-loss / 2))])
+    good = found.angle > 0
+    phase, rows = phase[good].astype(np.float64), rows[:, good]
+    cuts = np.flatnonzero(np.diff(np.sign(np.diff(phase))) != 0) + 1
+    grid = np.linspace(0, LARGEST_PHASE, CELLS + 1)
+    ends, out = [], []
+    for piece in np.split(np.arange(len(phase)), cuts):
+        at = piece if phase[piece[-1]] >= phase[piece[0]] else piece[::-1]
+        if len(at) > 1:
+            ends.append(phase[at][[0, -1]])
+            curve = np.array([np.interp(grid, phase[at], row[at]) for row in rows])
+            bend = np.max(np.abs(np.diff(curve[1:], 2)), axis=0)
+            bend = np.concatenate([bend[:1], np.maximum(bend[1:], bend[:-1]), bend[-1:]])
+            out.append(np.concatenate([curve, [np.append(bend, bend[-1])]]))
+    low, high = np.array(ends).T
+    return _Curves(np.zeros(len(out), np.int64), low, high, np.array(out))
+
+
+@dataclass(slots=True)
+class Roots:
+    """Steps (r,) that a map may be the power of: the matrix on (q, v h), its phase and log of determinant."""
+
+    s: Floats
+    turns: Floats
+    phase: Floats
+    log_det: Floats
+    step: Floats
+    error: float
+    kept: dict[Any, Any]
+    """What was already worked out of them."""
+
+
+def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
+    """The steps that a map may be these powers of, every whole number of unseen turns included."""
+    every = np.array(list(strides), np.float64)
+    b = found.entries.astype(np.float64)
+    ratio = float(found.size[1] / found.size[0])
+    turn = found.turn
+    det = float(turn.determinant[0])
+    angle = float(turn.angle[0])
+    error = float(np.sqrt(np.max(np.diag(found.covariance)))) + ROUNDING
+    if angle > 0:
+        normal = (b / math.sqrt(det) - math.cos(angle) * np.eye(2)) / math.sin(angle)
+        counts = np.maximum(every.astype(int), FLOW_TURNS if every[0] == 1 else 1)
+        s = np.repeat(every, counts)
+        turns = np.concatenate([np.arange(n) for n in counts]).astype(np.float64)
+        # a map that turns by more than half a turn has an upper right entry below 0
+        own = angle if b[0, 1] > 0 else 2 * math.pi - angle
+        normal = normal if b[0, 1] > 0 else -normal
+        phase = (own + 2 * math.pi * turns) / s
+        kept = (phase < 2 * math.pi) | (s == 1)
+        s, turns, phase = s[kept], turns[kept], phase[kept]
+        log_det = math.log(det) / s
+        step = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * normal
+        step = step * np.exp(log_det / 2)[:, None, None]
+        error *= (1 + 1 / math.sin(angle)) / math.sin(angle)
+    else:
+        values, vectors = np.linalg.eig(b)
+        values, vectors = np.real(values), np.real(vectors)
+        s = every if np.all(values > 0) else every[every % 2 == 1]
+        gap = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
+        if gap < 1e-9 or not np.all(values):
+            s = s[s == 1]
+        each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
+        back = np.linalg.inv(vectors) if gap >= 1e-9 else np.eye(2)
+        step = (vectors * each[:, None, :]) @ back if gap >= 1e-9 else np.repeat(b[None], len(s), axis=0)
+        turns, phase, log_det = np.zeros_like(s), np.full(len(s), np.nan), math.log(abs(det) or 1e-300) / s
+        error *= (1 + 1 / max(gap, 1e-6)) / max(gap, 1e-6)
+    step = step.copy()
+    # from (q/size, v T/size) to (q, v h)
+    step[:, 0, 1] *= s / ratio
+    step[:, 1, 0] *= ratio / s
+    return Roots(s, turns, phase, log_det, step, error, {})
+
+
+@dataclass(slots=True)
+class Guesses:
+    """Candidates (c,): family, root, and the unknowns a and g."""
+
+    which: Integers
+    root: Integers
+    a: Floats
+    g: Floats
+
+    def __getitem__(self, at: Integers) -> Guesses:
+        return Guesses(self.which[at], self.root[at], self.a[at], self.g[at])
+
+
+def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far: bool) -> Guesses:
+    """First guesses: a from the phase of the family's own step, g from what it leaves of the determinant; but
+    for `far` of those alone whose entries may agree."""
+    turning = np.flatnonzero(np.isfinite(roots.phase))
+    standing = np.flatnonzero(~np.isfinite(roots.phase))
+    curved = [i for i, f in enumerate(every.families) if not (f.held or f.flow)]
+    parts = []
+    if curved and len(turning):
+        parts.append(_on_curves(every, roots, np.array(curved), turning, free_scale=free_scale, far=far))
+    for i, family in enumerate(every.families):
+        if family.held:
+            a = 2 - np.trace(roots.step, axis1=1, axis2=2) + np.expm1(roots.log_det)
+            g = (1 - roots.step[:, 0, 0]) / np.where(a == 0, 1, a)
+            at = np.flatnonzero(np.abs(roots.step[:, 0, 1] - 1) < 0.1)
+            parts.append((np.full(len(at), i), at, a[at], g[at]))
+            continue
+        if family.flow:
+            at = turning[roots.s[turning] == 1]
+            g = -roots.log_det[at] if family.damped else np.zeros(len(at))
+            parts.append((np.full(len(at), i), at, roots.phase[at] ** 2 + g**2 / 4, g))
+        elif family.damped and len((curve := _curve(_base(family))).low) > 1:
+            # the phase turns back at its largest, which friction exceeds
+            highest = curve.high[0] + 2 * DAMPING * np.abs(roots.log_det)
+            left = np.flatnonzero(~(roots.phase < FOLDED * curve.high[0]) & ~(roots.phase > highest))
+            left = left[roots.s[left] <= STRIDES[0]]
+            tries = np.array([(h_w * curve.rows[0, 0, -1], share) for h_w in FOLDS for share in (0.5, 1.0)])
+            g = np.outer(-roots.log_det[left], tries[:, 1]).ravel()
+            h_w = np.tile(tries[:, 0], len(left))
+            parts.append((np.full(len(g), i), np.repeat(left, len(tries)), h_w**2, g))
+        if len(standing):
+            # real eigenvalues: an inverted spring, or friction beyond the critical
+            left = standing[roots.s[standing] == 1] if family.flow else standing
+            logs = np.log(np.abs(np.real(np.linalg.eigvals(roots.step[left]))) + 1e-300)
+            a = logs[:, 0] * logs[:, 1]
+            g = -np.sum(logs, axis=1) if family.damped else 0 * a
+            parts.append((np.full(len(left), i), left, a, g))
+            if not (family.damped or family.flow):
+                # beyond its limit a step kicks and drifts all the same
+                kick = 1 - np.trace(roots.step[left], axis1=1, axis2=2) + np.exp(roots.log_det[left])
+                parts.append((np.full(len(left), i), left, kick, 0 * a))
+    which, root, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
+    if every.damped and not growing:
+        held = every.held[which]
+        g = np.where(held, g, np.maximum(g, 1e-9))
+    good = np.isfinite(a) & np.isfinite(g) & (a != 0)
+    return Guesses(which[good], root[good].astype(np.int64), a[good], g[good])
+
+
+def _base(family: Family) -> str:
+    """The family without its friction."""
+    return family.scheme if family.damped else family.name
+
+
+def _on_curves(
+    every: MapTable, roots: Roots, curved: Integers, turning: Integers, *, free_scale: bool, far: bool
+) -> tuple[Integers, Integers, Floats, Floats]:
+    """Families and roots whose phase a step without friction has, and whose entries may agree; a and g."""
+    # friction moves a step away from that without it, which many families share
+    bases = np.array([_base(every.families[i]) for i in curved.tolist()])
+    names, base = np.unique(bases, return_inverse=True)
+    curves = _curves(tuple(names.tolist()))
+    at = turning[roots.phase[turning] < LARGEST_PHASE]
+    phase, log_det = roots.phase[at], roots.log_det[at]
+    first, second = (roots.step[at, 0, k] * np.exp(-log_det / 2) for k in (0, 1))
+    cell = np.minimum((phase / curves.apart).astype(np.int64), CELLS - 1)
+    part = phase / curves.apart - cell
+
+    def between(k: int, curve: Any, r: Any) -> Floats:
+        left, right = (curves.rows[curve, k, cell[r] + i] for i in (0, 1))
+        return np.asarray(left + (right - left) * part[r])
+
+    asked = "curves", tuple(names.tolist()), len(roots.s), len(at)
+    if asked not in roots.kept:
+        each, all_ = np.arange(len(curves.low))[:, None], np.arange(len(at))
+        losses = between(1, each, all_) - log_det
+        roots.kept[asked] = losses, np.abs(between(2, each, all_) - first) - curves.rows[each, 4, cell]
+    loss, off = roots.kept[asked]
+    room = GLANCE + NEAR[1] * roots.error
+    beyond = phase - curves.high[:, None]
+    close = (
+        off <= room + DAMPING * np.abs(loss) if every.damped else (off <= room) & (np.abs(loss) <= 2 * room)
+    )
+    # friction may exceed the largest phase, and beside it a table says little
+    beside = (beyond > -END) & (np.abs(loss) <= 2 if every.damped else True)
+    curve, r = np.nonzero(
+        far | (close & (beyond < END + DAMPING * np.abs(loss) * every.damped)) | (beside & (beyond < END))
+    )
+    if not (far or free_scale):
+        other = between(3, curve, r)
+        size = np.minimum(np.abs(other), np.abs(second[r])) + 0.05
+        rooms = (
+            room + (DAMPING * np.abs(loss[curve, r]) if every.damped else 0) + curves.rows[curve, 4, cell[r]]
+        )
+        kept = (np.abs(other - second[r]) <= rooms * size) | (phase[r] > curves.high[curve] - END)
+        curve, r = curve[kept], r[kept]
+    g = loss[curve, r] if every.damped else np.zeros(len(r))
+    h_w = between(0, curve, r)
+    # a step so small that it is not tabulated
+    h_w = np.where(phase[r] < curves.apart, phase[r], h_w)
+    # every family of a curve
+    order = np.argsort(base, kind="stable")
+    counts = np.bincount(base, minlength=len(names))
+    of = curves.family[curve]
+    times = counts[of]
+    begin = np.repeat((np.cumsum(counts) - counts)[of] - (np.cumsum(times) - times), times)
+    which = curved[order[begin + np.arange(int(np.sum(times)))]]
+    return which, np.repeat(at[r], times), np.repeat(h_w**2 + g**2 / 4, times), np.repeat(g, times)
+
+
+def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far: bool = False) -> Guesses:
+    """Those of the guesses that come near a root, by Gauss-Newton on a step's entries; with `far` all."""
+    rounds = 6 if every.damped else 3
+    bound = NEAR[0] + NEAR[1] * roots.error
+    length = np.full(len(x.a), np.inf)
+    for turn in range(rounds + 1):
+        wanted = _compared(roots.step[x.root], free_scale=free_scale)
+        size = _entry_sizes(wanted, roots, x)
+        r = (
+            _compared(every.unit(x.which, x.a, x.g).astype(np.float64), free_scale=free_scale) - wanted
+        ) / size
+        off = np.max(np.abs(r), axis=0)
+        # what is left over after a short step is its square and no more, or does not go away
+        short = np.where(length < FARTHEST, CURVED * length**2 + QUOTIENT * length, LOST)
+        keep = np.flatnonzero(off <= (FAR if far else bound + (short if turn < rounds else 0.0)))
+        x, length = x[keep], length[keep]
+        if turn == rounds or not len(keep) or float(np.max(off[keep])) < NEAR[0]:
+            return x
+        r, wanted, size = r[:, keep], wanted[:, keep], size[:, keep]
+        moves = [(1e-6 * np.abs(x.a), 0.0)] + ([(0.0, 1e-7)] if every.damped else [])
+        slopes = [
+            (
+                (
+                    _compared(every.unit(x.which, x.a + d, x.g + e).astype(np.float64), free_scale=free_scale)
+                    - wanted
+                )
+                / size
+                - r
+            )
+            / (d + e)
+            for d, e in moves
+        ]
+        step = least_squares(np.array(slopes), -r)[0]
+        x.a = x.a + np.clip(step[0], -0.5 * np.abs(x.a), 0.5 * np.abs(x.a))
+        length = np.abs(step[0] / x.a)
+        if every.damped:
+            x.g = x.g + step[1]
+            length = length + np.abs(step[1]) / np.sqrt(np.abs(x.a))
+    return x
+
+
+def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
+    """What entries are compared by: diagonal ones by the root of the determinant, the others by their own
+    size, but for what a half turn takes away of it."""
+    whole = np.exp(np.maximum(roots.log_det[x.root] / 2, -600))
+    bend = np.nan_to_num(np.abs(np.sinc(roots.phase[x.root] / np.pi)), nan=1.0)
+    out = np.abs(wanted)
+    out[[0, -1]] = np.maximum(out[[0, -1]], whole)
+    out[1:-1] = np.maximum(out[1:-1], 0.1 * out[1:-1] / np.maximum(bend, 1e-9)) + 1e-300
+    # a drift moves by v h; what does not turn may leave little of it
+    lost = ~np.isfinite(roots.phase[x.root])
+    out[1] = np.where(lost & (len(out) == 4), np.maximum(out[1], 0.3), out[1])
+    return out
+
+
+def _compared(m: Floats, *, free_scale: bool) -> Floats:
+    """What is compared of matrices (c, 2, 2): entries, or where velocities have any scale the three numbers
+    that no scale changes."""
+    if free_scale:
+        return np.stack([m[:, 0, 0], m[:, 0, 1] * m[:, 1, 0], m[:, 1, 1]])
+    return np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 0], m[:, 1, 1]])
+
+
+def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
+    """Steps (k, c) of k unknowns, of slopes (k, m, c) and right sides (m, c), and their variances."""
+    square = np.einsum("imc,jmc->cij", slopes, slopes)
+    size = np.sqrt(np.einsum("cii->ci", square)) + 1e-300
+    even = square / size[:, :, None] / size[:, None, :] + 1e-13 * np.eye(len(slopes))
+    inverse = np.linalg.inv(even) / size[:, :, None] / size[:, None, :]
+    step = np.einsum("cij,jmc,mc->ic", inverse, slopes, right)
+    return np.asarray(step), np.asarray(np.einsum("cii->ic", inverse))
+
+
+def roots_of(
+    families: tuple[Family, ...], steps: Floats, room: float, *, free_scale: bool = False
+) -> tuple[Integers, Integers, Floats, Floats]:
+    """Which families have these one-step matrices (r, 2, 2) on (q, v h) to within `room`: family, matrix, a
+    and g of each."""
+    every = table(families)
+    with np.errstate(all="ignore"):
+        found = rotation(steps.astype(np.longdouble))
+        phase = np.where(found.angle > 0, found.angle, np.nan).astype(np.float64)
+        phase = np.where(steps[:, 0, 1] < 0, 2 * np.pi - phase, phase)
+        log_det = np.log(np.abs(found.determinant)).astype(np.float64)
+        ones = np.ones(len(steps))
+        roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1], {})
+        x = polished(
+            every,
+            roots,
+            first(every, roots, growing=False, free_scale=True, far=True),
+            free_scale=free_scale,
+        )
+    return x.which, x.root, x.a, x.g

@@ -1,0 +1,173 @@
+"""Numbers that stand in the wrong place: positions wrapped into a box, particles or velocities in another
+order, velocities of the other sign.
+
+Each is undone and the map read anew: it is the cause where that brings down what the map leaves over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from springcheck.identify.evidence import FALLS, Evidence
+from springcheck.identify.fit import fit
+from springcheck.identify.record import Record
+from springcheck.identify.result import Explanation
+from springcheck.physics.arrays import Floats, Integers
+
+LEAPS = 4.0
+"""Times the usual way between two frames from which a position leaps."""
+
+AGAINST = 0.3
+"""Share of the way between frames by which it may differ from that of the velocities, turned over."""
+
+MOST_COMPARED = 12
+"""Coordinates of which every two are compared."""
+
+Repair = tuple[Record, str, str]
+"""A record with the numbers in their place, what was wrong, and what to do."""
+
+
+def misplaced(e: Evidence) -> list[Explanation]:
+    """What is wrong where numbers stand in the wrong place."""
+    before = _left(e.record, e.j)
+    if not before:
+        return []
+    for look in LOOKS:
+        for record, cause, remedy in look(e.record, e.j):
+            after = _left(record, e.j)
+            if after * FALLS < before:
+                return [Explanation(cause=cause, remedy=remedy, misfit=after / before, local=True)]
+    return []
+
+
+def _left(record: Record, j: int) -> float:
+    """What one map leaves over of a coordinate's frames, in the mean square of its size."""
+    z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.float64)
+    z = z - np.mean(z, axis=0)
+    if not np.all(np.std(z, axis=0) > 0):
+        return 0.0
+    try:
+        found = fit(record, j)
+    except np.linalg.LinAlgError:
+        return 0.0
+    return float(np.max(found.residual))
+
+
+def _wrapped(record: Record, j: int) -> Iterator[Repair]:
+    """Positions in a box: leaps of one length."""
+    q, v = (x[:, j].astype(np.float64) for x in (record.q, record.v))
+    way = np.diff(q) - (v[1:] + v[:-1]) / 2 * float(record.interval)
+    usual = float(np.median(np.abs(np.diff(q))))
+    leaps = np.abs(way) > LEAPS * max(usual, 1e-300)
+    if not np.any(leaps):
+        return
+    box = float(np.median(np.abs(way[leaps])))
+    times = np.rint(way / box)
+    if box < LEAPS * usual or np.any(np.abs(way - times * box) > LEAPS * usual):
+        return
+    # a box is a short number; what the states show of it is as long as their roundings allow
+    short = next((x for n in range(1, 17) if abs((x := float(f"{box:.{n}g}")) - box) < usual), box)
+    shift = np.concatenate([[0.0], np.cumsum(times)]) * short
+    moved = record.q.copy()
+    moved[:, j] -= shift
+    first = int(np.flatnonzero(times)[0]) + 1
+    yield (
+        replace(record, q=moved),
+        f"The positions of coordinate {j} are wrapped into a box of {short:.6g}, first at frame {first}",
+        "write unwrapped positions, or unwrap them by the length of the box",
+    )
+
+
+def turned(record: Record, moving: list[int]) -> list[Explanation]:
+    """Velocities of the other sign: positions move against them, in frames so close that this shows."""
+    against = []
+    for j in moving:
+        way = np.diff(record.q[:, j]).astype(np.float64)
+        mean = ((record.v[1:, j] + record.v[:-1, j]) / 2 * record.interval).astype(np.float64)
+        if float(np.sum((way + mean) ** 2)) < AGAINST**2 * float(np.sum(way**2)):
+            against.append(j)
+    if not against:
+        return []
+    whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
+    return [
+        Explanation(
+            cause=f"The velocities of {whose} have the wrong sign: positions move against them",
+            remedy="change the sign of the velocities, or write the frames in the order of time",
+            misfit=0.0,
+            local=True,
+        )
+    ]
+
+
+def _exchanged(record: Record, j: int) -> Iterator[Repair]:
+    """Numbers of two coordinates that have changed places, in some frames or in all."""
+    n = record.q.shape[1]
+    if not 1 < n <= MOST_COMPARED:
+        return
+    h = float(record.interval)
+    q, v = record.q.astype(np.float64), record.v.astype(np.float64)
+    for pair in combinations(range(n), 2):
+        if j not in pair:
+            continue
+        two = list(pair)
+        for what, whose in (
+            ("particles", (True, True)),
+            ("velocities", (False, True)),
+            ("positions", (True, False)),
+        ):
+            x, u = q[:, two].copy(), v[:, two].copy()
+            swapped = np.zeros(len(x), dtype=bool)
+            begin = what == "velocities" and _nearer(q[:, two], v[:, two], h)
+            for i in range(len(x)):
+                if i == 0 and not begin:
+                    continue
+                other = (x[i, ::-1] if whose[0] else x[i], u[i, ::-1] if whose[1] else u[i])
+                if i == 0:
+                    swap = True
+                else:
+                    was = _off(x[i - 1], u[i - 1], x[i], u[i], h)
+                    swap = _off(x[i - 1], u[i - 1], *other, h) < was
+                if swap:
+                    x[i], u[i] = other
+                    swapped[i] = True
+            if not np.any(swapped):
+                continue
+            qs, vs = record.q.copy(), record.v.copy()
+            at = np.flatnonzero(swapped)
+            here, there = (np.ix_(at, np.array(columns)) for columns in (two, two[::-1]))
+            if whose[0]:
+                qs[here] = qs[there]
+            if whose[1]:
+                vs[here] = vs[there]
+            yield (
+                replace(record, q=qs, v=vs),
+                f"The {what} of coordinates {pair[0]} and {pair[1]} have changed places {_where(at, len(x))}",
+                "sort the particles by their number before they are written, positions and velocities alike",
+            )
+
+
+def _off(q: Floats, v: Floats, x: Floats, u: Floats, h: float) -> float:
+    """How far a frame lies from the one before, moved on by the mean of the velocities."""
+    return float(np.sum((x - q - h * (u + v) / 2) ** 2) + np.sum((h * (u - v)) ** 2))
+
+
+def _nearer(q: Floats, v: Floats, h: float) -> bool:
+    """Whether the first velocities are each other's."""
+    way = q[1] - q[0]
+    return float(np.sum((way - h * v[0, ::-1]) ** 2)) < float(np.sum((way - h * v[0]) ** 2))
+
+
+def _where(frames: Integers, of: int) -> str:
+    if len(frames) == of:
+        return "in every frame"
+    if len(frames) == of - int(frames[0]):
+        return f"from frame {int(frames[0])} on"
+    shown = ", ".join(str(int(i)) for i in frames[:4])
+    return f"in {len(frames)} of {of} frames: {shown}{', ...' if len(frames) > 4 else ''}"
+
+
+LOOKS: tuple[Callable[[Record, int], Iterator[Repair]], ...] = (_wrapped, _exchanged)

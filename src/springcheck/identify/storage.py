@@ -1,0 +1,121 @@
+"""How finely numbers were written down, read from the numbers themselves: the rounding that a file adds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats
+
+SAMPLE = 500
+"""Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
+
+FEWEST_VALUES = 4
+"""Different sizes of numbers below which they say nothing of how they were written."""
+
+BINARY = {"single": 24, "half": 11, "bfloat16": 8}
+"""Binary formats shorter than double precision, and their significant bits."""
+
+SMALLEST = {"single": -149, "half": -24, "bfloat16": -133}
+"""Exponents of the smallest numbers of these formats."""
+
+MOST_DIGITS = 16
+"""Significant decimal digits of text that is coarser than double precision."""
+
+DIGITS_OF_SINGLE = 7
+"""More of them say nothing of numbers of single precision."""
+
+BY_CHANCE = 1e-6
+"""Probability of numbers that lie as near to those of single precision by chance, from which they do not."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Storage:
+    """How numbers were written down: `name` ("double", "single", "text, 6 digits"), and how finely."""
+
+    name: str = "double"
+    digits: int = 0
+    """Significant decimal digits; 0 where the numbers are not decimal text of that kind."""
+    decimals: int | None = None
+    """Digits after the point, where that is what is constant."""
+
+    def quantum(self, x: Floats) -> Floats:
+        """Distance of neighbouring numbers around x that the storage can hold."""
+        if self.decimals is not None:
+            return np.full(x.shape, 10.0**-self.decimals)
+        if self.digits:
+            size = np.where(x == 0, 1.0, np.abs(x))
+            return np.where(x == 0, 0.0, 10.0 ** (np.floor(np.log10(size)) - self.digits + 1))
+        if self.name in BINARY:
+            return _spacing(x, self.name)
+        return np.asarray(np.spacing(np.abs(x)))
+
+
+def _spacing(x: Floats, name: str) -> Floats:
+    """Distance of neighbouring numbers of a binary format around x."""
+    _, exponent = np.frexp(x)
+    return np.asarray(np.ldexp(1.0, np.maximum(exponent - BINARY[name], SMALLEST[name])))
+
+
+def _rounded(x: Floats, name: str) -> Floats:
+    """Numbers of a binary format, nearest to x."""
+    unit = _spacing(x, name)
+    return np.asarray(np.rint(x / unit) * unit)
+
+
+def single_of(x: Floats, digits: int = 0) -> bool:
+    """Whether x are numbers of single precision: within an ulp of double, as a conversion of units leaves
+    them, or within the rounding of so many decimal digits that they were written with."""
+    x = x[x != 0]
+    off = np.abs(_rounded(x, "single") - x)
+    if np.all(off <= 2.0**-51 * np.abs(x)):
+        return True
+    if digits <= DIGITS_OF_SINGLE:
+        return False
+    unit = Storage(digits=digits).quantum(x)
+    if np.any(off > unit / 2 + 2.0**-51 * np.abs(x)):
+        return False
+    # every number of few digits more lies near one by chance
+    return float(np.sum(np.log(np.minimum(unit / _spacing(x, "single"), 1)))) < math.log(BY_CHANCE)
+
+
+def storage(x: Floats) -> Storage:
+    """How x was written down, from the numbers themselves."""
+    values = np.ravel(x)
+    values = values[values != 0]
+    if len(np.unique(np.abs(values))) < FEWEST_VALUES:
+        return Storage()
+    at = np.linspace(0, len(values) - 1, min(len(values), SAMPLE)).astype(int)
+    sample = values[at]
+    listed = sample.tolist()
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        single = bool(np.all(np.abs(values) < 3e38)) and single_of(values)
+        short = next((name for name in ("bfloat16", "half") if single and _exact(values, name)), None)
+
+    def same(text: str, y: float) -> bool:
+        return bool(np.float32(text) == np.float32(y)) if single else float(text) == y
+
+    most = DIGITS_OF_SINGLE if single else MOST_DIGITS
+    digits = next((d for d in range(1, most + 1) if all(same(f"{y:.{d - 1}e}", y) for y in listed)), 0)
+    decimals = next((d for d in range(most) if all(same(f"{y:.{d}f}", y) for y in listed)), None)
+    if not single and digits > DIGITS_OF_SINGLE and single_of(values, digits):
+        # nine digits hold a number of single precision
+        return Storage(name="single")
+    found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
+    if decimals is not None:
+        found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
+    # text that is finer than the numbers around it says nothing: every number has such a decimal form
+    binary = Storage(name=short or ("single" if single else "double"))
+    found = [text for text in found if np.all(text.quantum(sample) >= 2 * binary.quantum(sample))]
+    if found:
+        # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
+        # neighbours below it ten times as close as those above
+        below = sample * (1 - 2.0**-40)
+        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
+    return binary
+
+
+def _exact(x: Floats, name: str) -> bool:
+    return bool(np.all(_rounded(x, name) == x))

@@ -1,0 +1,105 @@
+"""Identification of thermostats: what `springcheck.thermal` finds, in the words of an identification."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from springcheck.identify.result import Candidate, Explanation, Identification
+from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.likelihood import FEWEST, Thermal, identify_thermal
+
+MOST = 8
+"""Oscillators that are looked at, each by itself."""
+
+REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
+
+
+def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
+    """What a thermostat has left in states (f, n) at times t (f,); None where nothing random shows."""
+    times, positions = np.asarray(t, np.float64), np.asarray(q, np.float64)
+    u = np.asarray(p if v is None else v, np.float64)
+    if times.ndim != 1 or len(times) < FEWEST or positions.shape != u.shape or len(positions) != len(times):
+        return None
+    m = np.broadcast_to(1.0 if mass is None else np.asarray(mass, np.float64), positions.shape[1:]).ravel()
+    steps = np.diff(times)
+    if not np.all(np.abs(steps - steps[0]) <= 1e-9 * abs(steps[0])):
+        return None
+    positions, u = (x.reshape(len(x), -1) for x in (positions, u))
+    if positions.shape[1] > MOST or not np.all(m > 0):
+        return None
+    if v is None:
+        u = u / m
+    found = [identify_thermal(times, x, y) for x, y in zip(positions.T, u.T, strict=True)]
+    if any(one is None for one in found):
+        return None
+    known = [one for one in found if one is not None]
+    return _said(known, float(np.mean(steps)), None if mass is None and v is None else m, mass is not None)
+
+
+def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identification:
+    first = found[0]
+    names = [y.scheme for y in first.candidates]
+    schemes = [name for name in names if all(name in [y.scheme for y in one.candidates] for one in found)]
+    best = schemes[0] if schemes else None
+    named = best is not None and all(one.named and one.candidates[0].scheme == best for one in found)
+    verdict: Any = "named" if named else "not told apart" if best else "none"
+    rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
+    kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
+    candidates = tuple(
+        Candidate(
+            scheme=name, aliases=(), stride=1, step=h, turns=0, omega=tuple(y.omega for y in rows[name]),
+            stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
+            if with_mass else None,
+            friction=tuple(y.friction for y in rows[name]), law="of the bath",
+        )
+        for name in kept
+    )  # fmt: skip
+    notes = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    if first.uniform:
+        notes.append("the draws are uniform, not normal")
+    if first.candidates and not named:
+        notes.append(
+            "one scheme is named where it beats every other by a factor of 1e6; a stated stiffness, or more "
+            "frames, may tell them apart"
+        )
+    if first.free:
+        combination = ", ".join(f"{x:.9g}" for x in first.free)
+        notes.append(f"free of noise at every step: ({combination}) on (x', v', x, v), to {first.misfit:.0e}")
+    unknown = (math.nan,) * len(found)
+    head = "each step takes noise: a thermostat"
+    if named and best:
+        late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
+        statement = f"{head}, {THERMOSTATS[best].title}{late}"
+    elif best:
+        statement = f"{head}, {' or '.join(kept)}"
+    else:
+        statement = f"{head}, by no scheme that is known here, or frames lie several steps apart"
+    only = candidates[0] if named else None
+    return Identification(
+        verdict=verdict, statement=statement, scheme=best if named else None, aliases=(),
+        candidates=candidates,
+        step=h, stride=1 if named else None, omega=only.omega if only else unknown,
+        stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
+        velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
+        determinant=unknown, symplectic_defect=math.nan, defect_ulp=math.nan, precision="unknown",
+        fits=best is not None,
+        undecided=False, nearest=best if named else None, difference=(math.nan,) * 4, notes=tuple(notes),
+        explanations=() if best else (Explanation(cause=statement, remedy=REMEDY, misfit=math.nan),),
+    )  # fmt: skip
+
+
+def _numbers(name: str, one: Any, m: float | None) -> str:
+    """The numbers that a candidate means, each with its standard error."""
+    scale = 1.0 if m is None else m
+    of = (
+        ("omega", one.omega, one.omega_error), ("friction", one.friction, one.friction_error),
+        ("kT/m" if m is None else "kT", one.thermal * scale, one.thermal_error * scale),
+    )  # fmt: skip
+    return f"{name}: " + ", ".join(
+        f"{word} {x:.12g}" + ("" if error == 0 else f" +- {error:.1g}" if error > 0 else "")
+        for word, x, error in of
+        if math.isfinite(x)
+    )

@@ -1,0 +1,130 @@
+"""Maps that are no known scheme's: the class of a one-step method, and schemes with memory."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+
+from springcheck.identify.compare import nearest
+from springcheck.identify.evidence import FALLS, Evidence, distance, title
+from springcheck.identify.hypothesis import distinct
+from springcheck.identify.result import Explanation
+
+REAL = 0.3
+"""Largest share of an imaginary part in a coefficient that is real but for the terms of the next order."""
+
+ORDERS = range(1, 9)
+"""Powers of h L of which the first wrong coefficient is looked for."""
+
+SURE = 6.0
+"""Standard errors by which two numbers differ for certain."""
+
+FORGOTTEN = 0.1
+"""Share of what a map misses at first that is left in the last three quarters of the frames, of a memory that
+dies."""
+
+LASTING = 0.1
+"""Share of the largest state that each must have for what dies down to be a memory."""
+
+FEWEST_WITH_MEMORY = 12
+"""Frames from which a map of two states is told from chance."""
+
+
+def misfit(e: Evidence) -> Explanation:
+    """The class of a map that is no known scheme's, and how large the misfit is."""
+    entries = e.found.entries.astype(np.float64)
+    det = float(np.linalg.det(entries))
+    joints = nearest([e.found], [e.terms], distinct(damped=False), range(1, 2))
+    closest = min(joints, key=lambda x: distance(e.found, x.parts[0]), default=None)
+    growth = (
+        f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"
+    )
+    near = ""
+    if closest is not None:
+        off = distance(e.found, closest.parts[0])
+        near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
+    kind = _class(e) or growth
+    return Explanation(
+        cause=f"One linear map explains the states, but it is none of the known schemes': {kind}{near}",
+        remedy="compare the order of its stages and their coefficients with the scheme's",
+        misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
+    )
+
+
+def _class(e: Evidence) -> str:
+    """What is known of a one-step method by its map of a spring; "" where it is none's.
+
+    A Runge-Kutta method takes (q, v) by R(h L), which is x + y L with L**2 = -w**2, so that M11 = M22 and
+    M12, M21 show (h w)**2; R(i h w) less exp(i h w) is c (i h w)**n with a real c, and order n - 1.
+    """
+    if e.terms.mass_unknown:
+        return ""
+    entries = e.found.unscaled.astype(np.float64)
+    (x, y), (z, u) = entries
+    error = np.sqrt(np.diag(e.found.covariance))
+    det, turn = x * u - y * z, -z / y if y else -1.0
+    if not (det > 0 and turn > 0):
+        return ""
+    size = float(e.found.size[1] / e.found.size[0])
+    symmetric = abs(x - u) <= SURE * math.hypot(error[0], error[3]) + 1e-14
+    keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
+    if symmetric and keeps:
+        return (
+            "a one-step method that is not known here, which keeps areas and is symmetric in time, or a "
+            "known one whose velocities have another scale"
+        )
+    if not symmetric:
+        return f"a one-step method that is not known here, which {'keeps areas' if keeps else _growing(det)}"
+    step = math.sqrt(turn)
+    if e.stiffness is not None and e.record.mass is not None:
+        stated = e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
+        if abs(stated / turn - 1) > 1e-6:
+            return ""
+    wrong = complex(x, step * y) - cmath.exp(1j * step)
+    found = {n: wrong / (1j * step) ** n for n in ORDERS}
+    real = [n for n, c in found.items() if abs(c.imag) < REAL * abs(c.real)]
+    if not real:
+        return f"a one-step method that is not known here, which {_growing(det)}"
+    n = min(real, key=lambda n: abs(math.log(abs(found[n].real) * math.factorial(n))))
+    should = 1 / math.factorial(n)
+    return (
+        f"if every step was recorded, a one-step method of order {n - 1}, whose stability function has "
+        f"{should + found[n].real:.3g} z**{n} in place of {should:.3g} z**{n}"
+    )
+
+
+def _growing(det: float) -> str:
+    return f"multiplies areas by 1 {det - 1:+.2e}"
+
+
+def memory(e: Evidence) -> list[Explanation]:
+    """Two states that together give the next, where one does not: a scheme of two steps, whose memory dies.
+
+    What one map misses stands in the first frames then, and not in the first pair alone.
+    """
+    z = e.found.z.astype(np.float64)
+    size = np.sqrt(np.sum(z**2, axis=1))
+    if len(z) < FEWEST_WITH_MEMORY or np.min(size) < LASTING * np.max(size):
+        # what a motion that dies or grows misses does so as well
+        return []
+    off = np.max(np.abs(e.misses), axis=1)
+    if np.max(off[1:]) < 64 * np.max(e.unit) or np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
+        return []
+    columns = np.concatenate([z[1:-1], z[:-2]], axis=1)
+    left = z[2:] - columns @ np.linalg.lstsq(columns, z[2:], rcond=None)[0]
+    # the first frames alone show the other map, but for which all follow one
+    one = z[2:] - z[1:-1] @ np.linalg.lstsq(z[len(z) // 2 : -1], z[len(z) // 2 + 1 :], rcond=None)[0]
+    before, after = (float(np.max(np.abs(y))) for y in (one, left))
+    if before < FALLS * after or before < 64 * float(np.max(e.unit)):
+        return []
+    return [
+        Explanation(
+            cause="Each state follows from the two before it, and not from one: a scheme with memory, of two "
+            "steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha), whose "
+            f"start differs from one map by {before:.1e} of the state's size",
+            remedy="leave the first frames out, and judge it as a scheme of two steps",
+            misfit=after / before,
+        )
+    ]

@@ -1,0 +1,84 @@
+"""Files of strangers, read in a process of its own with little memory and time: whatever that does, we live.
+
+Libraries that read them (libhdf5, pandas, MDAnalysis, ASE ...) crash, hang and fill the memory on files that
+are damaged, or were made to do so.  A module that is called so has a `main(kind, path, *words)` that returns
+bytes, and a `__main__` that calls `perform`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from springcheck.interrupts import called
+
+LIMIT, SPEED = 8.0, 1e8
+"""Seconds that reading a file may take, whatever its size, and bytes a second on top."""
+MEMORY = 1 << 30
+"""Bytes of memory that it may take."""
+REFUSED = b"refused "
+"""Before what a reader says of a file that it does not take."""
+
+
+class EndedError(Exception):
+    """The process has crashed, or took more than it was given: the message says which."""
+
+
+def read(module: str, kind: str, path: Path, *words: str) -> bytes:
+    """What `main(kind, path, *words)` of a module's `__main__` returns.  EndedError where it does not."""
+    root = str(Path(__file__).parents[2])
+    paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+    # BLAS would take memory for a thread of each core
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    limit = LIMIT + path.stat().st_size / SPEED
+    command = [sys.executable, "-P", "-m", module, str(int(limit) + 1), str(MEMORY), kind, str(path), *words]
+    try:
+        # on a busy machine it waits longer than it works, and work is what is limited
+        done = called(command, 6 * limit, env={**os.environ, **threads, "PYTHONPATH": paths})
+    except subprocess.TimeoutExpired:
+        raise EndedError("does not end") from None
+    if done.returncode:
+        raise EndedError(
+            f"crashes its library, or asks for more than {limit:.0f} s or {MEMORY >> 30} GiB of memory"
+        )
+    return done.stdout
+
+
+def perform(main: Callable[..., bytes]) -> None:
+    """Be such a process: take no more than its arguments say, and answer on standard output alone."""
+    answer = os.dup(1)
+    os.dup2(2, 1)
+    _limit(int(sys.argv[1]), int(sys.argv[2]))
+    found = main(sys.argv[3], Path(sys.argv[4]), *sys.argv[5:])
+    with open(answer, "wb") as file:
+        file.write(found)
+    # a library that was given a bad file may crash as it is tidied up
+    os._exit(0)
+
+
+def _limit(seconds: int, memory: int) -> None:
+    """Take no more time and memory than this [s, B], write no file, and die with the process that asked."""
+    try:
+        import resource
+    except ImportError:
+        # Windows has no such limits; the process that asked waits no longer than its own
+        return
+    for what, most in (
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_AS, memory),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, 0),
+    ):
+        # macOS knows no RLIMIT_AS
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(what, (most, most))
+    if sys.platform == "linux":
+        import ctypes
+        import signal
+
+        parent_died = 1  # PR_SET_PDEATHSIG
+        ctypes.CDLL(None).prctl(parent_died, signal.SIGKILL)

@@ -1,0 +1,56 @@
+"""What commands are told: arguments that several of them take, and how they tell how far they are."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+Argument = tuple[tuple[str, ...], dict[str, Any]]
+"""An argument of a command: its names, and what argparse is told of it."""
+
+
+class Progress(Protocol):
+    """Told how much is done, of how much (pieces, steps or seconds of a budget), and what comes next."""
+
+    def __call__(self, done: float, whole: float, what: str = "") -> None: ...
+
+
+def argument(*names: str, **how: Any) -> Argument:
+    """An argument of a command."""
+    return names, how
+
+
+def repeatable(name: str, metavar: str, about: str, **more: Any) -> Argument:
+    """An option that may be given more than once."""
+    return argument(name, action="append", default=[], metavar=metavar, help=f"{about}; repeatable", **more)
+
+
+JSON = argument("--json", action="store_true", help="one JSON document on standard output")
+QUIET = argument("--quiet", action="store_true", help="print nothing but mistakes")
+FORCE = argument("--force", action="store_true", help="write an existing store anew")
+ENGINE = repeatable("--engine", "FILE.py", "an engine of your own, for this call")
+SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the path of a scene file")
+"""Arguments of many commands."""
+
+
+def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
+    """Those of every study that is kept in a store: where, which methods, what runs beside them."""
+    return (
+        argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})"),
+        repeatable("--method", "LABEL", "engine:method[@platform[-precision]] or a glob such as 'own:*'"),
+        ENGINE,
+        repeatable(
+            "--stepper", "MODULE:FUNCTION",
+            "your function step(q, p, h, force, mass) -> (q, p), also as FILE.py:FUNCTION",
+        ),
+        repeatable(
+            "--command", "NAME=COMMAND", "a program in any language, as 'name=./engine {scene} {out}'",
+            dest="program",
+        ),
+        repeatable(
+            "--scheme", "SCHEME|NAME=SCHEME", "the scheme of your functions and programs, or of one of them"
+        ),
+        argument("--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"),
+        FORCE,
+        JSON,
+        QUIET,
+    )  # fmt: skip

@@ -1,0 +1,80 @@
+"""The first limit of stability of a method on the spring, from its states alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck import simulate
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+
+LEAST, MOST, APART = 0.05, 4.0, 0.05
+"""h omega that are tried, the first of them and the last; of no engine is a limit below 0.05 looked for."""
+
+STEPS = 8
+"""Of each run: more pairs of states than a map of four entries needs, too few to leave a spring's range."""
+
+HALVINGS = 12
+"""Of the bracket, to 0.05 / 4096."""
+
+SMALL = 0.1
+"""Of the scene's start: near the limit a motion grows, and engines have a largest speed."""
+
+SPREAD = 10
+"""Times the error of the growth that its standard error is taken for: of eight steps it is poorly known."""
+
+STEEPEST = 4
+"""Power of h omega by which the growth of a scheme that always grows begins, at most: RK2's."""
+
+
+def first_limit(scene: Scene, label: Label) -> float:
+    """The least h omega whose one-step map grows, to a part in 1e5; 0: all grow, infinity: none up to 4.
+
+    One mass on one spring.  NaN where the engine refuses a step, or where its rounding hides a growth that
+    may begin below the first that is seen.
+    """
+    small = replace(scene, q=scene.q * SMALL, p=scene.p * SMALL, steps=STEPS, every=1, quantities=("q", "p"))
+    omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
+
+    def growth(h_omega: float) -> tuple[float, float]:
+        return _growth(simulate.run(replace(small, step=h_omega / omega), label))
+
+    try:
+        low, hidden = 0.0, 0.0
+        for high in np.arange(LEAST, MOST + APART / 2, APART).tolist():
+            size, error = growth(high)
+            if size > error:
+                break
+            low, hidden = high, error
+        else:
+            return float("inf")
+        if low == 0:
+            return 0.0
+        if hidden >= size * (low / high) ** STEEPEST:
+            return float("nan")
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            size, error = growth(middle)
+            low, high = (low, middle) if size > error else (middle, high)
+    except MethodError:
+        return float("nan")
+    return float((low + high) / 2)
+
+
+def _growth(run: Trajectory) -> tuple[float, float]:
+    """Spectral radius less 1 of the map (2, 2) that fits the states best, and what its error makes of 0."""
+    z = np.stack([run.q[:, 0], run.p[:, 0]])
+    if not np.isfinite(z).all():
+        return float("inf"), 0.0
+    z /= np.abs(z).max(axis=1, keepdims=True)
+    inverse = np.linalg.pinv(z[:, :-1])
+    fitted = z[:, 1:] @ inverse
+    left = z[:, 1:] - fitted @ z[:, :-1]
+    noise = np.sqrt((left**2).sum() / (left.size - fitted.size)) + 2.0**-52
+    values, vectors = np.linalg.eig(fitted)
+    error = SPREAD * noise * np.linalg.norm(inverse, 2) * np.linalg.cond(vectors)
+    return float(np.abs(values).max()) - 1, max(1e-12, float(error))

@@ -1,0 +1,205 @@
+"""The table of engines as a page, as CSV, and against an earlier one: from the JSON documents of censuses."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from springcheck import interrupts, schemes
+from springcheck.errors import SpringcheckError, StoreError, plain
+
+Row = Mapping[str, Any]
+
+COLUMNS = {
+    "method": "engine and attachment",
+    "about": "what is called",
+    "version": "version",
+    "scheme": "scheme, from the states",
+    "velocity": "stored velocity",
+    "substeps": "steps inside",
+    "friction": "unasked friction c/m",
+    "det": "det - 1",
+    "precision": "arithmetic",
+    "limit": "first limit, h omega",
+    "amplitude": "amplitude of the blog's spring (exact: 1)",
+    "forces": "forces a step",
+    "note": "note",
+    "command": "command that makes the row",
+}
+
+WATCHED = ("scheme", "velocity", "substeps", "friction", "det", "precision", "limit", "amplitude")
+"""Columns of which a change is said; versions are named beside it."""
+
+MARK = '<meta name="generator" content="springcheck census">'
+"""In the first lines of every page: no other file is replaced."""
+
+HEAD = ",".join(COLUMNS)
+"""The first line of every CSV."""
+
+MOST_BYTES = 500_000
+
+STYLE = """
+body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:110em;padding:0 1em}
+body{color:#222;background:#fff}
+table{border-collapse:collapse;font-size:13px}td,th{padding:.25em .6em;text-align:left;vertical-align:top}
+th{position:sticky;top:0;background:#eee;cursor:pointer}tr:nth-child(even){background:#f7f7f7}
+td.wrong{color:#b00;font-weight:bold}code{font-size:12px}input{font:inherit;width:24em;padding:.3em}
+@media(prefers-color-scheme:dark){body{color:#ddd;background:#181818}th{background:#333}
+tr:nth-child(even){background:#222}a{color:#8bf}td.wrong{color:#f77}}
+"""
+
+SCRIPT = """
+const body=document.querySelector('tbody'),rows=[...body.rows];
+document.querySelector('input').oninput=e=>{const w=e.target.value.toLowerCase().split(/\\s+/);
+for(const r of rows)r.hidden=!w.every(x=>r.textContent.toLowerCase().includes(x))};
+document.querySelectorAll('th').forEach((th,i)=>{let up=1;th.onclick=()=>{
+rows.sort((a,b)=>up*a.cells[i].textContent.localeCompare(b.cells[i].textContent,undefined,{numeric:true}));
+up=-up;body.append(...rows)}});
+"""
+
+
+def rows(*documents: Mapping[str, Any]) -> list[dict[str, str]]:
+    """One row for each entry of these documents, as text; of a method that is in several the first one's."""
+    found: dict[str, dict[str, str]] = {}
+    for document in documents:
+        for x in document["entries"]:
+            found.setdefault(x["method"], _row(x))
+    return list(found.values())
+
+
+def _row(x: Row) -> dict[str, str]:
+    named = x["found"] != "none that is known"
+    limit = "none up to 4" if x["bounded"] else "-" if x["limit"] is None else f"{x['limit']:.4f}"
+    offset = x["velocity_offset"]
+    return {
+        "method": x["method"],
+        "about": x.get("about", ""),
+        "version": x["version"],
+        "scheme": " or ".join(schemes.title(name) for name in x["found"].split(" or "))
+        if named
+        else x["found"],
+        "velocity": "-" if offset is None else "synchronised" if offset == 0 else f"{offset:+g} of a step",
+        "substeps": str(x["substeps"] or "-"),
+        "friction": _number(x["friction"], 1e-9),
+        "det": _number(x["area"], 1e-6 if x["precision"] == "single" else 1e-12),
+        "precision": x["precision"],
+        "limit": limit,
+        "amplitude": f"{x['amplitude']:.4f}",
+        "forces": f"{x['force_calls']:.3g}",
+        "note": "; ".join(filter(None, (x.get("note", ""), "" if x["agrees"] else "DECLARED OTHERWISE"))),
+        "command": x.get("command", f"springcheck census --method {x['method']}"),
+    }
+
+
+def _number(x: float | None, least: float) -> str:
+    return "-" if x is None else "0" if abs(x) < least else f"{x:+.3g}"
+
+
+def as_csv(found: Sequence[Mapping[str, str]]) -> str:
+    """The rows as CSV, whose cells no spreadsheet takes for a formula."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in found:
+        cells = (plain(row[name]) for name in COLUMNS)
+        writer.writerow([f"'{cell}" if cell[:1] in ("=", "@") else cell for cell in cells])
+    return out.getvalue()
+
+
+def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, Any]]) -> str:
+    """The page: a table to filter and sort; CSV and JSON are in it."""
+    engines = {row["method"].partition(":")[0] for row in found}
+    shown = {"CSV": ("text/csv", as_csv(found)), "JSON": ("application/json", json.dumps(list(documents)))}
+    links = " ".join(
+        f'<a download="engines.{name.lower()}" href="data:{kind};base64,'
+        f'{base64.b64encode(text.encode()).decode()}">{name}</a>'
+        for name, (kind, text) in shown.items()
+    )
+    head = "".join(f"<th>{escape(title)}</th>" for title in COLUMNS.values())
+    body = "\n".join("<tr>" + "".join(map(_cell, row, row.values())) + "</tr>" for row in found)
+    left = sorted({f"{x['method']}: {x['reason']}" for one in documents for x in one.get("left_out", ())})
+    rest = "".join(f"<li>{escape(plain(line, 300))}</li>" for line in left)
+    page = f"""<!doctype html><html lang="en"><head><meta charset="utf-8">{MARK}
+<meta name="viewport" content="width=device-width"><title>Which integrator does it really run?</title>
+<style>{STYLE}</style></head><body>
+<h1>Which integrator does it really run?</h1>
+<p>{len(found)} ways to move a mass on a spring by {len(engines)} engines.  No cell is an engine's word: each
+but the note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9).
+{links}</p>
+<p><input placeholder="filter: rapier, implicit, single ..." aria-label="filter"></p>
+<table><thead><tr>{head}</tr></thead><tbody>
+{body}
+</tbody></table>
+{"<h2>Not in the table</h2><ul>" + rest + "</ul>" if rest else ""}
+<script>{SCRIPT}</script></body></html>
+"""
+    if len(page.encode()) > MOST_BYTES:
+        raise SpringcheckError(f"the page would have {len(page.encode()):,} bytes, {MOST_BYTES:,} at most")
+    return page
+
+
+def _cell(name: str, text: str) -> str:
+    shown = escape(plain(text))
+    if name in ("method", "command"):
+        shown = f"<code>{shown}</code>"
+    return f'<td class="wrong">{shown}</td>' if "DECLARED" in text else f"<td>{shown}</td>"
+
+
+def changes(old: Sequence[Mapping[str, str]], new: Sequence[Mapping[str, str]]) -> list[str]:
+    """What is not as it was, one line each; methods that only one of the two has are said as such."""
+    before, after = ({row["method"]: row for row in found} for found in (old, new))
+    out = [f"{name} is no longer here ({before[name]['version']})" for name in before if name not in after]
+    for name, row in after.items():
+        was = before.get(name)
+        if was is None:
+            out.append(f"{name} is new: {row['scheme']} ({row['version']})")
+            continue
+        versions = (
+            row["version"] if row["version"] == was["version"] else f"{was['version']} -> {row['version']}"
+        )
+        out += [
+            f"{name}, {COLUMNS[column]}: {was[column]} -> {row[column]} ({versions})"
+            for column in WATCHED
+            if was[column] != row[column]
+        ]
+    return out
+
+
+def load(path: str | Path) -> dict[str, Any]:
+    """The document of a census, as `--json` prints it.  StoreError where it is none."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+        rows(found)
+    except OSError as error:
+        raise StoreError(f"{path}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise StoreError(f"{path}: is no JSON document of springcheck census --json") from error
+    return dict(found)
+
+
+def free(path: str | Path, beginning: str) -> None:
+    """StoreError where there is a file that is no such table, or no folder to write it in."""
+    place = Path(path)
+    if place.is_dir() or not place.parent.is_dir():
+        raise StoreError(
+            f"{path}: {'it is a folder' if place.is_dir() else f'there is no folder {place.parent}'}"
+        )
+    if place.exists() and place.stat().st_size:
+        with place.open("rb") as file:
+            if beginning.encode() not in file.read(1024):
+                raise StoreError(f"{path}: it is there and no such table; name another")
+
+
+def write(path: str | Path, text: str) -> None:
+    """Write a text.  StoreError where that cannot be."""
+    try:
+        with interrupts.held():
+            Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"cannot write {path}: {error.strerror}") from error

@@ -1,0 +1,67 @@
+"""Error and energy of a run, piece by piece, and its line in the report."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck import checks
+from springcheck.physics import exact
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.run.heat import Heat
+from springcheck.studies.run.result import MethodRun
+
+
+class Tally:
+    """Error and energy over all pieces of a trajectory."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._norm = scene.system.norm
+        self.heat = Heat(scene)
+        self._known = exact.has_true_motion(scene)
+        self._start = float(scene.system.energy(scene.q, scene.p))
+        self.error = 0.0 if self._known else np.nan
+        self.doubt = 0.0
+        self.drift = 0.0
+
+    def add(self, piece: Trajectory) -> None:
+        """Take a piece into account."""
+        scene, right = self._scene, np.asarray(self._start)
+        if scene.bath:
+            self.heat.add(piece)
+        if self._known:
+            steps = checks.Case(trajectory=piece, scene=scene).steps
+            q, p = exact.true_motion(scene, steps, piece.step)
+            if scene.system.is_damped:
+                right = np.asarray(scene.system.energy(q, p), np.float64)
+            # not max(), which leaves out what is no number
+            here = np.max(self._norm(piece.q - q, piece.p - p))
+            self.error = float(np.maximum(self.error, here))
+            self.doubt = max(self.doubt, exact.uncertainty(scene, float(steps[-1]) * piece.step))
+        with np.errstate(over="ignore", invalid="ignore"):
+            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - right
+        worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
+        if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
+            self.drift = worst
+
+
+def line(piece: Trajectory, tally: Tally) -> MethodRun:
+    """The line of the report on a run, whose last piece this is."""
+    # a run that left no frame but the start has no error: that of the start is nothing
+    ended = piece.outcome.status != "complete" and piece.outcome.step == 0
+    return MethodRun(
+        method=piece.label,
+        scheme=piece.scheme,
+        outcome=piece.outcome.status,
+        steps=piece.outcome.step,
+        message=piece.outcome.message,
+        # nothing below what is known of the exact solution is an error of the engine
+        max_error=np.nan if ended else tally.error + (tally.doubt if tally.error < tally.doubt else 0.0),
+        error_below=not ended and tally.error < tally.doubt,
+        energy_drift=np.nan if ended else tally.drift,
+        start_seconds=piece.timing.start,
+        run_seconds=piece.timing.run,
+        force_calls=piece.force_calls,
+    )

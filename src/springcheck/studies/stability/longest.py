@@ -1,0 +1,220 @@
+"""The longest step at which a scheme stays bounded on a scene, from the spectral radius of its one-step map.
+
+The map is that of the scene's linearisation where its motion is stiffest, with its friction, and with slow
+and fast springs apart for a scheme that parts them.  Where nothing couples the modes, each has a matrix of
+2 x 2; elsewhere one of 2n x 2n has them all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.errors import SceneError
+from springcheck.physics import exact
+from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
+from springcheck.physics.scene import Scene
+from springcheck.physics.system import MOST_DENSE, System
+from springcheck.schemes import Scheme
+from springcheck.studies.stability import propagators
+
+FIRST, LAST = 1e-9, 1e6
+"""Steps between which a limit is looked for, in units of the fastest angular frequency or friction rate."""
+
+NEIGHBOURS = 4096
+"""Steps of the first scan, 1.008 from one to the next."""
+
+FINE = 256
+"""Steps of each refinement of the bracket."""
+
+SAMPLES = 512
+"""States of an anharmonic motion among which the stiffest is looked for."""
+
+MOST_MODES = 64
+"""Modes of a long chain that are looked at: the fastest, the slowest, and some between."""
+
+MOST_COUPLED = 16
+"""Particles whose modes a scheme or friction couples: a scan is of NEIGHBOURS matrices of 2n x 2n."""
+
+GROWTH = 1e-7
+"""Growth per step from which coupled modes count as growing: eigenvalues of their matrix that are nearly
+equal are known to the square root of the rounding only."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linear:
+    """The linearised motion y'' = -A y - r y', y = sqrt(m) q: uncoupled modes, or one group of all.
+
+    A is that of the slow plus that of the fast springs, (g, n, n) [1/T2]; rate is r (g, n) [1/T].
+    """
+
+    slow: Extended
+    fast: Extended
+    rate: Extended
+
+    @classmethod
+    def of_modes(cls, w2: Reals, rate: Reals) -> Linear:
+        """Modes (g,) that nothing couples."""
+        a = np.asarray(w2, np.longdouble)[:, None, None]
+        return cls(slow=a, fast=np.zeros_like(a), rate=np.asarray(rate, np.longdouble)[:, None])
+
+
+@lru_cache(maxsize=8)
+def stiffest(scene: Scene) -> Floats:
+    """Positions (n,) where the exact solution of an anharmonic scene is stiffest; the start of others."""
+    system = scene.system
+    if system.is_linear or scene.n > MOST_MODES or not exact.has_true_motion(scene):
+        return np.asarray(scene.q)
+    q, _ = exact.true_motion(scene, np.arange(SAMPLES + 1), scene.step * scene.steps / SAMPLES)
+    here = q[np.isfinite(q).all(axis=-1)].astype(np.float64)
+    if not len(here):
+        return np.asarray(scene.q)
+    return np.asarray(here[int(np.argmax([_largest(system, at) for at in here]))])
+
+
+def _largest(system: System, q: Floats) -> float:
+    """The largest eigenvalue of M**-1/2 K M**-1/2 at q (n,), or its bound of Gershgorin [1/T2]."""
+    if system.is_separate:
+        return float(np.max(system.hessian_diagonal(q) / system.m))
+    if system.n > MOST_DENSE:
+        return float(np.max(system.gershgorin(q) / system.m))
+    found = _scaled(system, q).astype(np.float64)
+    return float(np.linalg.eigvalsh(found)[-1]) if np.isfinite(found).all() else np.inf
+
+
+def _scaled(system: System, q: Reals) -> Extended:
+    root = np.sqrt(system.m.astype(np.longdouble))
+    return np.asarray(system.hessian(q) / root[:, None] / root)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def fastest(scene: Scene) -> float:
+    """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
+
+    Of an anharmonic scene that of small oscillations where it is `stiffest`.  SceneError where forces
+    overflow there.
+    """
+    system = scene.system
+    largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
+    if not np.isfinite(largest):
+        raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
+    return float(np.sqrt(max(largest, 0.0)))
+
+
+def linear(scene: Scene, scheme: Scheme) -> Linear | None:
+    """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at."""
+    system = scene.system
+    if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
+        if scene.n > MOST_COUPLED:
+            return None
+        at = stiffest(scene).astype(np.longdouble)
+        parts = [
+            _scaled(System(scene.derived(terms=tuple(x for x in terms if x.kind == "potential"))), at)[None]
+            for terms in (system.slow, system.fast)
+        ]
+        return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
+    if system.has_modes:
+        modes, rate = system.modes, system.modes.rate
+        some = np.argsort(modes.w2)[np.unique(np.linspace(0, scene.n - 1, MOST_MODES).astype(int))]
+        # of particles side by side each has its own friction
+        some = np.append(some, [np.argmax(rate), np.argmin(np.where(rate > 0, rate, np.inf))])
+        return Linear.of_modes(modes.w2[some], rate[some])
+    here = stiffest(scene)
+    if system.is_separate:
+        return Linear.of_modes(system.hessian_diagonal(here) / system.m, system.friction_rates)
+    w2 = np.array([_largest(system, here)])
+    if scene.n <= MOST_DENSE:
+        w2 = np.linalg.eigvalsh(_scaled(system, here).astype(np.float64))
+    return Linear.of_modes(w2, np.broadcast_to(system.friction_rates[:1], w2.shape))
+
+
+def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
+    """Whether one step of h (j,) [T] grows in some mode that does not fall off a barrier by itself."""
+    g, n = of.rate.shape
+    # in units of each step: A h**2 and r h
+    t = np.asarray(h, np.longdouble)[:, None, None, None]
+    slow, fast, rate = of.slow * t * t, of.fast * t * t, of.rate[:, None, :] * t
+    eye, none = np.eye(n, dtype=np.longdouble), np.zeros((n, n), dtype=np.longdouble)
+    q, p = (np.broadcast_to(np.concatenate(x), (len(h), g, 2 * n, n)) for x in ((eye, none), (none, eye)))
+
+    def force(a: Extended, brake: Extended | float) -> Force:
+        return lambda q, p: np.asarray(-(q @ a) - brake * p)
+
+    one = np.longdouble(1)
+    q, p = schemes.step(
+        scheme, q, p, h=one, m=np.ones(n), force=force(slow + fast, rate),
+        rate=rate if np.any(rate) else None, parts=(force(slow, rate), force(fast, 0.0)),
+    )  # fmt: skip
+    # rows are the images of the unit vectors
+    maps = np.swapaxes(np.concatenate([q, p], axis=-1), -1, -2)
+    if n == 1:
+        wild = ~propagators.bounded(maps.reshape(-1, 2, 2), 64 * ROUNDOFF).reshape(len(h), g)
+        return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
+    finite = np.isfinite(maps).all(axis=(-1, -2))
+    values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
+    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + GROWTH), axis=-1))
+
+
+def longest(scheme: Scheme, scene: Scene) -> float:
+    """The largest h [T] up to which every step is bounded: 0 none is, infinity all are, NaN not known here.
+
+    For a scheme of multiple time steps that is where its first resonance begins.
+    """
+    if not scheme.has("one-step") or np.isinf(scheme.limit):
+        # what is bounded on every spring is bounded with friction too
+        return np.inf
+    of = linear(scene, scheme)
+    if of is None:
+        return np.nan
+    w2, known = np.linalg.eigvalsh(np.asarray(of.slow + of.fast, np.float64)), np.inf
+    if scheme.has("mixes") or w2.shape[1] > 1:
+        if np.min(w2) < -GROWTH * np.max(np.abs(w2)):
+            return np.nan
+    else:
+        alone = (w2[:, 0] > 0) & (of.rate[:, 0] == 0)
+        if np.any(alone):
+            # without friction the catalogue knows, in digits that a scan has not
+            known = scheme.limit / float(np.sqrt(np.max(w2[alone])))
+        of = Linear(slow=of.slow[~alone], fast=of.fast[~alone], rate=of.rate[~alone])
+        w2 = w2[~alone]
+    scale = max(float(np.sqrt(np.max(w2, initial=0.0))), float(np.max(of.rate, initial=0.0)))
+    return min(known, _first(scheme, of, scale)) if scale else known
+
+
+def too_long(name: str, scene: Scene) -> float | None:
+    """The largest step of a scheme where that of the scene is longer, None where it is not; nor for a scheme
+    that has none at all, as explicit Euler without friction, or whose map is not known."""
+    scheme = schemes.known().get(name)
+    if scheme is None or not scheme.has("one-step") or scheme.has("random") or np.isinf(scheme.limit):
+        return None
+    h = np.array([abs(scene.step)])
+    with np.errstate(all="ignore"):
+        of = linear(scene, scheme)
+        if of is None or not np.isfinite(of.slow + of.fast).all() or not grows(scheme, of, h)[0]:
+            return None
+        limit = longest(scheme, scene)
+    return limit if 0 < limit < h[0] else None
+
+
+def _first(scheme: Scheme, of: Linear, scale: float) -> float:
+    """Where a scan finds the first step that grows, to a part in 1e10."""
+    h = np.geomspace(FIRST, LAST, NEIGHBOURS) / scale
+    if scheme.has("mixes"):
+        # a resonance may be narrow: up to the limit of the fast springs alone at even distances
+        h = np.linspace(0, scheme.limit, NEIGHBOURS + 1)[1:] / scale
+    for _ in range(6):
+        with np.errstate(all="ignore"):
+            wild = grows(scheme, of, h)
+        if not wild.any():
+            return np.inf
+        j = int(np.argmax(wild))
+        if j == 0:
+            return 0.0
+        low, high = h[j - 1], h[j]
+        if high - low <= 1e-10 * high:
+            break
+        h = np.linspace(low, high, FINE)
+    return float((low + high) / 2)

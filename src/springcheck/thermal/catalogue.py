@@ -1,0 +1,330 @@
+"""Thermostats as data: the stages of random schemes, written once, and one step of any of them.
+
+A step takes draws: independent numbers of mean 0 and variance 1, some of which may be those of the step
+before.  Coefficients are functions of x = gamma h, the friction rate times the step; exact if rational.
+
+Sources: Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34 (splittings by their letters); Sivak,
+Chodera & Crooks, J. Phys. Chem. B 118 (2014) 6466; Zhang et al., J. Phys. Chem. A 123 (2019) 6056 (BAOA);
+Groenbech-Jensen, Mol. Phys. 118 (2020) e1662506 (GJ); Brunger, Brooks & Karplus, Chem. Phys. Lett. 105
+(1984) 495 (BBK); Vanden-Eijnden & Ciccotti, Chem. Phys. Lett. 429 (2006) 310; Andersen, J. Chem. Phys. 72
+(1980) 2384; Ermak & McCammon, J. Chem. Phys. 69 (1978) 1352 (Brownian).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from springcheck.physics.arrays import Force, Reals
+
+Part: TypeAlias = Fraction | Callable[[Any], Any]
+"""A share of the step, or a function of x = gamma h."""
+
+ONE, HALF = Fraction(1), Fraction(1, 2)
+
+
+class Act(NamedTuple):
+    """One stage: what is done, for which part, and by which draw of the step."""
+
+    kind: Literal[
+        "kick", "held", "drift", "exchange", "damp", "undamp", "noise", "jump", "creep", "rebuild", "collide"
+    ]
+    part: Part = ONE
+    draw: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thermostat:
+    """A random scheme: p and q of one step, by stages that friction and noise belong to."""
+
+    name: str
+    title: str
+    acts: tuple[Act, ...]
+    draws: int = 1
+    """Draws that act in a step."""
+    carried: int = 0
+    """How many of them, its first, were the last of the step before."""
+    uniform: bool = False
+    """Whether draws are uniform in place of normal."""
+    synchronised: bool = True
+    """Whether the momentum that it stores belongs to the time of the position."""
+    source: str = ""
+
+    @property
+    def fresh(self) -> int:
+        """New draws a step."""
+        return self.draws - self.carried
+
+    @property
+    def collides(self) -> bool:
+        """Whether noise comes with a probability."""
+        return any(act.kind == "collide" for act in self.acts)
+
+
+def _stretch(c2: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """How much longer than its step a GJ scheme kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
+
+    def q(x: Any) -> Any:
+        c = c2(x)
+        return np.sqrt(2 * (1 - c) / ((1 + c) * x))
+
+    return q
+
+
+def _value(part: Part, x: Any) -> Any:
+    if callable(part):
+        return part(x)
+    return x.dtype.type(part.numerator) / x.dtype.type(part.denominator)
+
+
+class Stepper:
+    """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
+
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  With `absolute` every difference
+    is taken as a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
+    """
+
+    def __init__(
+        self, scheme: Thermostat, *, h: float, m: Reals, rate: float, thermal: float, width: Any,
+        absolute: bool = False,
+    ) -> None:  # fmt: skip
+        self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
+        x = np.asarray(self.h * width(rate), width)
+        self.collision = float(-np.expm1(-x))
+        size = np.sqrt(self.m * width(thermal))
+        shot = np.sqrt(2 * x) * size
+        sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
+        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
+        self._moved = len(moves) - moves[::-1].index(True)
+        self._acts, self._sign = [], 1 if absolute else -1
+        for kind, part, number in scheme.acts:
+            c = _value(part, x)
+            noise = np.sqrt((1 - c) * (1 + c)) * size if kind == "exchange" else size
+            if absolute and kind != "undamp":
+                c = -np.abs(c) if kind == "damp" else np.abs(c)
+            self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
+
+    def __call__(
+        self,
+        q: Reals,
+        p: Reals,
+        force: Force,
+        draws: Sequence[Any],
+        hit: Any = None,
+        end: Reals | None = None,
+    ) -> tuple[Reals, Reals]:
+        """One step from (q, p), each (..., n).
+
+        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place.  A
+        force after the last drift is taken at `end`, where it is known: draws of other particles act there.
+        """
+        m, h, last, q_old = self.m, self.h, p, q
+        for i, (kind, c, noise, number) in enumerate(self._acts):
+            if kind == "drift":
+                q = q + c * (p / m)
+            elif kind == "kick":
+                last = force(q if end is None or i < self._moved else end, np.zeros_like(p))
+                p = p + (c * h) * last
+            elif kind == "exchange":
+                p = c * p + noise * draws[number]
+            elif kind == "noise":
+                p = p + c * draws[number]
+            elif kind == "damp":
+                p = p * (1 - c)
+            elif kind == "undamp":
+                p = p / (1 + c)
+            elif kind == "jump":
+                q = q + c * draws[number]
+            elif kind == "held":
+                p = p + (c * h) * last
+            elif kind == "creep":
+                q = q + c * force(q, np.zeros_like(p)) / m
+            elif kind == "rebuild":
+                p = m * ((q + self._sign * q_old) / h)
+            else:
+                p = np.where(hit, noise * draws[number] + (self._sign > 0) * p, p)
+        return q, p
+
+
+def _decay(share: int) -> Callable[[Any], Any]:
+    return lambda x: np.exp(-x / share)
+
+
+def splitting(letters: str) -> tuple[Act, ...]:
+    """The stages of a splitting by its letters: A drift, B kick, O exchange with the bath; letters that come
+    n times take an nth of the step each."""
+    times, drawn = Counter(letters), 0
+    acts = []
+    for letter in letters:
+        share = Fraction(1, times[letter])
+        if letter == "O":
+            acts.append(Act("exchange", _decay(times[letter]), drawn))
+            drawn += 1
+        else:
+            acts.append(Act("drift" if letter == "A" else "kick", share))
+    return tuple(acts)
+
+
+_SAID = {
+    "BAOAB": "VRORV; ASE's LangevinBAOAB",
+    "BAOA": "LF-middle; OpenMM's LangevinMiddle as it stores velocities, GROMACS sd",
+    "ABOBA": "RVOVR",
+    "OBABO": "OVRVO, VVVR; Bussi & Parrinello, GPUMD",
+    "OABAO": "ORVRO",
+    "AOBOA": "ROVOR",
+    "BOAOB": "VOROV",
+}
+
+
+def _by_letters(letters: str) -> Thermostat:
+    return Thermostat(
+        name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=splitting(letters),
+        draws=letters.count("O"), synchronised=letters != "BAOA", source="Leimkuhler & Matthews 2013",
+    )  # fmt: skip
+
+
+def _seventh(x: Any) -> Any:
+    """The c in (0, 1) with x = (1 + c)/(1 - c) log(c)**2 / 2, by Newton on log c."""
+    y = -np.asarray(x, dtype=np.asarray(x).dtype)
+    y = np.where(y < -1, -np.sqrt(2 * np.abs(y)), y)
+    for _ in range(60):
+        c = np.exp(y)
+        f = (1 + c) / (1 - c) * y * y / 2
+        slope = (1 + c) / (1 - c) * y + c / (1 - c) ** 2 * y * y
+        change = (f - x) / slope
+        y = y - change
+        if np.all(np.abs(change) <= np.finfo(c.dtype).eps * np.abs(y)):
+            break
+    return np.exp(y)
+
+
+GJ: dict[str, Callable[[Any], Any]] = {
+    "i": lambda x: (1 - x / 2) / (1 + x / 2),
+    "ii": lambda x: np.exp(-x),
+    "iii": lambda x: 1 - x,
+    "iv": lambda x: (np.sqrt(1 + 4 * x) - 1) / (2 * x),
+    "v": lambda x: 1 / (1 + x),
+    "vi": lambda x: 1 / (1 + x / 2) ** 2,
+    "vii": _seventh,
+    "viii": lambda x: 1 / (np.sqrt(x * x + 1) + x),
+}
+"""The decay c2 of each GJ scheme as a function of x = gamma h."""
+
+_GJ_SOURCE = (
+    "Groenbech-Jensen 2020; VII: Finkelstein et al., J. Chem. Phys. 155 (2021) 184104; "
+    "VIII: Groenbech-Jensen, J. Stat. Phys. 191 (2024) 137"
+)
+
+
+def _gj(number: str) -> Thermostat:
+    """BAOAB with c2 in the place of exp(-x), kicks and drifts longer by q."""
+    c2 = GJ[number]
+    half = _times(HALF, _stretch(c2))
+    acts = (Act("kick", half), Act("drift", half), Act("exchange", c2), Act("drift", half), Act("kick", half))
+    return Thermostat(
+        name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts, source=_GJ_SOURCE
+    )
+
+
+def _gj_half(number: str) -> Thermostat:
+    """The same motion with the velocity of the half step, whose noise acts again in the next one."""
+    c2 = GJ[number]
+
+    def root(x: Any) -> Any:
+        return np.sqrt((1 - c2(x)) / x)
+
+    noise = _times(HALF, root)
+    acts = (
+        Act("damp", lambda x: 1 - c2(x)), Act("noise", noise, 0), Act("kick", root), Act("noise", noise, 1),
+        Act("drift", root),
+    )  # fmt: skip
+    return Thermostat(
+        name=f"gj-{number}-half", title=f"GJ-{number.upper()}, half-step velocity", acts=acts, draws=2,
+        carried=1, synchronised=False, source=_GJ_SOURCE,
+    )  # fmt: skip
+
+
+def _times(part: Fraction, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda x: function(x) * (x.dtype.type(part.numerator) / x.dtype.type(part.denominator))
+
+
+def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:
+    """A polynomial in x, the constant first."""
+
+    def value(x: Any) -> Any:
+        total = np.zeros_like(x)
+        for c in reversed(coefficients):
+            total = total * x + _value(Fraction(c), x)
+        return total
+
+    return value
+
+
+_VEC_FRICTION = Act("damp", _of_x(0, HALF, Fraction(-1, 8)))
+_VEC_KICK = Act("kick", _of_x(HALF, Fraction(-1, 8)))
+_VEC_NOISE = (
+    Act("noise", _of_x(HALF, Fraction(-1, 8)), 0),
+    Act("noise", lambda x: -x / (4 * np.sqrt(3 * np.ones_like(x))), 1),
+)
+
+_OTHERS = (
+    Thermostat(
+        name="bbk", title="BBK, each random force used in two half kicks",
+        acts=(
+            Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 0), Act("drift"),
+            Act("kick", HALF), Act("noise", HALF, 1), Act("undamp", _of_x(0, HALF)),
+        ),
+        draws=2, carried=1, source="Brunger, Brooks & Karplus 1984",
+    ),
+    Thermostat(
+        name="lammps-langevin", title="LAMMPS fix langevin with fix nve, friction of the half-step velocity",
+        acts=(
+            Act("damp", _of_x(0, 1)), Act("kick", HALF), Act("noise", HALF, 0),
+            Act("undamp", _of_x(0, -HALF)), Act("drift"),
+            Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 1),
+        ),
+        draws=2, carried=1, uniform=True,
+        source="Schneider & Stoll, Phys. Rev. B 17 (1978) 1302; as LAMMPS runs it",
+    ),
+    Thermostat(
+        name="vanden-eijnden-ciccotti", title="Vanden-Eijnden & Ciccotti, eq. 23; ASE's Langevin",
+        acts=(
+            _VEC_FRICTION, _VEC_KICK, *_VEC_NOISE, Act("drift"),
+            Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1), _VEC_FRICTION, _VEC_KICK,
+            *_VEC_NOISE,
+        ),
+        draws=2, source="Vanden-Eijnden & Ciccotti 2006",
+    ),
+    Thermostat(
+        name="euler-maruyama", title="Euler-Maruyama: both from the old state",
+        acts=(Act("kick", Fraction(0)), Act("drift"), Act("damp", _of_x(0, 1)), Act("held"), Act("noise")),
+        source="Maruyama 1955",
+    ),
+    Thermostat(
+        name="brownian", title="Brownian (overdamped) steps, the velocity (x' - x)/h",
+        acts=(Act("creep", lambda x: 1 / x), Act("jump", lambda x: 1 / x), Act("rebuild")),
+        synchronised=False, source="Ermak & McCammon 1978; OpenMM's BrownianIntegrator",
+    ),
+    Thermostat(
+        name="andersen", title="Andersen: collision, then velocity Verlet",
+        acts=(Act("collide"), Act("kick", HALF), Act("drift"), Act("kick", HALF)), source="Andersen 1980",
+    ),
+    Thermostat(
+        name="andersen-after-kick", title="Andersen, the collision after the first half kick, which is lost",
+        acts=(Act("kick", HALF), Act("collide"), Act("drift"), Act("kick", HALF)), source="as ASE runs it",
+    ),
+    Thermostat(
+        name="andersen-leapfrog", title="Andersen on the half-step velocities of leapfrog",
+        acts=(Act("collide"), Act("kick"), Act("drift")), synchronised=False,
+        source="as OpenMM's VerletIntegrator with AndersenThermostat runs it",
+    ),
+)  # fmt: skip
+
+THERMOSTATS: dict[str, Thermostat] = {
+    one.name: one for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS)
+}

@@ -1,0 +1,136 @@
+"""Chances of draws under their null: independent numbers of a standard normal distribution.
+
+Each function returns the probability, two-sided, of a value as bad or worse.  They are exact but for `shape`,
+whose saddlepoint approximation is off by a few percent of the probability itself, however small that is
+(Lugannani & Rice, Adv. Appl. Probab. 12 (1980) 475).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats
+
+
+def of_normal(z: float) -> float:
+    """Of a standard normal number."""
+    return math.erfc(abs(z) / math.sqrt(2)) if math.isfinite(z) else 0.0
+
+
+def mean(x: Floats) -> float:
+    """Of the mean of draws x (...)."""
+    return of_normal(float(np.sum(x)) / math.sqrt(x.size))
+
+
+def variance(x: Floats) -> float:
+    """Of the sum of squares of draws x (...): chi-squared."""
+    from scipy.special import gammainc, gammaincc
+
+    half = float(np.sum(x * x)) / 2
+    if not math.isfinite(half):
+        return 0.0
+    return min(1.0, 2 * float(min(gammainc(x.size / 2, half), gammaincc(x.size / 2, half))))
+
+
+def shape(x: Floats) -> float:
+    """Of what the fourth moment shows, the tails beside the middle, whatever the variance.
+
+    The mean of the fourth Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws
+    whose variance is made 1 first: bounded, so that no single draw decides.
+    """
+    from scipy.special import erf
+
+    u = erf(x.ravel() / math.sqrt(2 * max(float(np.mean(x * x)), 1e-300)))
+    value = float(np.mean(((35 * u * u - 30) * u * u + 3) / 8))
+    return _saddlepoint(value, x.size) if math.isfinite(value) else 0.0
+
+
+@cache
+def _quadrature() -> tuple[Floats, Floats]:
+    """The fourth Legendre polynomial at Gauss's nodes, and their weights of a mean."""
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    return ((35 * nodes**2 - 30) * nodes**2 + 3) / 8, weights / 2
+
+
+def _saddlepoint(value: float, n: int) -> float:
+    """Of a mean of n values of the fourth Legendre polynomial at uniform numbers, two-sided."""
+    if not -3 / 7 < value < 1 or n < 8:
+        return 1.0 if n < 8 else 0.0
+
+    values, parts = _quadrature()
+
+    def moments(t: float) -> tuple[float, float, float]:
+        weights = parts * np.exp(t * values)
+        total = float(np.sum(weights))
+        first = float(np.sum(weights * values)) / total
+        return math.log(total), first, float(np.sum(weights * values**2)) / total - first**2
+
+    low, high = -2e3, 2e3
+    for _ in range(200):
+        t = (low + high) / 2
+        low, high = (t, high) if moments(min(max(t, -600), 600))[1] < value else (low, t)
+    t = min(max((low + high) / 2, -600), 600)
+    k, _, second = moments(t)
+    w = math.copysign(math.sqrt(max(2 * n * (t * value - k), 0)), t)
+    if abs(w) < 1e-3:
+        return 1.0
+    tail = math.erfc(abs(w) / math.sqrt(2)) / 2
+    tail += math.exp(-w * w / 2) / math.sqrt(2 * math.pi) * (1 / abs(t * math.sqrt(n * second)) - 1 / abs(w))
+    return min(1.0, 2 * max(tail, 0.0))
+
+
+def repeats(x: Floats) -> float:
+    """Of the products of draws x (f, ...) with those any number of rows later: the largest of all sums.
+
+    Each is nearly normal, more so the longer the record; ten times its chance stands for the difference.
+    """
+    f = len(x)
+    padded = np.fft.rfft(x.reshape(f, -1), 2 * f, axis=0)
+    sums = np.sum(np.fft.irfft(np.abs(padded) ** 2, axis=0), axis=1)[2 : f // 2]
+    if f < 1000 or not np.all(np.isfinite(sums)):
+        return 1.0
+    sizes = np.sqrt((f - np.arange(2, f // 2)) * (x.size / f))
+    return min(1.0, 10 * len(sums) * of_normal(float(np.max(np.abs(sums) / sizes))))
+
+
+def neighbours(x: Floats) -> float:
+    """Of the products of draws x (f, ...) with those one row later.
+
+    Given every second row, the sum over the rows between is normal, with a variance that these have.
+    """
+    if len(x) < 2:
+        return 1.0
+    around = np.zeros_like(x[1::2])
+    around += x[0 : 2 * len(around) : 2]
+    after = x[2::2]
+    around[: len(after)] += after[: len(around)]
+    size = float(np.sum(around * around))
+    return of_normal(float(np.sum(x[1::2] * around)) / math.sqrt(size)) if size > 0 else 0.0
+
+
+def pairs(x: Floats, y: Floats) -> float:
+    """Of the products of draws x with other draws y of one shape."""
+    size = float(np.sum(x * x))
+    return of_normal(float(np.sum(x * y)) / math.sqrt(size)) if size > 0 else 0.0
+
+
+def count(hits: int, n: int, p: float) -> float:
+    """Of so many hits of n, each of probability p: binomial."""
+    from scipy.special import bdtr, bdtrc
+
+    below, above = float(bdtr(hits, n, p)), float(bdtrc(hits - 1, n, p)) if hits else 1.0
+    return min(1.0, 2 * min(below, above))
+
+
+def normal_scores(x: Any) -> Floats:
+    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
+    from scipy.special import ndtri
+
+    u = np.asarray(x, np.float64) / math.sqrt(12) + 0.5
+    # the ends of the range are known to a rounding
+    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
+    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)

@@ -1,0 +1,195 @@
+"""The draws behind recorded states: which numbers a random scheme must have taken, and what contradicts it.
+
+Two numbers of a state, q' and p', follow from at most two draws.  Where one draw enters a step, or where one
+acts in two steps, they over-determine it: what is left over is rounding, at every step, at any temperature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.scene import Scene
+from springcheck.thermal.catalogue import Stepper, Thermostat
+from springcheck.thermal.laws import Law
+
+PER_ACT, IN_AND_OUT = 6, 4
+"""Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
+
+
+SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
+"""What an operation may lose to underflow: at rest in 0 nothing is rounded."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Reading:
+    """What frames say of the draws between them."""
+
+    draws: Floats
+    """Draws (f-1, n) of mean 0 and variance 1, independent if the scheme is right; NaN where a step had none.
+
+    Of two fresh draws a step those of the first and of the second are rows one after the other.
+    """
+    across: Floats | None
+    """By how many roundings states contradict each other; None where some draws reach every state."""
+    roundings: int
+    """What `across` may be."""
+    hits: NDArray[np.bool_] | None = None
+    """Where collisions took place, (f-1, n)."""
+
+
+def law_of(scheme: Thermostat, scene: Scene) -> Law:
+    """The law of a scheme on each particle by itself, with its own curvature at the start."""
+    assert scene.bath is not None
+    k = np.asarray(scene.system.hessian_diagonal(scene.q.astype(np.longdouble)), np.longdouble)
+    return Law(scheme=scheme, h=scene.step, m=scene.m, k=k, rate=scene.bath.friction, thermal=scene.thermal)
+
+
+def read(
+    scheme: Thermostat, scene: Scene, q: Floats, p: Floats, *, unit: float = 2.0**-53, rebuilt: bool = False
+) -> Reading:
+    """The draws behind frames q, p (f, n), one step apart; `unit` is the unit roundoff of the engine.
+
+    With `rebuilt` velocities are differences of positions over the step.
+    """
+    return _Reader(scheme, scene, unit, rebuilt).read(q, p)
+
+
+class _Reader:
+    def __init__(self, scheme: Thermostat, scene: Scene, unit: float, rebuilt: bool) -> None:
+        assert scene.bath is not None
+        self.scheme, self.scene, self.unit, self.rebuilt = scheme, scene, unit, rebuilt
+        about: dict[str, Any] = {
+            "h": scene.step,
+            "m": scene.m,
+            "rate": scene.bath.friction,
+            "thermal": scene.thermal,
+        }
+        self.stepper = Stepper(scheme, **about, width=np.longdouble)
+        self.sizer = Stepper(scheme, **about, width=np.longdouble, absolute=True)
+        self.roundings = IN_AND_OUT + PER_ACT * len(scheme.acts)
+        self.directions, self.of_q = _directions(scheme, scene)
+
+    def read(self, q: Floats, p: Floats) -> Reading:
+        z = q.astype(np.longdouble), p.astype(np.longdouble)
+        start, end = (z[0][:-1], z[1][:-1]), (z[0][1:], z[1][1:])
+        if self.scheme.collides:
+            return self._collided(start, end)
+        draws, far, allowed = self._solved(start, end, hit=False)
+        c = self.scheme.carried
+        if draws.shape[0] == 1:
+            across = far / allowed
+            one = np.asarray(draws[0], np.float64)
+            return Reading(
+                draws=_whitened(one) if c else one, across=np.asarray(across, np.float64),
+                roundings=self.roundings,
+            )  # fmt: skip
+        if c:
+            # the last draw of each step is the first of the next; that of the start is not in the record
+            off = np.abs(draws[0][1:] - draws[1][:-1]) / (allowed[0][1:] + allowed[1][:-1])
+            return Reading(
+                draws=np.asarray(draws[1], np.float64), across=np.asarray(off, np.float64),
+                roundings=self.roundings,
+            )  # fmt: skip
+        rows = draws.transpose(1, 0, 2).reshape(-1, draws.shape[2])
+        return Reading(draws=np.asarray(rows, np.float64), across=None, roundings=self.roundings)
+
+    def _collided(self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]) -> Reading:
+        """A step without a collision is known to rounding; any other has one draw."""
+        none = np.zeros((1, *start[0].shape), np.longdouble)
+        q, p = self.stepper(*start, self._force, list(none), False, end[0])
+        of_q, of_p = self._allowed(start, none)
+        straight = np.maximum(np.abs(end[0] - q) / of_q, np.abs(end[1] - p) / of_p)
+        draws, far, allowed = self._solved(start, end, hit=True)
+        hits = ~(straight <= self.roundings)
+        across = np.where(hits, far / allowed, straight)
+        return Reading(
+            draws=np.where(hits, np.asarray(draws[0], np.float64), np.nan),
+            across=np.asarray(across, np.float64), roundings=self.roundings, hits=hits,
+        )  # fmt: skip
+
+    def _force(self, q: Reals, p: Reals) -> Reals:
+        return self.scene.system.potential_force(q, p)
+
+    def _allowed(self, start: tuple[Extended, Extended], draws: Extended) -> tuple[Extended, Extended]:
+        """One rounding of everything that a step adds up."""
+        sizes = self.scene.system.magnitude()
+        q, p = self.sizer(np.abs(start[0]), np.abs(start[1]), sizes, list(np.abs(draws)), True)
+        if self.rebuilt:
+            p = p + self.scene.m * q / abs(self.scene.step)
+        return np.asarray(self.unit * q + SMALLEST), np.asarray(self.unit * p + SMALLEST)
+
+    def _solved(
+        self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool
+    ) -> tuple[Extended, Extended, Extended]:
+        """Draws (u, f-1, n); of one draw how far the other number of the state is off, and what that may be
+        off by; of two the rounding of each."""
+        u = self.directions.shape[1]
+        found = np.zeros((u, *start[0].shape), np.longdouble)
+
+        def at(draws: Extended) -> Extended:
+            each = np.tensordot(self.directions, draws, axes=1)
+            return np.stack(self.stepper(*start, self._force, list(each), hit, end[0]))
+
+        target = np.stack(end)
+        for _ in range(6):
+            now = at(found)
+            slopes = np.stack([at(found + _unit(u, j, found)) - now for j in range(u)])
+            if u == 1:
+                first = 0 if self.of_q else 1
+                change = ((target - now)[first] / slopes[0][first])[None]
+            else:
+                (a, c), (b, d) = slopes[0], slopes[1]
+                x, y = target - now
+                change = np.stack([d * x - b * y, a * y - c * x]) / (a * d - b * c)
+            found = found + change
+            if np.all(np.abs(change) <= 1e-17 * (1 + np.abs(found))) or (
+                self.scene.system.is_linear and _ == 1
+            ):
+                break
+        of = self._allowed(start, np.tensordot(self.directions, found, axes=1))
+        if u == 1:
+            first = 0 if self.of_q else 1
+            turn = np.abs(slopes[0][1 - first] / slopes[0][first])
+            return found, np.abs(target - at(found))[1 - first], of[1 - first] + turn * of[first]
+        allowed = np.stack([np.abs(d) * of[0] + np.abs(b) * of[1], np.abs(a) * of[1] + np.abs(c) * of[0]])
+        return found, found, allowed / np.abs(a * d - b * c)
+
+
+def _unit(u: int, j: int, like: Extended) -> Extended:
+    out = np.zeros_like(like)
+    out[j] = 1
+    return out
+
+
+def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:
+    """How the draws of a step (draws, u) come from those u that a state tells apart, and whether a single one
+    shows in the position."""
+    found = law_of(scheme, scene)
+    # the stiffest particle has all that the others have
+    G = found.G[int(np.argmax(np.abs(found.k) / found.m))].astype(np.float64)
+    size = np.sqrt(scene.thermal / scene.m[0])
+    G = G / np.array([[size * scene.step], [size * scene.m[0]]])
+    _, weights, turned = np.linalg.svd(G, full_matrices=False)
+    u = int(np.count_nonzero(weights > 1e-9 * weights[0]))
+    if u == scheme.draws:
+        return np.eye(u, dtype=np.longdouble), bool(np.any(np.abs(G[0]) > 1e-9))
+    of_one = turned[:1].T * np.sign(turned[0, 0])
+    return of_one.astype(np.longdouble), bool(np.any(np.abs(G[0]) > 1e-9))
+
+
+def _whitened(x: Floats) -> Floats:
+    """Independent draws of those (f, n) that are sums of one and the next over sqrt(2): covariance 1/2 with
+    their neighbours, by its Cholesky factor, whose rows have two entries."""
+    out = np.empty_like(x)
+    below, last = 0.0, np.zeros(x.shape[1])
+    for i, row in enumerate(x):
+        size = np.sqrt(1 - below * below)
+        last = (row - below * last) / size
+        out[i] = last
+        below = 0.5 / size
+    return out

@@ -1,0 +1,184 @@
+"""What follows exactly from a random scheme on springs: map, noise, stationary covariance, and its moments.
+
+One step of a linear random scheme is z' = A z + G xi with z = (q, p) and draws xi of variance 1; one with
+collisions takes one of several such maps, each with a probability.  A and G come from stepping unit states
+and unit draws, so a scheme is written down once.  The covariance is then S = A S A' + G G' (discrete
+Lyapunov), averaged over the maps; the autocovariance A**n S; the rest follows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.thermal.catalogue import Stepper, Thermostat
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Branch:
+    """One affine map that a step may take: its probability, A (n, 2, 2) and G (n, 2, draws)."""
+
+    chance: float
+    A: Extended
+    G: Extended
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law:
+    """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T] and thermal energy kT."""
+
+    scheme: Thermostat
+    h: float
+    m: Reals
+    k: Reals
+    rate: float
+    thermal: float
+
+    @cached_property
+    def collision(self) -> float:
+        """The chance of a collision a step, 1 - exp(-gamma h)."""
+        return float(-np.expm1(-self.rate * self.h))
+
+    @cached_property
+    def branches(self) -> tuple[Branch, ...]:
+        """The maps that a step may take."""
+        if not self.scheme.collides:
+            return (self._branch(1.0, hit=False),)
+        p = self.collision
+        return self._branch(1 - p, hit=False), self._branch(p, hit=True)
+
+    def _branch(self, chance: float, *, hit: bool) -> Branch:
+        m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
+        r, n = self.scheme.draws, len(m)
+        q, p = np.zeros((2, 2 + r, n), np.longdouble)
+        q[0], p[1] = 1, 1
+        draws = np.zeros((r, 2 + r, n), np.longdouble)
+        for i in range(r):
+            draws[i, 2 + i] = 1
+        stepper = Stepper(
+            self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
+        )
+        a, b = stepper(q, p, lambda q, p: -k * q, list(draws), hit)
+        both = np.stack([a, b], axis=0).transpose(2, 0, 1)
+        return Branch(chance=chance, A=both[:, :, :2], G=both[:, :, 2:])
+
+    @property
+    def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
+        """The propagator (n, 2, 2) of the means."""
+        return np.asarray(sum(np.longdouble(one.chance) * one.A for one in self.branches))
+
+    @property
+    def G(self) -> Extended:  # noqa: N802 - the letter of the noise
+        """The noise (n, 2, draws) of the last map: the only one, or that of a collision."""
+        return self.branches[-1].G
+
+    @cached_property
+    def _state(self) -> tuple[tuple[float, Floats, Floats], ...]:
+        """The maps on (q, p, carried draws), with fresh draws alone."""
+        d, r, c = 2, self.scheme.draws, self.scheme.carried
+        out = []
+        for one in self.branches:
+            n = len(one.A)
+            A, G = np.zeros((n, d + c, d + c)), np.zeros((n, d + c, r - c))
+            A[:, :d, :d], A[:, :d, d:], G[:, :d] = one.A, one.G[:, :, :c], one.G[:, :, c:]
+            for i in range(c):
+                # the last draws of this step are the first of the next
+                G[:, d + i, r - 2 * c + i] = 1
+            out.append((one.chance, A, G))
+        return tuple(out)
+
+    @cached_property
+    def _covariance(self) -> Floats:
+        """Stationary covariance of (q, p, carried draws), infinite where there is none.
+
+        The carried draws keep the unit covariance of their own.
+        """
+        n, d = self._state[0][1].shape[:2]
+        scale = self._scale
+        total, right = np.zeros((n, d * d, d * d)), np.zeros((n, d * d))
+        for chance, A, G in self._state:
+            a, g = A * scale[:, None, :] / scale[:, :, None], G / scale[:, :, None]
+            total += chance * np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
+            right += chance * np.einsum("nij,nkj->nik", g, g).reshape(n, d * d)
+        out = np.full((n, d, d), np.inf)
+        radius = np.max(np.abs(np.linalg.eigvals(total)), axis=-1)
+        for i in np.flatnonzero(radius < 1):
+            out[i] = np.linalg.solve(np.eye(d * d) - total[i], right[i]).reshape(d, d)
+        return np.asarray(out * scale[:, :, None] * scale[:, None, :])
+
+    @property
+    def _scale(self) -> Floats:
+        """Sizes of q, p and draws in thermal motion (n, d)."""
+        m, k = (np.atleast_1d(np.asarray(x, np.float64)) for x in (self.m, self.k))
+        free = np.sqrt(self.thermal / m) * abs(self.h)
+        q = np.where(k > 0, np.sqrt(self.thermal / np.where(k > 0, k, 1)), free)
+        return np.stack([q, np.sqrt(m * self.thermal), *[np.ones_like(q)] * self.scheme.carried], axis=-1)
+
+    @property
+    def covariance(self) -> Floats:
+        """Stationary covariance of (q, p), (n, 2, 2); infinite where the step has none."""
+        return self._covariance[:, :2, :2]
+
+    def autocovariance(self, steps: int) -> Floats:
+        """<z(t + steps h) z(t)'> of (q, p), (n, 2, 2)."""
+        mean = np.asarray(sum(chance * A for chance, A, _ in self._state))
+        return np.asarray((np.linalg.matrix_power(mean, steps) @ self._covariance)[:, :2, :2])
+
+    @property
+    def configurational(self) -> Floats:
+        """k <q**2> / kT (n,): the configurational temperature over that of the bath."""
+        return np.asarray(np.atleast_1d(self.k) * self.covariance[:, 0, 0] / self.thermal)
+
+    @property
+    def kinetic(self) -> Floats:
+        """<p**2> / m kT (n,): the kinetic temperature over the bath's, by the momenta that are stored."""
+        return np.asarray(self.covariance[:, 1, 1] / (np.atleast_1d(self.m) * self.thermal))
+
+    def displacement(self, steps: int) -> Floats:
+        """<(q(t + steps h) - q(t))**2> of a bound particle (n,)."""
+        return np.asarray(2 * (self.covariance - self.autocovariance(steps))[:, 0, 0])
+
+    @property
+    def diffusion(self) -> Floats:
+        """D m gamma / kT of particles that no spring holds (n,); 1 is exact.
+
+        Half of what a step adds to <q**2> in the long run, the spectral density of q' - q at frequency 0:
+        C(0) + 2 sum C(j), with momenta that forget as the mean of A has it.
+        """
+        free = Law(
+            scheme=self.scheme, h=self.h, m=self.m, k=np.zeros_like(self.m), rate=self.rate,
+            thermal=self.thermal,
+        )  # fmt: skip
+        # all but q itself, of which nothing depends: (p, carried draws)
+        parts = [(chance, A[:, 1:, 1:], A[:, 0, 1:], G[:, 1:], G[:, 0]) for chance, A, G in free._state]
+        n, d = parts[0][2].shape
+        rate = np.empty(n)
+        for i in range(n):
+            A = sum(chance * a[i] for chance, a, *_ in parts)
+            total = sum(chance * np.kron(a[i], a[i]) for chance, a, *_ in parts)
+            right = sum(chance * (g[i] @ g[i].T).ravel() for chance, *_, g, _ in parts)
+            S = np.linalg.solve(np.eye(d * d) - total, right).reshape(d, d)
+            at_once = sum(c * (b[i] @ S @ b[i] + j[i] @ j[i]) for c, _, b, _, j in parts)
+            onwards = sum(c * (a[i] @ S @ b[i] + g[i] @ j[i]) for c, a, b, g, j in parts)
+            reach = sum(chance * b[i] for chance, _, b, *_ in parts)
+            rate[i] = at_once + 2 * reach @ np.linalg.solve(np.eye(d) - A, onwards)
+        return np.asarray(rate / (2 * self.h) * np.asarray(self.m, np.float64) * self.rate / self.thermal)
+
+    def error_of_variances(self, frames: int, every: int = 1) -> Floats:
+        """Relative standard errors of <q**2> and <p**2> over so many frames, `every` steps apart, (n, 2).
+
+        Var of the mean of x**2 is 2/N sum (1 - |j|/N) C(j)**2 / C(0)**2 for a Gaussian x.
+        """
+        mean = np.linalg.matrix_power(np.asarray(sum(c * A for c, A, _ in self._state)), every)
+        start = np.diagonal(self._covariance, axis1=1, axis2=2)[:, :2]
+        total, now = np.ones_like(start), self._covariance
+        for j in range(1, frames):
+            now = mean @ now
+            part = (np.diagonal(now, axis1=1, axis2=2)[:, :2] / start) ** 2
+            total += 2 * (1 - j / frames) * part
+            if np.all(part < 1e-14):
+                break
+        return np.asarray(np.sqrt(2 * total / frames))

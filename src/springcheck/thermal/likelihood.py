@@ -1,0 +1,332 @@
+"""Which thermostat made the states of an oscillator: by what no noise reaches, and by likelihood.
+
+Of one draw a step a combination of (x', v', x, v) is free of noise: a null vector of the recorded frames,
+known to rounding at any temperature.  Everything else is a Gaussian likelihood in (h w)**2, gamma h and kT/m,
+of which the second moments of the frames are sufficient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf, nan
+from typing import Any
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats
+from springcheck.thermal import chance
+from springcheck.thermal.catalogue import GJ, THERMOSTATS
+from springcheck.thermal.laws import Law
+
+FEWEST = 200
+"""Frames from which on states are asked for their draws."""
+
+NOISE = 1e-3
+"""Size of the noise of a step over that of the motion, from which on it is noise and not rounding of a file:
+gamma h of 5e-7."""
+
+ODDS = float(np.log(1e6))
+"""Nats by which one scheme must beat every other to be named."""
+
+WHITE = 1e-9
+"""Chance below which draws are no draws: deterministic motion that does not close in one frame."""
+
+SPARSE = 0.1
+"""Median of the draws, of variance 1, below which most steps have none: 0.67 for normal ones."""
+
+TWO = ("obabo", "oabao", "boaob", "vanden-eijnden-ciccotti")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """A scheme that may have made the states, and the numbers that it would mean, with standard errors; an
+    error of 0 is rounding, and NaN is not known."""
+
+    scheme: str
+    omega: float = nan
+    omega_error: float = nan
+    friction: float = nan
+    friction_error: float = nan
+    thermal: float = nan
+    """kT/m [L2/T2]."""
+    thermal_error: float = nan
+    nats: float = 0.0
+    """By how much its likelihood falls short of the best one's."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thermal:
+    """What the states of an oscillator in a bath say."""
+
+    candidates: tuple[Candidate, ...]
+    """The best first; none where no scheme that is known fits."""
+    free: tuple[float, ...]
+    """The combination of (x', v', x, v) that noise does not reach, 1 on x'; () where there is none."""
+    misfit: float
+    """How far it is from 0, over the size of the noise."""
+    uniform: bool
+    """Whether the draws are uniform rather than normal."""
+
+    @property
+    def named(self) -> bool:
+        """Whether one scheme beats every other."""
+        return bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
+
+
+def identify_thermal(t: Floats, q: Floats, v: Floats) -> Thermal | None:
+    """What thermostat made positions q and velocities v (f,) at times t (f,); None where none seems to have.
+
+    Deterministic motion, coupled or not, leaves no noise of which one frame says nothing to the next.
+    """
+    if len(t) < FEWEST or not np.isfinite([q, v]).all():
+        return None
+    h = float((t[-1] - t[0]) / (len(t) - 1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes = np.array([np.std(q), np.std(v)])
+    if not np.all((sizes > 0) & (sizes < np.inf)) or not h > 0:
+        return None
+    x, u = (q - q[0]) / sizes[0], v / sizes[1]
+    # beside the state a constant: the place of rest is not known
+    frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(t) - 1)], axis=1)
+    weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
+    if weights[3] < NOISE * weights[0]:
+        return None
+    z = np.stack([x, u])
+    left = _left(z)
+    if weights[4] < 1e-3 * weights[3]:
+        free = turned[4][:4] / np.tile(sizes, 2)
+        # of one draw the position and the momentum leave the same
+        return _of_one(q, v, h, free / free[0], weights[4] / weights[3], left[1]) if free[0] else None
+    jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
+    if np.std(jump) < 1e-6 * sizes[0]:
+        return _of_two_halves(q, h, float(np.std(jump) / sizes[0]))
+    if not all(map(_is_white, left)):
+        return None
+    found = _likely(TWO, q, v, h)
+    return Thermal(candidates=tuple(found), free=(), misfit=nan, uniform=_is_uniform(left[1]))
+
+
+def _left(z: Floats) -> Floats:
+    """What the best linear map leaves of each frame, of variance 1, (2, f-1)."""
+    known = np.concatenate([z[:, :-1], np.ones((1, z.shape[1] - 1))]).T
+    left = z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]
+    return np.asarray((left / np.maximum(np.std(left, axis=0), 1e-300)).T)
+
+
+def _is_white(x: Floats) -> bool:
+    return min(chance.neighbours(x[:, None]), chance.repeats(x[:, None])) > WHITE
+
+
+def _is_uniform(x: Floats) -> bool:
+    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x) < WHITE)
+
+
+def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats) -> Thermal | None:
+    """Of a single draw a step: the schemes of whose null vector this is one."""
+    _, b, c, d = free
+    close = max(1e-9, 100 * misfit)
+
+    def near(value: float, wanted: float) -> bool:
+        return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
+
+    found: list[Candidate] = []
+    if near(b, d) and near(c, -1) and not near(b, -h / 2):
+        if -b > h / 2:
+            found = _likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
+        # a GJ scheme kicks and drifts by another step: another spring for the same null vector
+        found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h))]
+    elif near(b, d) and near(b, -h / 2) and near(c, -1):
+        found = _likely(("aboba", "aoboa"), q, v, h)
+    elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
+        found = _likely(("baoa",), q, v, h, turn=2 * (1 + c))
+    elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
+        found = _likely(("euler-maruyama",), q, v, h)
+    elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
+        # what a collision has left of the momentum, the rest of the step takes on without noise
+        w = float(np.sqrt(2 * (1 + 1 / c)) / h)
+        known = {"omega": w, "omega_error": 0.0}
+        found = [Candidate(scheme=name, **known) for name in ("andersen", "andersen-after-kick")]
+        left = np.empty(0)
+    elif near(c, -1) and abs(d) <= close * h:
+        if near(b, -h) and abs(np.corrcoef(v[1:], v[:-1])[0, 1]) > 0.5:
+            found = []
+        elif near(b, -h):
+            found = [Candidate(scheme="brownian")]
+        elif -b < h and _is_correlated(left):
+            roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
+            rates = {n: _rate(root, -b / h) for n, root in roots.items()}
+            found = [
+                Candidate(scheme=f"gj-{n}-half", friction=x / h, friction_error=0.0)
+                for n, x in rates.items()
+                if x
+            ]
+            left = np.empty(0)
+    if len(left) and not _is_white(left):
+        return None
+    if not found and float(np.median(np.abs(left))) < SPARSE:
+        # few steps are off, and all others are not
+        return None
+    uniform = bool(len(left)) and _is_uniform(left)
+    return Thermal(candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit, uniform=uniform)
+
+
+def _is_correlated(x: Floats) -> bool:
+    """Whether neighbours share something, and others nothing, as draws that act in two steps."""
+    far = [abs(float(np.mean(x[lag:] * x[:-lag]))) for lag in range(3, 30)]
+    return max(far) < 0.3
+
+
+def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
+    """The x = gamma h at which a function that falls is `wanted`, by halving."""
+    low, high = 1e-9, 1.9
+    if not of(np.asarray(high)) < wanted < of(np.asarray(low)):
+        return None
+    for _ in range(200):
+        x = (low + high) / 2
+        low, high = (x, high) if of(np.asarray(x)) > wanted else (low, x)
+    return x
+
+
+def _decay(q: Floats, v: Floats) -> float:
+    """The determinant of the best linear map, that of the decay of momenta."""
+    z = np.stack([q - np.mean(q), v - np.mean(v)])
+    return float(np.linalg.det(np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0]))
+
+
+def _as_gj(number: str, decay: float, t: float, h: float) -> Candidate | None:
+    """What a GJ scheme of this decay would mean by the null vector (1, -t, -1, -t)."""
+    x = _rate(GJ[number], decay)
+    if not x:
+        return None
+    stretch = float(np.sqrt(2 * (1 - decay) / ((1 + decay) * x)))
+    a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
+    # GJ-I does not stretch, and knows its spring whatever its friction
+    error = 0.0 if number == "i" else nan
+    known = {"omega": float(np.sqrt(a) / h), "omega_error": error, "friction": x / h} if a > 0 else None
+    return Candidate(scheme=f"gj-{number}", **known) if known else None
+
+
+def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
+    """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
+    half = np.diff(q) / h
+    known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
+    entries = np.linalg.lstsq(known, half[1:], rcond=None)[0]
+    c, kick = float(entries[0]), float(entries[1])
+    left = half[1:] - known @ entries
+    noise = float(np.std(left))
+    if noise == 0 or not _is_white(left / noise):
+        return None
+    of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
+    uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise)
+    found = []
+    for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
+        # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
+        over = 1 + x / 2 if name == "bbk" else 1.0
+        a = -kick * h * over
+        if a <= 0 or x <= 0:
+            continue
+        w, thermal = float(np.sqrt(a) / h), float((noise * over) ** 2 / (2 * x))
+        found.append(
+            Candidate(
+                scheme=name,
+                omega=w,
+                omega_error=float(of_kick * over / (2 * w)),
+                friction=float(x / h),
+                friction_error=float(of_c * slope / h),
+                thermal=thermal,
+                thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
+                # each draws as its library does, where that shows: uniform draws end at 1.73
+                nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
+            )
+        )
+    return Thermal(
+        candidates=tuple(sorted(found, key=lambda y: y.nats)), free=(), misfit=misfit, uniform=uniform
+    )
+
+
+def _likely(
+    names: tuple[str, ...], q: Floats, v: Floats, h: float, *, turn: float | None = None
+) -> list[Candidate]:
+    """Schemes by the likelihood of their innovations; `turn` is (h w)**2 where it is known.
+
+    None where every one falls short of a free map and a free noise by more than chance allows.
+    """
+    from scipy.optimize import minimize
+
+    z = np.stack([q - np.mean(q), v - np.mean(v)])
+    n, both = z.shape[1] - 1, np.concatenate([z[:, 1:], z[:, :-1]])
+    moments = both @ both.T / n
+    single = names[0] not in TWO
+
+    def minus(name: str, at: Floats) -> float:
+        a = turn if turn is not None else float(np.exp(at[2]))
+        one = np.ones(1)
+        law = Law(
+            scheme=THERMOSTATS[name],
+            h=h,
+            m=one,
+            k=a / h**2 * one,
+            rate=float(np.exp(at[0])) / h,
+            thermal=float(np.exp(at[1])),
+        )
+        A, G = law.A[0].astype(float), law.G[0].astype(float)
+        over = np.concatenate([np.eye(2), -A], axis=1)
+        seen, Q = over @ moments @ over.T, G @ G.T
+        if single:
+            # the position says what the momentum says
+            value = np.log(Q[1, 1]) + seen[1, 1] / Q[1, 1]
+        else:
+            value = np.log(np.linalg.det(Q)) + np.trace(np.linalg.solve(Q, seen))
+        return n / 2 * float(value) if np.isfinite(value) else 1e300
+
+    A = moments[:2, 2:] @ np.linalg.inv(moments[2:, 2:])
+    decay = min(max(float(np.linalg.det(A)), 1e-6), 1 - 1e-6)
+    a = min(max(2 * (1 - float(np.trace(A)) / (1 + decay)), 1e-6), 3.9)
+    start: Any = np.log([-np.log(decay), np.var(v), a][: 2 if turn is not None else 3])
+    found = []
+    for name in names:
+        with np.errstate(all="ignore"):
+            of_name: Any = partial(minus, name)
+            how = {"xatol": 1e-7, "fatol": 1e-7, "maxiter": 2000}
+            fit: Any = minimize(of_name, start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
+            errors = _errors(of_name, fit.x)
+        of_a = turn if turn is not None else float(np.exp(fit.x[2]))
+        w, rate, thermal = float(np.sqrt(of_a) / h), float(np.exp(fit.x[0]) / h), float(np.exp(fit.x[1]))
+        found.append(
+            Candidate(
+                scheme=name,
+                omega=w,
+                omega_error=0.0 if turn is not None else float(w * errors[2] / 2),
+                friction=rate,
+                friction_error=float(rate * errors[0]),
+                thermal=thermal,
+                thermal_error=float(thermal * errors[1]),
+                nats=float(fit.fun),
+            )
+        )
+    best = min(y.nats for y in found)
+    if not single:
+        free = moments[:2, :2] - A @ moments[2:, :2]
+        floor = n / 2 * (float(np.log(np.linalg.det(free))) + 2)
+        # seven numbers less three: 25 nats more come about by chance once in 1e9 times
+        if not best - floor < 25:
+            return []
+    return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
+
+
+def _errors(minus: Callable[[Floats], float], at: Floats) -> Floats:
+    """Standard errors by the curvature of a log-likelihood."""
+    step, n = 1e-3, len(at)
+    unit = np.eye(n) * step
+    curved = np.array(
+        [
+            [minus(at + e + g) - minus(at + e - g) - minus(at - e + g) + minus(at - e - g) for g in unit]
+            for e in unit
+        ]
+    ) / (4 * step * step)
+    try:
+        return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.inv(curved)))))
+    except np.linalg.LinAlgError:
+        return np.full(n, nan)

@@ -1,0 +1,53 @@
+"""A budget of lines for every room: whoever raises one says in the commit what left, or why nothing could."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import springcheck
+
+HOME = Path(springcheck.__file__).parent
+
+BUDGETS = {
+    ("physics",): 4470,
+    ("schemes",): 1414,
+    ("thermal",): 1200,
+    ("engines/own",): 1658,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 977,
+    ("engines",): 2288,
+    ("simulate", "conformance", "doors"): 1130,
+    ("checks",): 3628,
+    ("identify",): 7180,
+    ("formats", "store"): 4930,
+    ("studies",): 1531,
+    ("studies/*",): 9162,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5075,
+}
+"""Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
+folder."""
+
+
+def sizes() -> Counter[tuple[str, ...]]:
+    """Lines of each room; of one without a budget under its own name."""
+    found: Counter[tuple[str, ...]] = Counter()
+    for path in HOME.rglob("*.py"):
+        room, *below = path.relative_to(HOME).with_suffix("").parts
+        if len(below) > 1 and room == "studies":
+            room = "studies/*"
+        elif len(below) > 1 and room == "engines":
+            room = f"engines/{below[0]}"
+        rooms = next((rooms for rooms in BUDGETS if room in rooms), (room,))
+        found[rooms] += len(path.read_text().splitlines())
+    return found
+
+
+def test_every_room_keeps_its_budget() -> None:
+    found = sizes()
+    over = [
+        f"{', '.join(rooms)}: {lines} lines of {BUDGETS.get(rooms, 0)}"
+        for rooms, lines in found.items()
+        if lines > BUDGETS.get(rooms, 0)
+    ]
+    assert over == []
+    assert set(found) == set(BUDGETS)

@@ -1,0 +1,115 @@
+"""What an engine declares of itself is believed up to what is known of any, and said in the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks
+from springcheck.checks import compare
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Outcome, Trajectory
+from springcheck.studies.faults import clean
+
+
+def uneven(**changes: Any) -> Scene:
+    return replace(scenefile.load_scene("spring-uneven"), steps=200, **changes)
+
+
+def run_of(scene: Scene, label: str = "own:semi-implicit-euler") -> Trajectory:
+    return springcheck.simulate(scene, label)
+
+
+def failed(scene: Scene, run: Trajectory) -> set[str]:
+    return {v.check for v in springcheck.judge(scene, run) if v.passed is False}
+
+
+@pytest.mark.parametrize(
+    "declared", [{"excess": 0.5}, {"force": 0.5}, {"quantum": 0.5}, {"state": 0.5}, {"force": -1.0}]
+)
+def test_no_arithmetic_excuses_a_force_half_as_large_again(declared: dict[str, float]) -> None:
+    scene = uneven()
+    wrong = run_of(scene.system.scaled(1.5))
+    wrong = replace(
+        wrong, energy=scene.system.energy(wrong.q, wrong.p), arithmetic=replace(Arithmetic(), **declared)
+    )
+    assert "grid" in failed(scene, wrong)
+    (name,) = declared
+    (grid,) = (v for v in springcheck.judge(scene, wrong) if v.check == "grid")
+    assert f"the engine declares {name} = " in grid.why
+
+
+def test_a_declared_arithmetic_is_said_in_the_verdict() -> None:
+    scene = uneven()
+    run = run_of(scene)
+    (plain,) = checks.judge(scene, run, [checks.step_defect])
+    assert "declares" not in plain.why
+    coarse = replace(run, arithmetic=Arithmetic(name="single", state=2.0**-24, parameters="single"))
+    (said,) = checks.judge(scene, coarse, [checks.step_defect])
+    assert "as the engine declares: states to 6e-08, parameters in single precision" in said.why
+
+
+def test_calls_that_a_solver_says_it_made_are_believed_up_to_64_a_frame() -> None:
+    scene = uneven(tolerance=1e-10)
+    run = run_of(scene, "sundials:adams")
+    assert failed(scene, run) == set()
+
+    def bound(calls: int) -> float:
+        judged = checks.judge(scene, replace(run, force_calls=calls), [checks.tolerance])
+        assert "internal steps" in judged[0].why
+        return judged[0].bound
+
+    assert bound(10**9) <= 64 * 200 / run.force_calls * bound(run.force_calls) * 1.001
+    assert bound(10**9) < 5e-6
+
+
+def test_a_solver_that_stops_at_its_first_row_is_not_judged() -> None:
+    scene = uneven(tolerance=1e-10)
+    run = run_of(scene, "sundials:adams")
+    assert run.energy is not None
+    tired = replace(
+        run, t=run.t[:1], q=run.q[:1], p=run.p[:1], energy=run.energy[:1],
+        outcome=Outcome(status="stopped", step=0, message="tired"),
+    )  # fmt: skip
+    verdicts = checks.judge(scene, tired)
+    assert checks.not_judged(verdicts) == (run.label,)
+    assert checks.status(verdicts) == 2
+    runs = {run.label: tired}
+    assert compare.same_motions(scene, runs, compare.compare(scene, runs)) == []
+
+
+def many() -> Scene:
+    rng, each = np.random.default_rng(4), np.ones(37)
+    start = rng.normal(size=37), rng.normal(size=37)
+    return clean.scene(each, (clean.walls(rng.uniform(1, 2, 37), 0 * each),), *start, step=0.1, steps=50)
+
+
+@pytest.mark.parametrize("kind", ["Fortran order", "transposed views", "long doubles"])
+def test_energies_do_not_depend_on_the_order_or_width_of_an_array(kind: str) -> None:
+    scene = many()
+    run = run_of(scene)
+
+    def of(x: Floats) -> Any:
+        if kind == "Fortran order":
+            return np.asfortranarray(x)
+        return np.ascontiguousarray(x.T).T if kind == "transposed views" else x.astype(np.longdouble)
+
+    q, p = of(run.q), of(run.p)
+    assert failed(scene, replace(run, q=q, p=p, energy=scene.system.energy(q, p))) == set()
+    assert failed(scene, replace(run, q=q, p=p)) == set() or kind == "long doubles"
+
+
+@pytest.mark.parametrize("name", ["t", "q", "p", "energy"])
+def test_lists_and_objects_are_refused_in_one_line(name: str) -> None:
+    scene = many()
+    run = run_of(scene)
+    for given in (getattr(run, name).tolist(), getattr(run, name).astype(object)):
+        with pytest.raises(SpringcheckError, match=rf"^own:semi-implicit-euler: {name} is [^\n]* is needed$"):
+            springcheck.judge(scene, replace(run, **{name: given}))

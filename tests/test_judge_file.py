@@ -1,0 +1,87 @@
+"""`judge FILE` says what it took from the file in place of the scene, and fails what is none of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import simulate
+from springcheck.cli import file, main
+from springcheck.errors import StoreError
+from springcheck.physics import scenefile
+from springcheck.physics.arrays import Floats
+from springcheck.physics.trajectory import Verdict
+
+SCENE = scenefile.load_scene("spring-uneven")
+RUN = simulate.run(SCENE, "own:velocity-verlet")
+
+
+def verdicts(
+    tmp_path: Path, table: Floats, header: str = "t,q,p"
+) -> tuple[dict[str, Verdict], tuple[str, ...]]:
+    np.savetxt(tmp_path / "a.csv", table, fmt="%.17g", delimiter=",", header=header, comments="")
+    found = file.judge(tmp_path / "a.csv", scene=SCENE, scheme="velocity-verlet")
+    return {v.check: v for v in found.verdicts}, found.notes
+
+
+def table(**off: float) -> Floats:
+    """The right run's times, position and momentum (f, 3)."""
+    t = RUN.t * (1 + off.get("clock", 0.0))
+    q, p = RUN.q * (1 + off.get("start", 0.0)), RUN.p * (1 + off.get("start", 0.0))
+    return np.c_[t, q, p]
+
+
+@pytest.mark.parametrize("name", ["three frames", "every second frame", "the whole"])
+def test_frames_that_the_scene_does_not_ask_for_are_no_fact_of_its_grid(tmp_path: Path, name: str) -> None:
+    rows = {"three frames": slice(3), "every second frame": slice(None, None, 2), "the whole": slice(None)}[
+        name
+    ]
+    found, notes = verdicts(tmp_path, table()[rows])
+    assert found["step-defect"].passed is True
+    assert found["grid"].passed is (True if name == "the whole" else None)
+    assert bool(notes) is (name != "the whole")
+    if name != "the whole":
+        assert f"the scene asks for {SCENE.frames}" in found["grid"].reason
+        assert "any other value" not in found["grid"].reason
+
+
+def test_twice_as_many_steps_are_none_either(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    run = simulate.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
+    found, notes = verdicts(tmp_path, np.c_[run.t, run.q, run.p])
+    assert found["grid"].passed is None
+    assert any(f"ends after {2 * SCENE.steps:,} steps, the scene after {SCENE.steps:,}" in x for x in notes)
+
+
+@pytest.mark.parametrize(("what", "check"), [("start", "start"), ("clock", "times")])
+def test_a_start_or_a_clock_that_is_a_little_off_is_told(tmp_path: Path, what: str, check: str) -> None:
+    found, notes = verdicts(tmp_path, table(**{what: 9e-10}))
+    assert found[check].passed is None
+    assert any(x in found[check].reason for x in ("of the amplitude off", "beside them"))
+    assert notes
+
+
+def test_a_motion_beside_its_line_fails(tmp_path: Path) -> None:
+    header = "t,q0,q1,q2,p0,p1,p2"
+    for beside, passed in ((1e-7, False), (0.0, None)):
+        none = np.zeros((len(RUN.t), 2))
+        rows = np.c_[RUN.t, RUN.q, none, RUN.p, none]
+        rows[:, 2] = beside * np.cos(np.arange(len(rows))) * np.max(np.abs(RUN.q))
+        found, notes = verdicts(tmp_path, rows, header)
+        assert found["line"].passed is passed
+        assert "motion along" in notes[0]
+
+
+def test_what_is_no_number_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = table()
+    rows[-1, 1] = np.nan
+    with pytest.raises(StoreError, match=r"row 201 (are|of)[^\n]*finite"):
+        verdicts(tmp_path, rows)
+    arguments = ["judge", str(tmp_path / "a.csv"), "--scene", "spring-uneven", "--scheme", "velocity-verlet"]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "LinAlgError" not in said

@@ -1,0 +1,109 @@
+"""Long runs: every step is judged where no closed form tells what happened between pieces, or none passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import checks, schemes
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic
+from springcheck.studies import keeper
+from springcheck.studies.faults import clean, steppers
+from springcheck.studies.run import measure, text
+from springcheck.studies.run.result import Report
+
+Change = Callable[[int, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
+
+
+def wells(steps: int) -> Scene:
+    """64 Duffing oscillators."""
+    rng, each = np.random.default_rng(3), np.ones(64)
+    terms = (clean.walls(each, 0 * each), Quartic(i=np.arange(64), b=each, at=0 * each))
+    start = rng.normal(size=64), rng.normal(size=64)
+    made = clean.scene(10 ** rng.uniform(-0.3, 0.3, 64), terms, *start, step=0.05, steps=steps)
+    return replace(made, quantities=("q", "p"))
+
+
+def springs(steps: int) -> Scene:
+    return replace(wells(steps), terms=(clean.walls(np.ones(64), np.zeros(64)),))
+
+
+FAULTS: dict[str, Change] = {
+    "right": lambda i, q0, p0, q, p: (q, p),
+    "stands still": lambda i, q0, p0, q, p: (q0, p0) if 70 < i < 310 else (q, p),
+    "one momentum trebled": lambda i, q0, p0, q, p: (
+        q,
+        p * np.where((np.arange(64) == 5) & (i == 200), 3, 1),
+    ),
+}
+
+
+def judged(tmp_path: Path, scene: Scene, change: Change) -> Report:
+    """The report on a run of an engine to which this happens after each step."""
+    scheme = schemes.SCHEMES["velocity-verlet"]
+    right = steppers.textbook(scene, scheme)
+    run = steppers.record(scene, scheme, lambda i, q, p: change(i, q, p, *right(i, q, p)), label="own:plain")
+    path = tmp_path / "a.h5"
+    with keeper.open_new(path, "test", force=True) as journal:
+        with journal.draft(run.label, scene) as draft:
+            draft.append(run.t, run.q, run.p, None)
+            draft.finish(keeper.attributes(run))
+        return measure.judge(scene, path, journal.sources(), [])
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces so small that 400 steps of 64 particles are long."""
+    monkeypatch.setattr(measure, "PIECE", 64 * 16)
+    monkeypatch.setattr(measure, "LONG_PIECE", 64 * 4)
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_step_of_a_long_anharmonic_run_is_judged(tmp_path: Path, fault: str) -> None:
+    report = judged(tmp_path, wells(400), FAULTS[fault])
+    assert report.judged_frames == 401
+    assert report.status == (fault != "right")
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_closed_form_tells_what_happened_between_the_pieces_of_springs(tmp_path: Path, fault: str) -> None:
+    report = judged(tmp_path, springs(400), FAULTS[fault])
+    assert report.judged_frames < 100
+    assert report.status == (fault != "right")
+    said = "\n".join(str(line) for line in text.lines(report))
+    assert "error, energy and same motion are of these" in said
+
+
+@pytest.mark.usefixtures("small")
+def test_pieces_alone_pass_nothing_where_no_closed_form_joins_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "MOST_NUMBERS", 64 * 100)
+    report = judged(tmp_path, wells(400), FAULTS["right"])
+    assert report.judged_frames < 100
+    assert report.status == 2
+    assert report.not_judged == ("own:plain",)
+    (why,) = {v.why for v in report.verdicts if v.check == "step-defect"}
+    assert "no closed form tells what happened between them" in why
+
+
+def test_a_closed_form_that_forgets_does_not_join_pieces() -> None:
+    def bridges(scene: Scene, name: str) -> bool:
+        scheme = schemes.SCHEMES[name]
+        run = steppers.record(replace(scene, steps=2), scheme, steppers.textbook(scene, scheme))
+        return checks.bridges(checks.Case(trajectory=run, scene=scene))
+
+    assert bridges(springs(10**6), "velocity-verlet")
+    assert bridges(springs(10**6), "explicit-euler")
+    assert bridges(springs(10**4), "rk4")
+    assert not bridges(springs(10**9), "rk4")
+    assert not bridges(springs(10**4), "implicit-euler")
+    assert not bridges(wells(10**4), "velocity-verlet")

@@ -1,0 +1,131 @@
+"""Files at temperature name themselves: by what no noise reaches, to rounding, and by likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import simulate
+from springcheck.cli import main
+from springcheck.physics import scenefile
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
+from springcheck.thermal.likelihood import identify_thermal
+
+M, K, RATE, THERMAL = 3.7, 2.9, 0.8, 1.7
+OMEGA = np.sqrt(K / M)
+
+
+def scene(steps: int) -> Scene:
+    spring = WallSpring(i=np.array([0]), k=np.array([K]), at=np.array([0.4]))
+    return Scene(
+        m=np.array([M]), q=np.array([0.3]), p=np.array([0.2]), terms=(spring,), step=0.35, steps=steps,
+        bath=Bath(temperature=THERMAL, friction=RATE), name="spring",
+    )  # fmt: skip
+
+
+def run(name: str, steps: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    made = simulate.run(scene(steps), f"own:{name}", seed=seed)
+    return made.t, made.q[:, 0], made.p[:, 0] / M
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("baoab", "baoab"), ("baoa", "baoa"), ("aboba", "aboba"), ("aoboa", "aoboa"), ("gj-i", "gj-i"),
+        ("gj-vi", "gj-vi"), ("gj-i-half", "gj-i-half"), ("bbk", "bbk"),
+        ("lammps-langevin", "lammps-langevin"),
+        ("euler-maruyama", "euler-maruyama"), ("brownian", "brownian"), ("andersen", "andersen"),
+        ("andersen-after-kick", "andersen-after-kick"),
+        ("vanden-eijnden-ciccotti", "vanden-eijnden-ciccotti"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_thousand_frames_name_the_scheme_or_list_it_among_those_that_share_its_states(
+    name: str, expected: str, seed: int
+) -> None:
+    found = identify_thermal(*run(name, 1000, seed))
+    assert found is not None
+    assert expected in [one.scheme for one in found.candidates if one.nats < 14]
+    if found.named:
+        assert found.candidates[0].scheme == expected
+
+
+@pytest.mark.parametrize("name", ["baoab", "baoa", "andersen"])
+def test_the_spring_is_known_to_rounding_at_any_temperature(name: str) -> None:
+    found = identify_thermal(*run(name, 1000))
+    assert found is not None
+    assert found.candidates[0].omega == pytest.approx(OMEGA, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["obabo", "oabao", "boaob"])
+def test_two_draws_a_step_are_told_apart_by_likelihood(name: str) -> None:
+    few, many = (identify_thermal(*run(name, steps)) for steps in (1000, 20000))
+    assert few is not None
+    assert many is not None
+    assert not few.named or few.candidates[0].scheme == name
+    assert many.named
+    best = many.candidates[0]
+    assert best.scheme == name
+    assert abs(best.friction - RATE) < 5 * best.friction_error < 0.2
+    assert abs(best.thermal - THERMAL / M) < 5 * best.thermal_error < 0.1
+    assert abs(best.omega - OMEGA) < 5 * best.omega_error < 0.1
+
+
+@pytest.mark.parametrize(
+    "label", ["own:semi-implicit-euler", "own:velocity-verlet", "own:position-verlet", "own:rk4"]
+)
+@pytest.mark.parametrize("name", ["spring", "chain", "anharmonic", "two-scales", "pendulum", "detest-b1"])
+def test_what_is_not_random_is_no_thermostat(name: str, label: str) -> None:
+    made = simulate.run(scenefile.load_scene(name), label)
+    for j in range(min(made.q.shape[1], 2)):
+        assert identify_thermal(made.t, made.q[:, j], made.p[:, j]) is None
+
+
+def test_single_precision_and_text_say_less_and_nothing_wrong() -> None:
+    t, q, v = run("baoa", 2000)
+    for less in (lambda x: x.astype(np.float32).astype(float), lambda x: np.round(x, 6)):
+        found = identify_thermal(t, less(q), less(v))
+        assert found is not None
+        assert [one.scheme for one in found.candidates] == ["baoa"]
+        assert found.candidates[0].omega == pytest.approx(OMEGA, rel=1e-3)
+        assert found.misfit > 1e-9
+
+
+def test_frames_several_steps_apart_are_named_by_nothing_wrong() -> None:
+    for name in ("baoab", "obabo", "baoa"):
+        t, q, v = run(name, 8000)
+        found = identify_thermal(t[::4], q[::4], v[::4])
+        assert found is None or not found.named or found.candidates[0].scheme == name
+
+
+def test_the_public_function_and_the_command_say_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = simulate.run(scene(1500), "openmm:langevin-middle-bath", seed=3)
+    found = springcheck.identify(made.t, made.q, made.p, mass=M)
+    assert found.scheme == "baoa"
+    assert found.omega[0] == pytest.approx(OMEGA, rel=1e-12)
+    assert found.stiffness is not None
+    assert found.stiffness[0] == pytest.approx(K, rel=1e-12)
+    assert "its velocities are of another time" in found.statement
+    path = tmp_path / "x.h5"
+    arguments = ["bath-spring", "--method", "own:obabo", "--seed", "3", "-o", str(path)]
+    assert main(["run", *arguments]) == 0
+    capsys.readouterr()
+    main(["identify", str(path)])
+    said = capsys.readouterr()
+    assert "one of: obabo" in said.out
+    assert "friction" in said.out
+    assert "does not fit" not in said.out
+    assert "do not span" not in said.out + said.err
+
+
+def test_an_engine_that_is_no_thermostat_keeps_its_words() -> None:
+    made = simulate.run(replace(scenefile.load_scene("spring"), steps=400), "own:velocity-verlet")
+    assert springcheck.identify(made.t, made.q, made.p, mass=1.0).scheme == "velocity-verlet"

@@ -1,0 +1,198 @@
+"""Thermostats on a spring: each law from its stages, held against closed forms and matrices by hand.
+
+a = (h w)**2, x = gamma h, c = exp(-x), s = sqrt(c); covariances in units of kT/k, m kT and sqrt(m/k) kT.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from springcheck.thermal import THERMOSTATS, Law, Stepper
+
+SPRINGS = [(0.35, 3.7, 2.9, 0.8, 1.7), (0.11, 0.4, 31.0, 2.3, 0.02), (1.3, 5.0, 2.0, 0.05, 40.0)]
+"""h, m, k, gamma, kT: none of them 1, which hides what is missing."""
+
+
+def law(name: str, h: float, m: float, k: float, rate: float, thermal: float) -> Law:
+    return Law(scheme=THERMOSTATS[name], h=h, m=np.array([m]), k=np.array([k]), rate=rate, thermal=thermal)
+
+
+def _table(name: str, a: float, x: float) -> tuple[float, float, float | None]:
+    """<x**2>, <v**2> and <x v> as the literature has them, or as computer algebra gave them."""
+    c, s = math.exp(-x), math.exp(-x / 2)
+    e = 1 - math.exp(-x)
+    root = math.sqrt(a)
+    g = x / root
+    if name.startswith("gj-"):
+        number = name.split("-")[1]
+        c2 = float(THERMOSTATS[f"gj-{number}"].acts[2].part(np.float64(x)))
+        q2 = 2 * (1 - c2) / ((1 + c2) * x)
+        return (1, 1, None) if name.endswith("half") else (1, 1 - q2 * a / 4, 0)
+    return {
+        "baoab": (1, 1 - a / 4, 0),
+        "baoa": (1, 1, root / 2),
+        "aboba": (1, 1 / (1 - a / 4), 0),
+        "obabo": (1 / (1 - a / 4), 1, 0),
+        "oabao": (1 - a / 4, 1, 0),
+        "aoboa": ((1 + c) / (2 * s), 2 * (1 + c) / (2 * (1 + c) - a * s), 0),
+        "boaob": ((1 + c) ** 2 / (s * (2 * (1 + c) - a * s)), None, None),
+        "bbk": (1 / (1 - a / 4), 1 / (1 + x / 2), 0),
+        "lammps-langevin": ((1 - x / 2) / (1 - x / 2 - a / 4), 1, 0),
+        "euler-maruyama": (2 * g * (2 + a - x) / ((g - root) * (4 + a - 2 * x)), None, None),
+        "brownian": (1 / (1 - a / x / 2), None, None),
+        "andersen": (1 / (1 - a / 4), 1, 0),
+        "andersen-after-kick": ((1 - e / 2) / ((1 - e) * (1 - a / 2)), None, None),
+        "andersen-leapfrog": ((1 - e / 2) / (1 - a / 2), 1 / (1 - a / 2), None),
+    }.get(name, (None, None, None))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("spring", SPRINGS)
+@pytest.mark.parametrize("name", THERMOSTATS)
+def test_covariances_are_those_of_the_table(name: str, spring: tuple[float, ...]) -> None:
+    h, m, k, rate, thermal = spring
+    found, x = law(name, *spring), h * rate
+    expected = _table(name, h * h * k / m, x)
+    cross = found.covariance[0, 0, 1] / thermal * math.sqrt(k / m)
+    for value, known in zip((found.configurational[0], found.kinetic[0], cross), expected, strict=True):
+        if known is not None and (known > 0 or known is expected[2]):
+            assert value == pytest.approx(known, rel=1e-11, abs=1e-11), name
+
+
+def by_hand(
+    name: str, h: float, m: float, k: float, rate: float, thermal: float
+) -> tuple[mp.matrix, mp.matrix]:
+    """A and G of one step on (x, v, last draw), from the recurrences as their papers print them."""
+    H, g = mp.mpf(h), mp.mpf(rate)
+    M, K, T = mp.mpf(m), mp.mpf(k), mp.mpf(thermal)
+    unit = [mp.matrix([[int(i == j) for j in range(5)]]) for i in range(5)]
+    x, v, old, one, two = unit
+    sigma = mp.sqrt(2 * T * g / M)
+    F = -K / M
+    if name == "bbk":
+        R = mp.sqrt(2 * g * T / (M * H))
+        half = v + H / 2 * (F * x - g * v + R * old)
+        x1 = x + H * half
+        v1 = (half + H / 2 * (F * x1 + R * one)) / (1 + g * H / 2)
+        rows = [x1, v1, one]
+    elif name == "lammps-langevin":
+        # v half a step back, from the force with friction that led to v
+        R = mp.sqrt(2 * g * T / (M * H))
+        before = (v - H / 2 * (F * x + R * old)) / (1 - g * H / 2)
+        half = v + H / 2 * (F * x - g * before + R * old)
+        x1 = x + H * half
+        v1 = half + H / 2 * (F * x1 - g * half + R * one)
+        rows = [x1, v1, one]
+    elif name == "vanden-eijnden-ciccotti":
+        C = H**2 / 2 * (F * x - g * v) + sigma * H ** mp.mpf("1.5") * (one / 2 + two / (2 * mp.sqrt(3)))
+        c1, c2 = H / 2 - H * H * g / 8, H * g / 2 - H * H * g * g / 8
+        c5 = H ** mp.mpf("1.5") * sigma / (2 * mp.sqrt(3))
+        noise = (mp.sqrt(H) * sigma / 2 - H ** mp.mpf("1.5") * g * sigma / 8) * one - g / 2 * c5 * two
+        half = v + c1 * F * x - c2 * v + noise
+        x1 = x + H * half + c5 * two
+        # the x of eq. 23 to the order of its own truncation
+        assert mp.norm((x1 - x - H * v - C)[:2], 2) < 10 * H**3 * (1 + abs(F)) * (1 + g) ** 2
+        v1 = half + c1 * F * x1 - c2 * half + noise
+        rows = [x1, v1, 0 * x]
+    elif name == "euler-maruyama":
+        rows = [x + H * v, v + H * (F * x - g * v) + sigma * mp.sqrt(H) * one, 0 * x]
+    else:
+        s = mp.exp(-g * H / 2)
+        u = v + H / 2 * F * x
+        u = s * u + mp.sqrt((1 - s * s) * T / M) * one
+        x1 = x + H * u
+        u = s * u + mp.sqrt((1 - s * s) * T / M) * two
+        rows = [x1, u + H / 2 * F * x1, 0 * x]
+    A, G = mp.zeros(3), mp.zeros(3, 2)
+    for i, row in enumerate(rows):
+        for j in range(3):
+            A[i, j] = row[j]
+        for j in range(2):
+            G[i, j] = row[3 + j]
+    return A, G
+
+
+@pytest.mark.parametrize("spring", SPRINGS)
+@pytest.mark.parametrize(
+    "name", ["bbk", "lammps-langevin", "vanden-eijnden-ciccotti", "euler-maruyama", "boaob"]
+)
+def test_laws_agree_with_the_recurrences_of_the_papers(name: str, spring: tuple[float, ...]) -> None:
+    mp.mp.dps = 40
+    m, thermal = spring[1], spring[4]
+    A, G = by_hand(name, *spring)
+    found = law(name, *spring)
+    scale = np.array([1, m])
+    of_A = np.array([[float(A[i, j]) for j in range(2)] for i in range(2)]) * scale[:, None] / scale[None, :]
+    assert found.A[0].astype(float) == pytest.approx(of_A, rel=1e-14, abs=1e-16)
+    d = 3
+    lhs, rhs = mp.zeros(d * d), mp.zeros(d * d, 1)
+    GG = G * G.T
+    for i in range(d):
+        for j in range(d):
+            rhs[i * d + j] = GG[i, j]
+            for a in range(d):
+                for b in range(d):
+                    lhs[i * d + j, a * d + b] = int((i, j) == (a, b)) - A[i, a] * A[j, b]
+    S = mp.lu_solve(lhs, rhs)
+    if float(S[0]) < 0:
+        assert np.all(np.isinf(found.covariance))
+        return
+    assert found.covariance[0, 0, 0] == pytest.approx(float(S[0]), rel=1e-11)
+    assert found.covariance[0, 1, 1] == pytest.approx(float(S[4]) * m * m, rel=1e-11)
+    assert found.covariance[0, 0, 1] == pytest.approx(float(S[1]) * m, rel=1e-11, abs=1e-12 * thermal)
+
+
+@pytest.mark.parametrize("name", THERMOSTATS)
+def test_diffusion_is_that_of_the_table(name: str) -> None:
+    h, m, _, rate, thermal = SPRINGS[0]
+    x = rate * h
+    c, s = math.exp(-x), math.exp(-x / 2)
+    found = law(name, h, m, 1.0, rate, thermal).diffusion[0]
+    if name in {"baoab", "baoa", "aboba", "obabo", "oabao"} or name.startswith("andersen"):
+        assert found == pytest.approx(x / 2 / math.tanh(x / 2), rel=1e-12)
+    elif name in {"aoboa", "boaob"}:
+        # one kick of the bath between two flights, or flights with the half decayed velocity
+        assert found == pytest.approx(
+            x * s / (1 - c) if name == "boaob" else x * (1 + c) / (1 - c) / 2, rel=1e-1
+        )
+        assert found == pytest.approx(1 + x * x / 12, abs=x**3)
+    elif name == "vanden-eijnden-ciccotti":
+        assert found == pytest.approx(1, abs=x**4)
+    else:
+        assert found == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["baoab", "aboba", "gj-i", "lammps-langevin", "bbk", "andersen-after-kick"])
+def test_laws_are_what_long_runs_of_the_scheme_itself_show(name: str) -> None:
+    """Ten thousand springs side by side, 200 steps after 400: each number within five standard errors."""
+    h, m, k, rate, thermal = SPRINGS[0]
+    found, scheme = law(name, h, m, k, rate, thermal), THERMOSTATS[name]
+    stepper = Stepper(scheme, h=h, m=np.full(10_000, m), rate=rate, thermal=thermal, width=np.float64)
+    n, rng = 10_000, np.random.default_rng(20)
+    q, p = rng.standard_normal((2, n))
+    carried = [rng.standard_normal(n) for _ in range(scheme.carried)]
+    frames = []
+    for i in range(600):
+        draws = [*carried, *rng.standard_normal((scheme.fresh, n))]
+        hit = rng.random(n) < found.collision
+        q, p = stepper(q, p, lambda q, p: -k * q, draws, hit)
+        carried = draws[len(draws) - scheme.carried :]
+        if i >= 400:
+            frames.append((q, p))
+    q, p = np.array(frames).transpose(1, 0, 2)
+    error = found.error_of_variances(len(frames))[0] / math.sqrt(n)
+    assert np.mean(q * q) / found.covariance[0, 0, 0] == pytest.approx(1, abs=5 * error[0])
+    assert np.mean(p * p) / found.covariance[0, 1, 1] == pytest.approx(1, abs=5 * error[1])
+    lagged = (np.mean(q[7:] * q[:-7]) - found.autocovariance(7)[0, 0, 0]) / found.covariance[0, 0, 0]
+    assert lagged == pytest.approx(0, abs=5 * error[0])
+    moved = np.mean((q[7:] - q[:-7]) ** 2) / found.displacement(7)[0]
+    assert moved == pytest.approx(1, abs=20 * error[0])
+
+
+def test_a_step_beyond_its_limit_has_no_stationary_state() -> None:
+    found = replace(law("baoab", *SPRINGS[0]), h=2.4)
+    assert np.all(np.isinf(found.covariance))

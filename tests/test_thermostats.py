@@ -1,0 +1,232 @@
+"""Thermostats of every engine: the right ones pass, to rounding and by chance; what is broken is rejected.
+
+Seeds here are those at which a test was written, none of them chosen; a chance of 1e-6 a call is what the
+checks allow themselves.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import engines, simulate
+from springcheck.cli import main
+from springcheck.engines import Label
+from springcheck.errors import MethodError, SceneError
+from springcheck.physics import scenefile
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
+from springcheck.thermal import THERMOSTATS, chance
+
+LABELS = [
+    f"{name}:{method}"
+    for name in ("own", "openmm", "ase", "lammps")
+    for method in engines.engine(name).thermostats
+]
+
+
+def pair(steps: int = 400, step: float = 0.35) -> Scene:
+    """Two unlike particles, one on a wall, joined, in a bath: nothing is 1."""
+    return Scene(
+        m=np.array([3.7, 1.3]), q=np.array([0.3, -0.2]), p=np.array([0.7, 0.4]),
+        terms=(WallSpring(i=np.array([0]), k=np.array([2.9]), at=np.array([0.1])),
+               Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.7]), rest=np.array([0.6]))),
+        step=step, steps=steps, bath=Bath(temperature=1.7, friction=0.8), name="pair",
+    )  # fmt: skip
+
+
+def here(label: str) -> None:
+    if reason := engines.absence(label.partition(":")[0]):
+        pytest.skip(reason)
+
+
+def test_there_are_twenty_methods_of_four_engines_at_least() -> None:
+    assert len(LABELS) >= 20
+    assert len({label.partition(":")[0] for label in LABELS}) == 4
+
+
+@pytest.mark.parametrize("label", LABELS)
+def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
+    here(label)
+    scene = pair(step=0.1 if "euler" in label else 0.35)
+    run = simulate.run(scene, label, seed=271828)
+    verdicts = springcheck.judge(scene, run)
+    assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
+    assert sum(v.passed is True for v in verdicts) >= 6
+    assert run.origin["seed"] == "271828"
+    assert run.origin["generator"]
+
+
+@pytest.mark.parametrize("label", LABELS)
+def test_a_seed_is_kept_to_and_another_seed_is_another_run(label: str) -> None:
+    here(label)
+    scene = pair(steps=20, step=0.1)
+    one, same, other = (simulate.run(scene, label, seed=seed) for seed in (5, 5, 6))
+    assert np.array_equal(one.q, same.q)
+    assert np.array_equal(one.p, same.p)
+    assert not np.array_equal(one.p, other.p)
+
+
+@pytest.mark.parametrize("name", ["baoab", "obabo", "andersen", "bbk"])
+def test_numbers_do_not_depend_on_how_many_steps_are_asked_for_at_once(name: str) -> None:
+    scene, label = pair(steps=60), Label(engine="own", method=name)
+    whole = simulate.run(scene, label, seed=3)
+    simulation = engines.start(scene, label, 3)
+    q, p = np.empty((2, 60, 2))
+    for row in range(0, 60, 4):
+        simulation.advance(1, q[row : row + 4], p[row : row + 4])
+    assert np.array_equal(q, whole.q[1:])
+    assert np.array_equal(p, whole.p[1:])
+
+
+@pytest.mark.parametrize(
+    "label", ["own:baoab", "own:aboba", "own:gj-i", "own:andersen", "openmm:langevin-middle-bath"]
+)
+def test_an_anharmonic_well_leaves_the_direction_of_the_noise_to_rounding(label: str) -> None:
+    scene = scenefile.load_scene("bath-well")
+    run = simulate.run(replace(scene, steps=500), label, seed=11)
+    verdicts = {v.check: v for v in springcheck.judge(replace(scene, steps=500), run)}
+    assert verdicts["noise-direction"].passed
+    assert all(v.passed is not False for v in verdicts.values())
+
+
+def test_chances_are_those_of_their_null() -> None:
+    rng = np.random.default_rng(8)
+    x = rng.standard_normal((2000, 60))
+    for of in (chance.mean, chance.variance, chance.shape, chance.neighbours):
+        found = np.array([of(row) for row in x])
+        for level in (0.5, 0.1, 0.01):
+            assert np.mean(found <= level) < level + 5 * np.sqrt(level / len(x)), of.__name__
+    assert chance.shape(np.sqrt(12) * (rng.random(2000) - 0.5)) < 1e-15
+    assert chance.shape(rng.standard_t(3, 2000)) < 1e-15
+    assert chance.variance(1.01 * rng.standard_normal(1_000_000)) < 1e-30
+    assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)) < 1e-15
+
+
+BAD = {
+    "temperature = -3.0\nfriction = 1.0": r"bath.temperature = -3.0: a number > 0 is needed",
+    "temperature = 3.0\nfriction = 0.0": r"bath.friction = 0.0: a number > 0 is needed",
+    "temperature = 3.0": r"bath: it lacks the field `friction`",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bath_that_makes_no_sense_is_one_line(text: str) -> None:
+    whole = scenefile.text_of("spring") + f"\n[bath]\n{text}\n"
+    with pytest.raises(SceneError, match=BAD[text]):
+        scenefile.parse(whole, name="spring")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--temperature", "-3"], "bath.temperature = -3.0: a number > 0"),
+        (["--temperature", "warm"], "--temperature warm: a number is needed"),
+        (["--temperature", "300K", "--method", "own:euler"],
+         "explicit-euler has no noise, and the scene has a bath"),
+        (["--method", "own:baoab"], "it is a thermostat, for scenes with a bath"),
+        (["--seed", "3"], "--seed goes with --vary, or with a scene that has a bath"),
+        (["--temperature", "1", "--seed", "0"], "seed = 0: a whole number from 1"),
+        (["--friction", "2"], "--friction goes with --temperature"),
+    ],
+)  # fmt: skip
+def test_a_users_mistake_is_one_line_and_exit_status_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["run", "spring", "-o", str(tmp_path / "x.h5"), *arguments]) == 2
+    shown = capsys.readouterr()
+    assert said in " ".join(shown.err.split())
+    assert "Traceback" not in shown.err
+
+
+def test_a_seed_that_is_no_integer_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["run", "spring", "--temperature", "1", "--seed", "lucky"])
+    assert stopped.value.code == 2
+    with pytest.raises(MethodError, match=r"seed = 1\.5: a whole number"):
+        simulate.run(pair(), "own:baoab", seed=1.5)  # type: ignore[arg-type]
+    with pytest.raises(MethodError, match="takes no seed"):
+        simulate.run(scenefile.load_scene("spring"), "own:euler", seed=1)
+
+
+def test_a_spring_at_300_kelvin_runs_and_repeats(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--method", "own:ba*", "--method", "openmm:*"]
+    assert main(["run", "spring", "--temperature", "300K", "--seed", "7", *arguments]) == 0
+    shown = capsys.readouterr().out
+    assert "at temperature 300K" in shown
+    assert "Temperatures over that of the bath" in shown
+    assert main(["run", "--from", "spring.h5"]) == 0
+    assert "NOT equal" not in capsys.readouterr().out
+    again = ["--force", "--json", "--method", "own:baoab"]
+    assert main(["run", "spring", "--temperature", "300K", *again]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["temperatures"][0]["configurational_law"] == pytest.approx(1, abs=1e-9)
+    kept = springcheck.read("spring.h5")["own:baoab"]
+    assert 1 <= int(kept.origin["seed"]) <= simulate.MOST_SEED
+
+
+@pytest.mark.parametrize("name", ["bath-spring", "bath-uneven", "bath-free", "bath-brownian", "bath-well"])
+def test_a_bath_is_read_back_as_it_was_written(name: str) -> None:
+    scene = scenefile.load_scene(name)
+    again = scenefile.parse(scene.to_toml(), name=name)
+    assert again.bath == scene.bath
+    assert again.digest == scene.digest
+    assert replace(scene, bath=Bath(temperature=1.0, friction=1.0)).digest != scene.digest
+
+
+def test_schemes_by_letters_are_those_of_the_table_of_stages() -> None:
+    """Two ways to the same map and noise: stages of the catalogue of schemes, and the thermostats'."""
+    from springcheck import schemes
+    from springcheck.schemes import Scheme
+    from springcheck.thermal import Law
+
+    h, m, k, rate, thermal = 0.35, 3.7, 2.9, 0.8, 1.7
+    kinds = {"A": "drift", "B": "pull", "O": "thermal"}
+    for letters in ("BAOAB", "BAOA", "ABOBA", "OBABO", "OABAO", "AOBOA", "BOAOB"):
+        from fractions import Fraction
+
+        stages = tuple((kinds[x], Fraction(1, letters.count(x))) for x in letters)
+        scheme = Scheme(name=letters, title="", order=2, limit=2.0, symplectic=False, stages=stages)
+        of = {"h": h, "m": np.array([m]), "k": np.array([k]), "c": np.array([rate * m])}
+        law = Law(
+            scheme=THERMOSTATS[letters.lower()],
+            h=h,
+            m=np.array([m]),
+            k=np.array([k]),
+            rate=rate,
+            thermal=thermal,
+        )
+        assert schemes.matrix(scheme, **of) == pytest.approx(law.A, rel=1e-15)
+        assert schemes.noise(scheme, **of, kT=thermal) == pytest.approx(law.G, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "name", [*THERMOSTATS, "noise-direction", "draws-variance", "noise-map", "openmm:andersen"]
+)
+def test_thermostats_and_their_checks_are_explained(name: str) -> None:
+    from springcheck.cli import explain
+
+    said = list(explain.lines(name))
+    assert len(said) >= 3
+    if name in THERMOSTATS:
+        assert any("k<q**2>/kT" in line for line in said)
+        assert not any("chooses its own steps" in line for line in said)
+
+
+def test_a_deterministic_run_imports_no_generator() -> None:
+    import subprocess
+    import sys
+
+    code = "import springcheck as s, sys\n"
+    code += "s.simulate('spring', 'own:euler'); print('numpy.random' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,142 @@
+"""The JSON documents of the commands, as JSON Schema in `data/schemas`; does what is printed keep to it?
+
+A document names its schema and version first.  Here each command is run in several ways, and what they print
+is put together: the types that were met, and the names that were always there.  A name that goes, or another
+type, needs another version (`springcheck.cli.output.SCHEMA`); a name more does not.
+
+Run:   python validation/schemas.py            (50 s: 0 documents of 14 are off)
+       python validation/schemas.py write      (writes data/schemas anew)
+"""
+
+import contextlib
+import io
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from arguments import arguments
+from springcheck.cli import main as springcheck
+from springcheck.cli.output import SCHEMA
+
+FOLDER = Path(__file__).parents[1] / "data" / "schemas"
+
+WAYS = {
+    "run": (
+        "run spring --method own:euler --method own:rk4 -o run.h5",
+        "run spring-uneven --method own:euler -o f.h5 --fault stiffness",
+        "run --from run.h5",
+    ),
+    "inspect": ("inspect run.h5", "inspect run.h5 --verdicts"),
+    "identify": (
+        "identify run.h5",
+        "identify table.csv --stiffness 2.9 --mass 3.7 --step 0.1",
+        "identify table.csv --mass 3.7 --scheme rk4",
+        "identify run.h5 table.csv",
+    ),
+    "judge": ("judge table.csv --scene spring-uneven --scheme velocity-verlet",),
+    "list": ("list",),
+    "census": ("census --method own:euler --method own:rk4 -o census.h5",),
+    "stability": ("stability spring --method own:euler -o stability.h5",),
+    "precision": ("precision spring --method own:euler -o precision.h5",),
+}
+"""What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
+
+
+def inferred(values: list[Any]) -> dict[str, Any]:
+    """The schema of these values: their types, and what they hold where they are objects or arrays."""
+    names = {
+        dict: "object",
+        list: "array",
+        tuple: "array",
+        str: "string",
+        bool: "boolean",
+        type(None): "null",
+    }
+    types = sorted({names.get(type(x), "number") for x in values})
+    if types == ["null"]:
+        # what was never there may be anything
+        return {}
+    found: dict[str, Any] = {"type": types[0] if len(types) == 1 else types}
+    objects = [x for x in values if isinstance(x, dict)]
+    if objects:
+        keys = {key: None for x in objects for key in x}
+        found["properties"] = {key: inferred([x[key] for x in objects if key in x]) for key in keys}
+        found["required"] = [key for key in keys if all(key in x for x in objects)]
+    entries = [y for x in values if isinstance(x, list | tuple) for y in x]
+    if entries:
+        found["items"] = inferred(entries)
+    return found
+
+
+def problems(value: Any, schema: dict[str, Any], where: str = "") -> list[str]:
+    """What in a value is not as the schema says."""
+    name = inferred([value]).get("type", "null")
+    allowed = schema.get("type", name)
+    allowed = allowed if isinstance(allowed, list) else [allowed]
+    if name not in allowed:
+        return [f"{where or 'document'} is {name}, not {' or '.join(allowed)}"]
+    if isinstance(value, dict):
+        out = [f"{where}.{key} is missing" for key in schema.get("required", ()) if key not in value]
+        known = schema.get("properties", {})
+        return out + [
+            x for key, y in value.items() if key in known for x in problems(y, known[key], f"{where}.{key}")
+        ]
+    if isinstance(value, list) and "items" in schema:
+        return [x for i, y in enumerate(value) for x in problems(y, schema["items"], f"{where}[{i}]")]
+    return []
+
+
+def table() -> str:
+    """A trajectory of velocity Verlet with half a drift, which fits nothing."""
+    q, v, h, w2 = 0.3, 0.7 / 3.7, 0.1, 2.9 / 3.7
+    rows = ["t,q,v"]
+    for i in range(101):
+        rows.append(f"{i * h!r},{q!r},{v!r}")
+        v -= h / 2 * w2 * q
+        q += h / 2 * v
+        v -= h / 2 * w2 * q
+    return "\n".join(rows) + "\n"
+
+
+def printed(words: str) -> Any:
+    """The document that a command prints."""
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as said:
+        springcheck([*words.split(), "--json"])
+    if not out.getvalue():
+        raise RuntimeError(f"{words}: {said.getvalue()}")
+    return json.loads(out.getvalue())
+
+
+def schema_of(command: str, documents: list[Any]) -> dict[str, Any]:
+    """The schema of a command's documents, with its head."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"springcheck/{command}/{SCHEMA}",
+        **inferred(documents),
+    }
+
+
+def main() -> int:
+    """Compare, or write; the exit status says whether every document keeps to its schema."""
+    given = arguments(__doc__, what="compare")
+    wrong = 0
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        Path("table.csv").write_text(table())
+        for command, ways in WAYS.items():
+            documents = [printed(words) for words in ways]
+            path = FOLDER / f"{command}-{SCHEMA}.json"
+            if given.what == "write":
+                path.write_text(json.dumps(schema_of(command, documents), indent=1) + "\n")
+            schema = json.loads(path.read_text())
+            for words, document in zip(ways, documents, strict=True):
+                found = problems(document, schema)
+                wrong += bool(found)
+                print(f"{words}: {'; '.join(found[:5]) or 'as its schema says'}")
+    print(f"{wrong} documents of {sum(map(len, WAYS.values()))} are off")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
