@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.figures import style
 from springcheck.store import apart, trust
 from springcheck.studies.precision import measure, sweeps
@@ -138,6 +138,6 @@ def steady_clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
             return _Metered(self._inner.start(scene, method, label, step), clock, each)
 
     monkeypatch.setattr(engines, "load", Driver)
-    for module in (simulate, measure, sweeps):
+    for module in (driver, measure, sweeps):
         monkeypatch.setattr(module, "perf_counter", clock)
     return clock

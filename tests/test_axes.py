@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.builders import spring
@@ -44,9 +44,9 @@ def planar(**changes: object) -> Scene:
 )
 def test_every_axis_moves_as_a_spring_of_its_own(label: str) -> None:
     scene = orbit()
-    whole = simulate.run(scene, label)
+    whole = driver.run(scene, label)
     for j in range(3):
-        alone = simulate.run(spring(m=scene.m[j], k=2.9, q=scene.q[j], p=scene.p[j]), label)
+        alone = driver.run(spring(m=scene.m[j], k=2.9, q=scene.q[j], p=scene.p[j]), label)
         # in space OpenMM takes the root of a sum of squares for a length: a rounding more
         assert np.max(np.abs(whole.q[:, j] - alone.q[:, 0])) < 200 * 50 * 2.0**-53 * np.max(np.abs(alone.q))
 
@@ -57,9 +57,9 @@ def test_engines_in_space_pass_every_check(label: str, make: object) -> None:
     scene = make()  # type: ignore[operator]
     if engines.refusal(scene, engines.parse(label)):
         pytest.skip("does not serve this scene")
-    run = simulate.run(scene, label)
+    run = driver.run(scene, label)
     verdicts = checks.judge(scene, run) + checks.judge_thoroughly(
-        scene, label, simulate.run, [one for one in checks.THOROUGH if one.family != "law"]
+        scene, label, driver.run, [one for one in checks.THOROUGH if one.family != "law"]
     )
     assert [v for v in verdicts if v.passed is False] == []
     assert {"step-defect", "line", "propagator"} <= {v.check for v in verdicts if v.passed}
@@ -68,16 +68,16 @@ def test_engines_in_space_pass_every_check(label: str, make: object) -> None:
 def test_a_bond_of_a_program_that_is_not_alike_along_its_axes_is_refused() -> None:
     unlike = planar(terms=(Spring(a=[0, 1], b=[2, 3], k=[1.7, 1.9], rest=[0.0, 0.0]),))
     with pytest.raises(MethodError, match="alike along every axis"):
-        simulate.run(unlike, "openmm:verlet")
+        driver.run(unlike, "openmm:verlet")
     # counted from their rest a bond of a rest length along y is one of none
     long = planar(terms=(Spring(a=[0, 1], b=[2, 3], k=[1.7, 1.7], rest=[0.0, 0.5]),))
-    assert not [v for v in checks.judge(long, simulate.run(long, "openmm:verlet")) if v.passed is False]
+    assert not [v for v in checks.judge(long, driver.run(long, "openmm:verlet")) if v.passed is False]
 
 
 def test_angular_momentum_is_kept_where_area_is_and_grows_by_the_determinant_elsewhere() -> None:
     scene = orbit()
     for scheme, growth in (("semi-implicit-euler", 1.0), ("euler", 1 + 0.01 * 2.9 / 3.7)):
-        run = simulate.run(scene, f"own:{scheme}")
+        run = driver.run(scene, f"own:{scheme}")
         q, p = run.q.astype(np.longdouble), run.p.astype(np.longdouble)
         found = q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
         assert np.allclose(np.asarray(found / found[0], float), growth ** np.arange(201.0), rtol=1e-12)
@@ -100,9 +100,9 @@ def test_angular_momentum_is_of_axes_that_nothing_tells_apart() -> None:
 def test_a_scene_along_another_axis_is_the_same_motion_to_the_bit() -> None:
     scene = spring(m=3.7, k=2.9, q=0.3, p=0.7)
     for label in IN_SPACE:
-        along_x = simulate.run(scene, label)
+        along_x = driver.run(scene, label)
         for axis in (1, 2):
-            turned = simulate.run(replace(scene, places=[axis]), label)
+            turned = driver.run(replace(scene, places=[axis]), label)
             assert np.array_equal(turned.q, along_x.q)
             assert np.array_equal(turned.p, along_x.p)
             assert turned.off_axis == 0

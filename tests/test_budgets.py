@@ -16,7 +16,7 @@ BUDGETS = {
     ("engines/own",): 1658,
     ("engines/openmm", "engines/ase", "engines/sundials"): 977,
     ("engines",): 2288,
-    ("simulate", "conformance", "doors"): 1130,
+    ("driver", "conformance", "doors"): 1130,
     ("checks",): 3628,
     ("identify",): 7180,
     ("formats", "store"): 4930,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import census as by_hand
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
@@ -50,7 +50,7 @@ def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) 
     assert Path("figures/c/census.png").stat().st_size > 10_000
     restored = census.stored("c.h5")
     assert [x.method for x in restored.entries] == list(OWN)
-    assert np.array_equal(restored.entries[0].q, simulate.run(load_scene("spring"), OWN[0]).q[:, 0])
+    assert np.array_equal(restored.entries[0].q, driver.run(load_scene("spring"), OWN[0]).q[:, 0])
 
 
 def test_a_census_by_workers_is_that_of_one_but_for_the_times_which_they_do_not_measure() -> None:
@@ -97,7 +97,7 @@ def test_what_was_measured_by_hand_is_compared() -> None:
 def held(n: float) -> Trajectory:
     """States of a force held over n substeps."""
     scene = load_scene("spring-uneven")
-    made = simulate.run(scene, "own:euler")
+    made = driver.run(scene, "own:euler")
     m, k, h = float(scene.m[0]), float(scene.system.hessian_diagonal(scene.q)[0]), scene.step
     g = (1 + 1 / n) / 2
     step = np.array([[1 - g * h * h * k / m, h / m], [-h * k, 1]])
@@ -123,7 +123,7 @@ def test_a_held_force_over_no_whole_number_of_substeps_is_none(n: float) -> None
 def test_states_of_another_scheme_are_no_held_force() -> None:
     scene = load_scene("spring-uneven")
     for label in ("own:implicit-euler", "own:semi-implicit-euler"):
-        found = census._held(scene, simulate.run(scene, label))
+        found = census._held(scene, driver.run(scene, label))
         assert found in ("", "force-held-1")
         assert not found
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from onestep import propagator
-from springcheck import checks, schemes, simulate
+from springcheck import checks, driver, schemes
 from springcheck.checks import experiments, laws
 from springcheck.checks.stats import student
 from springcheck.errors import MethodError
@@ -34,7 +34,7 @@ ENGINES = [
 @pytest.mark.parametrize("label", ENGINES)
 def test_every_engine_passes_every_experiment_that_applies(label: str, need: Need) -> None:
     need(label)
-    verdicts = checks.judge_thoroughly(scenes.load_scene("spring-uneven"), label, simulate.run)
+    verdicts = checks.judge_thoroughly(scenes.load_scene("spring-uneven"), label, driver.run)
     assert [v for v in verdicts if v.passed is False] == []
     assert sum(v.passed is True for v in verdicts) >= 2
     assert all(v.why for v in verdicts)
@@ -91,14 +91,14 @@ def test_symmetric_schemes_are_those_that_are_their_own_adjoint() -> None:
 def test_openmm_s_rebuilt_velocity_drifts_as_its_arithmetic_implies(need: Need) -> None:
     """h fl(1/h) - 1 = -8.9e-17 a step at h = 0.013, nothing at h = 2**-7; without the prediction it fails."""
     need("openmm:verlet")
-    bench = checks.Bench(scene=scenes.load_scene("spring-uneven"), label="openmm:verlet", run=simulate.run)
+    bench = checks.Bench(scene=scenes.load_scene("spring-uneven"), label="openmm:verlet", run=driver.run)
     assert laws.rounding_bias(bench).passed is True
     run = bench.once(laws.ensemble(laws.ODD))
     assert laws.predicted_drift(run) == pytest.approx(-8.88e-17, rel=1e-2)
     assert laws.predicted_drift(bench.once(laws.ensemble(laws.EVEN))) == 0.0
 
     def silent(scene: Scene, label: str) -> Trajectory:
-        return replace(simulate.run(scene, label), rebuilds_velocity=False)
+        return replace(driver.run(scene, label), rebuilds_velocity=False)
 
     unexplained = checks.Bench(scene=bench.scene, label="openmm:verlet", run=silent)
     # a drift of 0.8 of what the reference itself rounds where it is no wider than the engine
@@ -158,7 +158,7 @@ def test_a_livelier_neighbour_does_not_change_from_where_positions_count(label: 
     scene = clean.scene(
         np.array([1.1, 0.7]), (bond,), np.array([0.3, 1.7]), np.array([1.2, -0.5]), step=0.1, steps=20
     )
-    bench = checks.Bench(scene=scene, label=label, run=simulate.run)
+    bench = checks.Bench(scene=scene, label=label, run=driver.run)
     assert experiments.company(bench).passed is True
 
 
@@ -238,6 +238,6 @@ def test_friction_that_leaves_no_area_has_no_determinant_to_judge() -> None:
     (damping,) = (term for term in scene.terms if term.key == "damping")
     heavy = replace(damping, c=np.full_like(damping.c, 1e9))
     scene = replace(scene, terms=tuple(heavy if term is damping else term for term in scene.terms))
-    verdicts = checks.judge_thoroughly(scene, "own:langevin-middle-early", simulate.run)
+    verdicts = checks.judge_thoroughly(scene, "own:langevin-middle-early", driver.run)
     assert [v for v in verdicts if v.passed is False] == []
     assert {v.check: v.passed for v in verdicts}["determinant"] is None

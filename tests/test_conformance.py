@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import springcheck.engines
-from springcheck import conformance, engines, simulate
+from springcheck import conformance, driver, engines
 from springcheck.engines import Engine
 from springcheck.physics.scenefile import load_scene
 
@@ -150,7 +150,7 @@ def test_an_engine_that_imports_its_library_as_it_is_declared_is_rejected(
 
 def test_a_wrong_trajectory_is_told_in_words() -> None:
     scene = load_scene("spring-uneven")
-    run = simulate.run(scene, "own:euler")
+    run = driver.run(scene, "own:euler")
     conformance.assert_right(scene, run)
     with pytest.raises(
         AssertionError, match=r"own:euler is not rk4 on spring-uneven: .*xplicit Euler.*\n  step-defect: "

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import doors, engines, simulate
+from springcheck import doors, driver, engines
 from springcheck.cli import main
 from springcheck.errors import MethodError
 from springcheck.physics.scenefile import load_scene
@@ -136,7 +136,7 @@ def test_workers_run_what_a_call_brings(tmp_path: Path) -> None:
     labels = what.bring()
     assert labels == ["pefrl:pefrl", "stepper:leapfrog"]
     scene = load_scene("spring-uneven")
-    parts = [partial(simulate.run, scene, label) for label in labels]
+    parts = [partial(driver.run, scene, label) for label in labels]
     alone = dict(team.Processes(1).carried_out(parts))
     both = dict(team.Processes(2, what).carried_out(parts))
     for number in (0, 1):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -270,7 +270,7 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
     need(label)
     scene = replace(scenes.load_scene("spring-uneven"), steps=300, every=100)
     whole = springcheck.simulate(scene, label)
-    monkeypatch.setattr(simulate, "PIECE", 7)
+    monkeypatch.setattr(driver, "PIECE", 7)
     told: list[int] = []
     pieces = springcheck.simulate(scene, label, progress=told.append)
     assert np.array_equal(whole.q, pieces.q)
@@ -282,8 +282,8 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
 def test_chunks_of_any_length_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(scenes.load_scene("chain"), steps=1000)
     whole = springcheck.simulate(scene, "own:euler")
-    monkeypatch.setattr(simulate, "FIRST", 3)
-    monkeypatch.setattr(simulate, "CHUNK", 40)
+    monkeypatch.setattr(driver, "FIRST", 3)
+    monkeypatch.setattr(driver, "CHUNK", 40)
     pieces = springcheck.simulate(scene, "own:euler")
     assert np.array_equal(whole.q, pieces.q)
     assert np.array_equal(whole.energy, pieces.energy)

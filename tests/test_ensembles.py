@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck import cli, simulate, store
+from springcheck import cli, driver, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.studies.ensemble import measure, page, shown, vary
@@ -59,7 +59,7 @@ def test_a_cell_has_the_numbers_of_a_run_of_its_own(
         assert tally.cells == cells.cells == len(columns["steps"])
         for j in range(cells.cells):
             one = varied.whole({axis.field: float(columns[axis.field][j]) for axis in cells.axes})
-            run = simulate.run(one, tally.method)
+            run = driver.run(one, tally.method)
             tell = Tally(one)
             tell.add(run)
             assert columns["steps"][j] == run.outcome.step
@@ -80,7 +80,7 @@ def test_own_cells_are_equal_bit_for_bit_to_runs_of_their_own(tmp_path: Path) ->
     for method in ("own:euler", "own:semi-implicit-euler", "own:implicit-euler"):
         columns = measure.columns(tmp_path / "e.h5", method)
         for k, q in zip(columns["spring.0.stiffness"], columns["q0"], strict=True):
-            assert simulate.run(varied.whole({"spring.0.stiffness": float(k)}), method).q[-1, 0] == q
+            assert driver.run(varied.whole({"spring.0.stiffness": float(k)}), method).q[-1, 0] == q
 
 
 def test_a_cell_that_explodes_leaves_the_others_alone(tmp_path: Path) -> None:

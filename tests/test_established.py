@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springcheck import checks, conformance, engines, simulate
+from springcheck import checks, conformance, driver, engines
 from springcheck.engines import lammps
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
@@ -26,7 +26,7 @@ LABELS = [f"{name}:{method}" for name in NAMES for method in engines.engine(name
 
 
 def run(scene: Scene, label: str) -> Trajectory:
-    return simulate.run(scene, label)
+    return driver.run(scene, label)
 
 
 def failed(scene: Scene, made: Trajectory) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import springcheck
-from springcheck import checks, simulate, store
+from springcheck import checks, driver, store
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.faults import measure as trial
@@ -60,7 +60,7 @@ def test_relative_errors_from_1e12_up_are_rejected_by_the_step_and_the_motion(na
 def test_an_engine_that_was_given_a_spring_1e12_too_stiff_is_rejected(label: str, need: Need) -> None:
     need(label)
     scene = scenes.load_scene("spring-uneven")
-    run = simulate.run(scene.system.scaled(1 + 1e-12), label)
+    run = driver.run(scene.system.scaled(1 + 1e-12), label)
     failed = {v.check for v in checks.judge(scene, run) if v.passed is False}
     # the energies stored are those of the stiffer spring
     assert "step-defect" in failed

@@ -11,7 +11,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from springcheck import schemes, simulate
+from springcheck import driver, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
 from springcheck.figures import chain, looks, overlay
@@ -29,7 +29,7 @@ OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 
 
 def runs(scene: Scene, *methods: str) -> dict[str, Trajectory]:
-    return {method: simulate.run(scene, method) for method in methods}
+    return {method: driver.run(scene, method) for method in methods}
 
 
 def test_every_scheme_has_a_look_of_its_own() -> None:
@@ -127,7 +127,7 @@ def test_axes_are_in_units_in_which_numbers_are_read_easily(
 
 def test_a_legend_has_one_entry_for_each_scheme() -> None:
     scene = scenefile.load_scene("spring")
-    one = simulate.run(scene, "own:euler")
+    one = driver.run(scene, "own:euler")
     import dataclasses
 
     same = {name: dataclasses.replace(one, label=name) for name in ("own:euler", "x:a", "x:b", "y:c")}
@@ -190,7 +190,7 @@ def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:
 
 def test_errors_are_distances_from_the_exact_solution() -> None:
     scene = scenefile.load_scene("spring")
-    run = simulate.run(scene, "own:euler")
+    run = driver.run(scene, "own:euler")
     exact = Exact(scene)
     # m = k = 1 from (0, 1): the distance in the plane
     expected = np.hypot(run.q[:, 0] - np.sin(run.t), run.p[:, 0] - np.cos(run.t))
@@ -201,7 +201,7 @@ def test_errors_are_distances_from_the_exact_solution() -> None:
 
 def test_the_energies_of_all_modes_of_a_chain_are_its_energy() -> None:
     scene = scenefile.load_scene("chain")
-    run = simulate.run(scene, "own:semi-implicit-euler")
+    run = driver.run(scene, "own:semi-implicit-euler")
     found = chain._energies(scene, run.q, run.p)
     rest = scene.system.modes.centre()
     q = np.asarray(scene.system.modes.out_of(rest, np.zeros_like(rest))[0], float)[None, :]

@@ -21,7 +21,7 @@ import pytest
 import scipy.io
 from ase import Atoms
 
-from springcheck import formats, simulate
+from springcheck import driver, formats
 from springcheck.cli import main
 from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
@@ -34,7 +34,7 @@ LINE = np.array([0.6, 0.0, 0.8])
 
 
 def made(label: str = "own:semi-implicit-euler") -> Trajectory:
-    return simulate.run(SCENE, label)
+    return driver.run(SCENE, label)
 
 
 def csv(run: Trajectory) -> list[str]:

@@ -19,7 +19,7 @@ HOME = Path(springcheck.__file__).parent
 
 ROWS = [
     "interrupts", "errors", "physics", "schemes", "thermal", "engines",
-    "store", "formats", "text", "simulate", "checks", "identify", "conformance",
+    "store", "formats", "text", "driver", "checks", "identify", "conformance",
     "doors", "figures", "plot", "studies", "api", "cli", "__main__",
 ]  # fmt: skip
 

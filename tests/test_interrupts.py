@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, cli, engines, interrupts, simulate, store
+from springcheck import checks, cli, driver, engines, interrupts, store
 from springcheck.cli import listing
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
@@ -68,8 +68,8 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
         return Interrupted(begun) if label.method == "semi-implicit-euler" else begun
 
     monkeypatch.setattr(simulation, "start", wrapped)
-    monkeypatch.setattr(simulate, "FIRST", 2)
-    monkeypatch.setattr(simulate, "QUICK", 0.0)
+    monkeypatch.setattr(driver, "FIRST", 2)
+    monkeypatch.setattr(driver, "QUICK", 0.0)
 
 
 @pytest.mark.usefixtures("interrupted")
@@ -93,7 +93,7 @@ def test_ctrl_c_in_an_engine_leaves_no_verdict_and_keeps_what_was_finished(tmp_p
 def test_ctrl_c_in_an_experiment_is_no_failed_verdict() -> None:
     scene = scenefile.load_scene("spring-uneven")
     with pytest.raises(KeyboardInterrupt):
-        checks.judge_thoroughly(scene, "own:semi-implicit-euler", simulate.run)
+        checks.judge_thoroughly(scene, "own:semi-implicit-euler", driver.run)
 
 
 def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,15 +109,15 @@ def test_an_engine_is_asked_for_few_steps_at_a_time(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(simulation, "start", lambda *_: Counting())
     scene = replace(scenefile.load_scene("spring-uneven"), steps=10**9, every=10**8)
     assert springcheck.simulate(scene, "own:euler").outcome.step == sum(calls) == 10**9
-    assert max(calls) <= simulate.PIECE
+    assert max(calls) <= driver.PIECE
     calls.clear()
     label = engines.parse("own:euler")
-    simulate.bare(scene, label)
+    driver.bare(scene, label)
     assert sum(calls) == 10**9
-    assert calls[0] <= simulate.PIECE
-    monkeypatch.setattr(simulate, "UNHEARD", 0.0)
-    simulate.bare(scene, label)
-    assert max(calls[-(10**4) :]) <= simulate.PIECE
+    assert calls[0] <= driver.PIECE
+    monkeypatch.setattr(driver, "UNHEARD", 0.0)
+    driver.bare(scene, label)
+    assert max(calls[-(10**4) :]) <= driver.PIECE
 
 
 def test_openmm_moves_in_pieces_as_it_does_in_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -367,7 +367,7 @@ def test_a_command_ends_with_its_grandchildren_whatever_signal_comes(
 
 SLOW_DISK = """interrupts.GRACE = 0.1
     import ctypes, os, signal, threading
-    from springcheck import simulate, store
+    from springcheck import driver, store
     from springcheck.physics import scenefile
     right, calls = os.fsync, []
     def slow(file):
@@ -381,7 +381,7 @@ SLOW_DISK = """interrupts.GRACE = 0.1
     os.fsync = slow
     scene = scenefile.load_scene("spring")
     journal = store.open_new("s.h5", "run")
-    journal.save(simulate.run(scene, "own:euler"), scene)
+    journal.save(driver.run(scene, "own:euler"), scene)
     journal.commit(scene)"""
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springcheck import checks, schemes, simulate
+from springcheck import checks, driver, schemes
 from springcheck.checks.drag import drag
 from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.scene import Scene
@@ -82,7 +82,7 @@ def test_the_noise_of_rebuilt_velocities_raises_no_alarm(seed: int) -> None:
 def test_openmm_s_velocities_raise_none(step: float, need: Callable[[str], None]) -> None:
     need("openmm:verlet")
     scene = four(3, step, 4000)
-    found = checks.judge(scene, simulate.run(scene, "openmm:verlet"))
+    found = checks.judge(scene, driver.run(scene, "openmm:verlet"))
     assert [v.why for v in found if v.passed is False] == []
 
 

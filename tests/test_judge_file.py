@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import simulate
+from springcheck import driver
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
@@ -15,7 +15,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Verdict
 
 SCENE = scenefile.load_scene("spring-uneven")
-RUN = simulate.run(SCENE, "own:velocity-verlet")
+RUN = driver.run(SCENE, "own:velocity-verlet")
 
 
 def verdicts(
@@ -50,7 +50,7 @@ def test_frames_that_the_scene_does_not_ask_for_are_no_fact_of_its_grid(tmp_path
 def test_twice_as_many_steps_are_none_either(tmp_path: Path) -> None:
     from dataclasses import replace
 
-    run = simulate.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
+    run = driver.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
     found, notes = verdicts(tmp_path, np.c_[run.t, run.q, run.p])
     assert found["grid"].passed is None
     assert any(f"ends after {2 * SCENE.steps:,} steps, the scene after {SCENE.steps:,}" in x for x in notes)

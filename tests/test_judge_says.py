@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
@@ -122,7 +122,7 @@ def test_company_changes_nothing_but_ase_s_smallest_motions(
     label: str, size: float, passed: bool, need: Need
 ) -> None:
     need(label)
-    bench = checks.Bench(scene=lone(size), label=label, run=simulate.run)
+    bench = checks.Bench(scene=lone(size), label=label, run=driver.run)
     assert experiments.company(bench).passed is passed
 
 
@@ -166,7 +166,7 @@ def test_judge_says_what_run_says_and_counts_what_failed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = scenefile.load_scene("spring-uneven")
-    run = simulate.run(scene, "own:velocity-verlet")
+    run = driver.run(scene, "own:velocity-verlet")
     np.savetxt(tmp_path / "a.csv", np.c_[run.t, run.q, run.p], fmt="%.17g", delimiter=",", header="t,q,p")
     judged = ["judge", str(tmp_path / "a.csv"), "--scene", "spring-uneven", "--scheme"]
     assert main([*judged, "velocity-verlet"]) == 0
@@ -180,7 +180,7 @@ def test_judge_says_what_run_says_and_counts_what_failed(
 
 
 def test_times_in_another_unit_are_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = simulate.run(scenefile.load_scene("ch-bond"), "own:velocity-verlet")
+    run = driver.run(scenefile.load_scene("ch-bond"), "own:velocity-verlet")
     table = np.c_[run.t * 1000, run.q, run.p]
     names = ["t", *(f"q{i}" for i in range(run.q.shape[1])), *(f"p{i}" for i in range(run.q.shape[1]))]
     np.savetxt(tmp_path / "a.csv", table, fmt="%.17g", delimiter=",", header=",".join(names), comments="")

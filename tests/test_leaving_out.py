@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import simulate
+from springcheck import driver
 from springcheck.engines.own import forces, kernels, layout
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
@@ -168,7 +168,7 @@ def test_a_term_is_evaluated_once_a_step(monkeypatch: pytest.MonkeyPatch, need: 
             f(self, q, p, out)
 
         monkeypatch.setattr(term, "add_force", counting)
-    simulate.run(scenes.load_scene("carbon-monoxide"), "ase:velocity-verlet")
+    driver.run(scenes.load_scene("carbon-monoxide"), "ase:velocity-verlet")
     assert counted == {"spring": 401, "damping": 0}
 
 

@@ -20,7 +20,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from springcheck import checks, engines, schemes, simulate
+from springcheck import checks, driver, engines, schemes
 from springcheck.engines import Need, parse
 from springcheck.engines.own import ENGINE, compiled, forces, kernels, simulation, solver, tiles, updates
 from springcheck.errors import MethodError
@@ -220,7 +220,7 @@ def test_every_own_method_passes_its_verdicts_at_every_record_interval(scheme: s
             what = scene([1.7, 3.3], [0.3, 1.1], [0.7, -0.2], *terms, step=step, steps=84, every=every)
             if step < 0 and Need.DAMPING in method.requires:
                 continue
-            found = checks.judge(what, simulate.run(what, f"own:{method.name}"))
+            found = checks.judge(what, driver.run(what, f"own:{method.name}"))
             assert not [verdict for verdict in found if verdict.passed is False]
             defect = next(verdict for verdict in found if verdict.check == "step-defect")
             assert defect.passed, defect

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import engines, simulate, store
+from springcheck import driver, engines, store
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -46,7 +46,7 @@ def measure(scene: Scene, label: str, counts: list[int]) -> list[Point]:
         every = max(d for d in range(1, steps // 1024 + 2) if steps % d == 0)
         here = replace(scene, step=known.duration / steps, steps=steps, every=every, quantities=("q", "p"))
         errors = accuracy.Errors(known, here.step, every, scheme=SCHEMES[engines.method(parsed).scheme])
-        record = simulate.play(here, parsed, errors, planned=sweeps.PLANNED)
+        record = driver.play(here, parsed, errors, planned=sweeps.PLANNED)
         assert record.outcome.status == "complete"
         points.append(
             Point(
@@ -105,7 +105,7 @@ def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], 
         h = known.duration / steps
         errors = accuracy.Errors(known, h, 1, scheme=SCHEMES["semi-implicit-euler"])
         wrong = replace(scene, step=h * 1.0001, steps=steps, every=1, quantities=("q", "p"))
-        simulate.play(wrong, engines.parse("own:semi-implicit-euler"), errors)
+        driver.play(wrong, engines.parse("own:semi-implicit-euler"), errors)
         points.append(
             Point(method="", step=h, tolerance=None, steps=steps, outcome="complete", accuracy=errors.result)
         )
@@ -126,8 +126,8 @@ def test_rounding_adds_up_as_its_condition_says(label: str, need: Callable[[str]
     need(label)
     scene = scenes.load_scene("spring-uneven")
     known, parsed = accuracy.truth(scene), engines.parse(label)
-    method, driver = engines.method(parsed), engines.load(parsed.engine)
-    how = fits.condition(method, driver.arithmetic(parsed), known.angle)
+    method, engine = engines.method(parsed), engines.load(parsed.engine)
+    how = fits.condition(method, engine.arithmetic(parsed), known.angle)
     assert how is not None
     counts = [90_112, 180_224, 360_448] if "openmm" in label else [1_441_792, 2_883_584, 5_767_168]
     seen = [
@@ -344,7 +344,7 @@ def test_several_short_runs_in_one_timing_count_as_one() -> None:
     scene = scenes.load_scene("spring-uneven")
     label = engines.parse("own:semi-implicit-euler")
     for read in (False, True):
-        found = simulate.bare(replace(scene, steps=70), label, copies=5, read=read)
+        found = driver.bare(replace(scene, steps=70), label, copies=5, read=read)
         assert found.force_calls == 70
 
 
@@ -427,7 +427,7 @@ def test_the_least_number_of_steps_between_two_points_is_the_one_that_a_search_f
     def measured(steps: int) -> Point:
         one = replace(scene, step=known.duration / steps, steps=steps, every=1, quantities=("q", "p"))
         errors = accuracy.Errors(known, one.step, 1, scheme=SCHEMES[engines.method(label).scheme])
-        run = simulate.play(one, label, errors)
+        run = driver.play(one, label, errors)
         return Point(
             method=name, step=one.step, tolerance=None, steps=steps, outcome="complete",
             accuracy=errors.result, force_calls=run.force_calls, run_seconds_repeats=(1e-8 * steps,),

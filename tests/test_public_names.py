@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import pydoc
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,10 +32,16 @@ def test_the_names_are_these_and_each_is_there() -> None:
 
 
 @pytest.mark.parametrize("name", ["simulate", "compare", "identify"])
-def test_a_module_named_as_a_function_is_called_as_it_and_shows_its_signature(name: str) -> None:
+def test_help_of_a_function_is_its_own_text_whatever_room_has_its_name(name: str) -> None:
     from springcheck import api
+    from springcheck.identify import files
 
-    assert inspect.signature(getattr(springcheck, name)) == inspect.signature(getattr(api, name))
+    assert files.__name__ == "springcheck.identify.files"
+    found = getattr(springcheck, name)
+    assert found is getattr(api, name)
+    shown = pydoc.plain(pydoc.render_doc(found))
+    assert shown.startswith(f"Python Library Documentation: function {name} in module springcheck.api")
+    assert inspect.cleandoc(found.__doc__).splitlines()[0] in shown
 
 
 def test_run_is_the_whole_job_and_simulate_one_method(

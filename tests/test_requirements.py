@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from springcheck import checks, schemes, simulate
+from springcheck import checks, driver, schemes
 from springcheck.checks import check, requires
 from springcheck.checks.check import DECADES, FALSE_ALARMS, Chance, Finding, shared
 from springcheck.physics.scene import Scene
@@ -44,7 +44,7 @@ def test_what_is_missing_is_said_in_one_sentence_for_all_checks() -> None:
         (scene, "sundials:adams", "one-step", "adaptive"),
         (damped, "own:velocity-verlet", "undamped", "friction"),
     ):
-        run = simulate.run(made, label)
+        run = driver.run(made, label)
         case = checks.Case(trajectory=run, scene=made)
         found = [one(case) for one in checks.CHECKS if name in one.requires]
         whys = {verdict.why for verdict in found if verdict.passed is None and word in verdict.why}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import simulate, store
+from springcheck import driver, store
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.studies import keeper
@@ -42,7 +42,7 @@ def test_numbers_are_set_as_if_the_file_had_them() -> None:
     assert kept.digest == scene.digest != scenefile.load_scene("spring").digest
     assert "spring.0.stiffness = 2" in kept.title
     np.testing.assert_array_equal(
-        store.read_one("spring.h5", "own:euler").q, simulate.run(scene, "own:euler").q
+        store.read_one("spring.h5", "own:euler").q, driver.run(scene, "own:euler").q
     )
     # the unchanged scene is another one
     assert main(["run", "spring", *EULER, "--quiet"]) == 2
@@ -81,7 +81,7 @@ def test_a_fault_is_a_method_among_the_others_and_is_rejected(capsys: Captured) 
     assert set(failed) == set(found["faults"]) == {"fault:stiffness", "fault:mass"}
     assert found["faults"]["fault:mass"] == "every mass is too large (1e-06)"
     whole = store.read_one("spring-uneven.h5", "fault:mass")
-    right = simulate.run(scenefile.load_scene("spring-uneven"), "ase:velocity-verlet")
+    right = driver.run(scenefile.load_scene("spring-uneven"), "ase:velocity-verlet")
     off = np.max(np.abs(whole.q - right.q))
     # a phase of 200 steps of h w = 0.0885 with a mass that is 1e-6 too large
     assert off == pytest.approx(0.3 * 200 * 0.0885 * 0.5e-6, rel=1)
@@ -102,7 +102,7 @@ def test_with_friction_energies_are_measured_against_the_exact_loss(capsys: Capt
     q, p = scene.system.solution(np.arange(401), scene.step)  # type: ignore[misc]
     right = np.asarray(scene.system.energy(q, p), float)
     for method, found in drift.items():
-        run = simulate.run(scene, method)
+        run = driver.run(scene, method)
         assert run.energy is not None
         off = run.energy - right
         assert found == pytest.approx(off[np.argmax(np.abs(off))] / run.energy[0], rel=1e-9), method

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from springcheck import checks, simulate, store
+from springcheck import checks, driver, store
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.builders import chain, spring
@@ -297,7 +297,7 @@ def test_springs_side_by_side_are_one_scene() -> None:
     scene = spring(m=[1.0, 2.0, 3.0], k=2.9, c=[0.0, 0.1, 0.0], at=0.5)
     assert scene.n == 3
     assert [term.key for term in scene.terms] == ["wall-spring", "damping"]
-    run = simulate.run(scene, LABEL)
+    run = driver.run(scene, LABEL)
     assert all(v.passed is not False for v in checks.judge(scene, run))
     with pytest.raises(SceneError, match="broadcast together"):
         spring(m=[1.0, 2.0], k=[1.0, 2.0, 3.0])
@@ -305,5 +305,5 @@ def test_springs_side_by_side_are_one_scene() -> None:
 
 def test_a_run_of_a_scene_that_records_every_other_step_passes_its_times() -> None:
     scene = replace(spring(), steps=8, every=2)
-    verdicts = {v.check: v.passed for v in checks.judge(scene, simulate.run(scene, LABEL))}
+    verdicts = {v.check: v.passed for v in checks.judge(scene, driver.run(scene, LABEL))}
     assert verdicts["times"] is True

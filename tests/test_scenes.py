@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.checks.steps import fastest
 from springcheck.cli import listing, main
 from springcheck.engines.own import simulation as own
@@ -66,9 +66,9 @@ def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: s
     scene = shortened(name)
     if (name, label) in LEFT_OUT_AT_START:
         with pytest.raises(MethodError, match="one friction rate"):
-            simulate.run(scene, label)
+            driver.run(scene, label)
         return
-    run = simulate.run(scene, label)
+    run = driver.run(scene, label)
     verdicts = checks.judge(scene, run)
     assert [(v.check, v.value, v.bound) for v in verdicts if v.passed is False] == []
     assert sum(v.passed is True for v in verdicts) >= 4
@@ -315,7 +315,7 @@ def test_engines_give_a_molecule_its_wave_number(name: str, label: str, need: Ne
     scene = scenes.load_scene(name)
     term = scene.terms[0]
     assert isinstance(term, Spring)
-    u = length(simulate.run(scene, label)) - term.rest[0]
+    u = length(driver.run(scene, label)) - term.rest[0]
     twice = float(u[1:-1] @ (u[2:] + u[:-2]) / (u[1:-1] @ u[1:-1]))
     w = 2 * np.sqrt((2 - twice) / 4) / scene.step
     wanted, digits = WAVE_NUMBERS[name]
@@ -328,7 +328,7 @@ def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: 
     need("openmm:verlet")
     need("ase:velocity-verlet")
     scene = scenes.load_scene(name)
-    one, other = simulate.run(scene, "openmm:verlet"), simulate.run(scene, "ase:velocity-verlet")
+    one, other = driver.run(scene, "openmm:verlet"), driver.run(scene, "ase:velocity-verlet")
     case = checks.Case(trajectory=other, scene=scene)
     hw = scene.step * fastest(case)
     rounding = float(np.max(scene.system.norm(*case.allowance)))
@@ -341,7 +341,7 @@ def test_a_molecule_moves_alike_in_nanometres_and_in_angstroms(name: str, need: 
 def test_the_centre_of_mass_goes_straight_on(label: str, need: Need) -> None:
     need(label)
     scene = scenes.load_scene("carbon-monoxide")
-    run = simulate.run(scene, label)
+    run = driver.run(scene, label)
     centre = run.q @ scene.m / np.sum(scene.m)
     wanted = centre[0] + run.t * np.sum(scene.p) / np.sum(scene.m)
     assert np.max(np.abs(centre - wanted)) < scene.steps * 2.0**-52 * np.max(np.abs(run.q))

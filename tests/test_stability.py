@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from rich.text import Text
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
@@ -164,7 +164,7 @@ def test_the_largest_step_is_where_the_scene_itself_begins_to_grow(
     assert found == pytest.approx(limit, rel=1e-5)
 
     def reach(h: float) -> float:
-        run = simulate.run(replace(scene, step=h, steps=40_000, every=100, quantities=("q", "p")), label)
+        run = driver.run(replace(scene, step=h, steps=40_000, every=100, quantities=("q", "p")), label)
         return float(np.max(np.abs(run.q)) / max(abs(scene.q)))
 
     below, above = reach(found * (1 - 2e-3)), reach(found * (1 + 2e-3))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from onestep import propagator
-from springcheck import checks, engines, schemes, simulate
+from springcheck import checks, driver, engines, schemes
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -145,7 +145,7 @@ def test_every_method_that_serves_a_stiff_scene_passes_every_check(name: str, ne
             # two friction rates: refused, as another test demands
             continue
         need(str(label))
-        run = simulate.run(scene, label)
+        run = driver.run(scene, label)
         failed = [v for v in checks.judge(scene, run) if v.passed is False]
         assert not failed, f"{label}: {failed}"
         judged += 1
@@ -157,7 +157,7 @@ def test_a_wrong_coefficient_in_a_new_kind_of_stage_is_seen(name: str, stage: st
     need("openmm:mts")
     scene = scenes.load_scene("overdamped" if stage == "friction" else "multiple-time-steps")
     scene = replace(scene, steps=200, every=1)
-    run = simulate.run(scene, "openmm:langevin-middle" if stage == "friction" else "openmm:mts")
+    run = driver.run(scene, "openmm:langevin-middle" if stage == "friction" else "openmm:mts")
     case = checks.Case(scene=scene, trajectory=run)
     assert checks.step_defect(case).passed
     true = schemes.SCHEMES[name]
@@ -177,10 +177,10 @@ def test_a_wrong_coefficient_in_a_new_kind_of_stage_is_seen(name: str, stage: st
 def test_the_langevin_middle_engine_refuses_two_friction_rates_and_a_run_backwards(need: Any) -> None:
     need("openmm:langevin-middle")
     with pytest.raises(MethodError, match="one friction rate"):
-        simulate.run(scenes.load_scene("detest-b1"), "openmm:langevin-middle")
+        driver.run(scenes.load_scene("detest-b1"), "openmm:langevin-middle")
     scene = scenes.load_scene("overdamped")
     with pytest.raises(MethodError, match="forwards in time only"):
-        simulate.run(replace(scene, step=-scene.step), "openmm:langevin-middle")
+        driver.run(replace(scene, step=-scene.step), "openmm:langevin-middle")
 
 
 def test_methods_for_friction_or_fast_springs_say_what_a_scene_lacks() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from h5grove.content import get_content_from_file
 
-from springcheck import engines, simulate, store
+from springcheck import driver, engines, store
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.trajectory import Comparison
 from springcheck.studies.stability import regions
@@ -185,7 +185,7 @@ def test_a_region_of_stability_lies_on_even_axes(tmp_path: Path) -> None:
 
 def test_h5web_draws_a_run_of_the_real_spring(tmp_path: Path) -> None:
     s, label = scenes.load_scene("spring-uneven"), "own:euler"
-    made = simulate.run(s, engines.parse(label))
+    made = driver.run(s, engines.parse(label))
     with store.open_new(tmp_path / "s.h5", "run") as journal:
         journal.save(made, s)
         journal.commit(s)

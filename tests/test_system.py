@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springcheck import checks, simulate
+from springcheck import checks, driver
 from springcheck.physics import graph, system, term
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.builders import chain, spring
@@ -119,7 +119,7 @@ def test_a_sparse_hessian_bounds_what_the_full_one_does(monkeypatch: pytest.Monk
     assert other.turned(x, m) == pytest.approx(one.turned(x, m), rel=1e-13)
     assert np.all(other.kicked(x) >= one.kicked(x) * (1 - 1e-13))
     assert np.median(other.kicked(x) / one.kicked(x)) < 4
-    run = simulate.run(scene, "own:implicit-euler")
+    run = driver.run(scene, "own:implicit-euler")
     dense = {v.check: v for v in checks.judge(scene, run)}
     monkeypatch.setattr(system, "MOST_DENSE", 10)
     sparse = {v.check: v for v in checks.judge(replace(scene), run)}
@@ -133,7 +133,7 @@ def test_a_wrong_step_of_a_long_chain_is_seen_without_the_full_hessian(
 ) -> None:
     monkeypatch.setattr(system, "MOST_DENSE", 10)
     scene = chain(60, m=1.3, k=2.9, waves=[(2, 0.7), (20, 0.1)], step=0.9)
-    run = simulate.run(scene, "own:implicit-euler")
+    run = driver.run(scene, "own:implicit-euler")
     q = run.q.copy()
     q[100, 30] += 1e-14
     verdicts = {v.check: v.passed for v in checks.judge(scene, replace(run, q=q))}
@@ -142,12 +142,12 @@ def test_a_wrong_step_of_a_long_chain_is_seen_without_the_full_hessian(
 
 LARGE = """
 import resource, numpy as np
-from springcheck import checks, simulate
+from springcheck import checks, driver
 from springcheck.physics.builders import chain
 scene = chain({n}, m=1.3, k=2.9, waves=[(2, 0.7), (37, 0.11)], step=0.03, steps=4, every=2)
 assert len(scene.to_toml()) < 1000
 for label in {labels}:
-    run = simulate.run(scene, label)
+    run = driver.run(scene, label)
     verdicts = checks.judge(scene, run)
     assert [v.check for v in verdicts if v.passed is False] == [], verdicts
     assert sum(v.passed is True for v in verdicts) >= 6

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, simulate, store
+from springcheck import checks, driver, store
 from springcheck.checks import laws
 from springcheck.cli import main
 from springcheck.errors import SceneError
@@ -148,11 +148,11 @@ def test_a_new_term_is_hardened_and_judged(dent: Path, need: Need) -> None:
         harder = scene.system.scaled(1 + size)
         changed = next(term for term in harder.terms if isinstance(term, Gauss))
         assert changed.zeta.tolist() == (gauss.zeta * (1 + size)).tolist()
-        run = simulate.run(harder, "ase:velocity-verlet")
+        run = driver.run(harder, "ase:velocity-verlet")
         verdicts = {v.check: v.passed for v in checks.judge(scene, run)}
         assert verdicts["step-defect"] is (size == 0)
     moved = seeded.shifted(scene, 1e-9)
-    run = simulate.run(moved, "ase:velocity-verlet")
+    run = driver.run(moved, "ase:velocity-verlet")
     assert {v.check: v.passed for v in checks.judge(scene, run)}["step-defect"] is False
     kept = next(term for term in scene.system.in_single.terms if isinstance(term, Gauss))
     for column in Gauss.columns:

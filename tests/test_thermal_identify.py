@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import simulate
+from springcheck import driver
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
@@ -30,7 +30,7 @@ def scene(steps: int) -> Scene:
 
 
 def run(name: str, steps: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    made = simulate.run(scene(steps), f"own:{name}", seed=seed)
+    made = driver.run(scene(steps), f"own:{name}", seed=seed)
     return made.t, made.q[:, 0], made.p[:, 0] / M
 
 
@@ -82,7 +82,7 @@ def test_two_draws_a_step_are_told_apart_by_likelihood(name: str) -> None:
 )
 @pytest.mark.parametrize("name", ["spring", "chain", "anharmonic", "two-scales", "pendulum", "detest-b1"])
 def test_what_is_not_random_is_no_thermostat(name: str, label: str) -> None:
-    made = simulate.run(scenefile.load_scene(name), label)
+    made = driver.run(scenefile.load_scene(name), label)
     for j in range(min(made.q.shape[1], 2)):
         assert identify_thermal(made.t, made.q[:, j], made.p[:, j]) is None
 
@@ -107,7 +107,7 @@ def test_frames_several_steps_apart_are_named_by_nothing_wrong() -> None:
 def test_the_public_function_and_the_command_say_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = simulate.run(scene(1500), "openmm:langevin-middle-bath", seed=3)
+    made = driver.run(scene(1500), "openmm:langevin-middle-bath", seed=3)
     found = springcheck.identify(made.t, made.q, made.p, mass=M)
     assert found.scheme == "baoa"
     assert found.omega[0] == pytest.approx(OMEGA, rel=1e-12)
@@ -127,5 +127,5 @@ def test_the_public_function_and_the_command_say_it(
 
 
 def test_an_engine_that_is_no_thermostat_keeps_its_words() -> None:
-    made = simulate.run(replace(scenefile.load_scene("spring"), steps=400), "own:velocity-verlet")
+    made = driver.run(replace(scenefile.load_scene("spring"), steps=400), "own:velocity-verlet")
     assert springcheck.identify(made.t, made.q, made.p, mass=1.0).scheme == "velocity-verlet"

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.engines import Label
 from springcheck.errors import MethodError, SceneError
@@ -55,7 +55,7 @@ def test_there_are_twenty_methods_of_four_engines_at_least() -> None:
 def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     here(label)
     scene = pair(step=0.1 if "euler" in label else 0.35)
-    run = simulate.run(scene, label, seed=271828)
+    run = driver.run(scene, label, seed=271828)
     verdicts = springcheck.judge(scene, run)
     assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
     assert sum(v.passed is True for v in verdicts) >= 6
@@ -67,7 +67,7 @@ def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
 def test_a_seed_is_kept_to_and_another_seed_is_another_run(label: str) -> None:
     here(label)
     scene = pair(steps=20, step=0.1)
-    one, same, other = (simulate.run(scene, label, seed=seed) for seed in (5, 5, 6))
+    one, same, other = (driver.run(scene, label, seed=seed) for seed in (5, 5, 6))
     assert np.array_equal(one.q, same.q)
     assert np.array_equal(one.p, same.p)
     assert not np.array_equal(one.p, other.p)
@@ -76,7 +76,7 @@ def test_a_seed_is_kept_to_and_another_seed_is_another_run(label: str) -> None:
 @pytest.mark.parametrize("name", ["baoab", "obabo", "andersen", "bbk"])
 def test_numbers_do_not_depend_on_how_many_steps_are_asked_for_at_once(name: str) -> None:
     scene, label = pair(steps=60), Label(engine="own", method=name)
-    whole = simulate.run(scene, label, seed=3)
+    whole = driver.run(scene, label, seed=3)
     simulation = engines.start(scene, label, 3)
     q, p = np.empty((2, 60, 2))
     for row in range(0, 60, 4):
@@ -90,7 +90,7 @@ def test_numbers_do_not_depend_on_how_many_steps_are_asked_for_at_once(name: str
 )
 def test_an_anharmonic_well_leaves_the_direction_of_the_noise_to_rounding(label: str) -> None:
     scene = scenefile.load_scene("bath-well")
-    run = simulate.run(replace(scene, steps=500), label, seed=11)
+    run = driver.run(replace(scene, steps=500), label, seed=11)
     verdicts = {v.check: v for v in springcheck.judge(replace(scene, steps=500), run)}
     assert verdicts["noise-direction"].passed
     assert all(v.passed is not False for v in verdicts.values())
@@ -150,9 +150,9 @@ def test_a_seed_that_is_no_integer_is_refused(capsys: pytest.CaptureFixture[str]
         main(["run", "spring", "--temperature", "1", "--seed", "lucky"])
     assert stopped.value.code == 2
     with pytest.raises(MethodError, match=r"seed = 1\.5: a whole number"):
-        simulate.run(pair(), "own:baoab", seed=1.5)  # type: ignore[arg-type]
+        driver.run(pair(), "own:baoab", seed=1.5)  # type: ignore[arg-type]
     with pytest.raises(MethodError, match="takes no seed"):
-        simulate.run(scenefile.load_scene("spring"), "own:euler", seed=1)
+        driver.run(scenefile.load_scene("spring"), "own:euler", seed=1)
 
 
 def test_a_spring_at_300_kelvin_runs_and_repeats(
@@ -171,7 +171,7 @@ def test_a_spring_at_300_kelvin_runs_and_repeats(
     document = json.loads(capsys.readouterr().out)
     assert document["temperatures"][0]["configurational_law"] == pytest.approx(1, abs=1e-9)
     kept = springcheck.read("spring.h5")["own:baoab"]
-    assert 1 <= int(kept.origin["seed"]) <= simulate.MOST_SEED
+    assert 1 <= int(kept.origin["seed"]) <= driver.MOST_SEED
 
 
 @pytest.mark.parametrize("name", ["bath-spring", "bath-uneven", "bath-free", "bath-brownian", "bath-well"])

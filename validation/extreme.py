@@ -31,7 +31,7 @@ import mpmath
 import numpy as np
 
 from arguments import arguments
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.studies.extremes import STUDY, grid
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes.judging import Cell
@@ -47,7 +47,7 @@ def off_alone(cell: Cell) -> float:
     values = {name: cell.parameters[name] for name in ("m", "k", "q", "p", "h")}
     spec = grid.Spec(block=cell.block, steps=int(cell.parameters["steps"]), **values)
     with np.errstate(all="ignore"):
-        run = simulate.run(grid.scene([spec], engines.parse(cell.method), method.requires), cell.method)
+        run = driver.run(grid.scene([spec], engines.parse(cell.method), method.requires), cell.method)
     if len(run.t) <= spec.steps:
         return np.inf
     with mpmath.workdps(60):

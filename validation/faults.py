@@ -18,7 +18,7 @@ Expected (smallest relative size that any check sees on one spring, h w = 0.09, 
 import sys
 
 from arguments import arguments
-from springcheck import simulate
+from springcheck import driver
 from springcheck.studies.faults.measure import judged_labels, study
 from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.keeper import Keeper
@@ -42,7 +42,7 @@ def table(found: FaultReport) -> list[str]:
 def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
     arguments(__doc__)
-    found = study(simulate.run, judged_labels(), kept=Keeper(team=Processes(2)))
+    found = study(driver.run, judged_labels(), kept=Keeper(team=Processes(2)))
     for line in table(found):
         print(line)
     clean = found.clean

@@ -247,7 +247,7 @@ def _shortened() -> None:
 
 def _import() -> None:
     """Import what the commands import, so that a forked one need not."""
-    from springcheck import formats, plot, simulate  # noqa: F401
+    from springcheck import driver, formats, plot  # noqa: F401
     from springcheck.cli import commands, file, inspect, page  # noqa: F401
     from springcheck.figures import render  # noqa: F401
     from springcheck.identify import files, stepper  # noqa: F401

@@ -6,7 +6,7 @@ system), the smallest of interleaved repetitions, with compiled modules in place
 
 * the smallest run: two own methods with --quiet, over a process that imports numpy and h5py alone;
 * `run spring`, all of its methods, over a process that imports the libraries that these use, plus what the
-  engines alone take to start, to run and to be read (`simulate.bare`).
+  engines alone take to start, to run and to be read (`driver.bare`).
 
 Command: python validation/house.py [repeats]        (40 s for 5)
 
@@ -47,7 +47,7 @@ SMALLEST = ("--method", "own:euler", "--method", "own:semi-implicit-euler", "--q
 
 BARE = """
 import time
-from springcheck import engines, simulate
+from springcheck import engines, driver
 from springcheck.physics.scenefile import load_scene
 from springcheck.studies.choose import choose
 scene = load_scene("spring")
@@ -56,7 +56,7 @@ for label in labels:
     engines.load(label.engine)
 began = time.process_time()
 for label in labels:
-    simulate.bare(scene, label, read=True)
+    driver.bare(scene, label, read=True)
 print(time.process_time() - began)
 """
 """What all methods of the scene take without springcheck around them, after their imports."""

@@ -41,7 +41,7 @@ import numpy as np
 
 import implicit_forms
 from arguments import arguments
-from springcheck import checks, engines, schemes, simulate
+from springcheck import checks, driver, engines, schemes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
@@ -771,7 +771,7 @@ def experiments(seed: int, counts: Counts) -> None:
     if engines.refusal(scene, label):
         return
     what = f"seed {seed}, {label}, every {scene.every}"
-    _legal(counts, checks.judge_thoroughly(scene, str(label), simulate.run), what)
+    _legal(counts, checks.judge_thoroughly(scene, str(label), driver.run), what)
 
 
 BLOCK = 250

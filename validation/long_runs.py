@@ -38,7 +38,7 @@ import h5py
 import numpy as np
 
 from arguments import arguments
-from springcheck import engines, simulate, store
+from springcheck import driver, engines, store
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -110,7 +110,7 @@ def recorded(path: Path, frames: int, mass: float) -> None:
     s = scenes.parse(SCENE.format(mass=mass, steps=frames - 1, every=1), name="long")
     with store.open_new(path, "speed") as journal:
         with journal.draft("own:semi-implicit-euler", s) as draft:
-            simulate.play(s, engines.parse("own:semi-implicit-euler"), draft.append)
+            driver.play(s, engines.parse("own:semi-implicit-euler"), draft.append)
             draft.finish({})
         journal.commit(s)
 

@@ -22,11 +22,11 @@ from matplotlib.figure import Figure
 
 from arguments import arguments
 from springcheck.checks import laws
+from springcheck.driver import run
 from springcheck.figures import looks, style
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
-from springcheck.simulate import run
 
 STEPS = 300_000
 FRAMES = 300

@@ -37,11 +37,11 @@ FRAMES = 2000
 
 BARE = """
 import numpy, h5py, openmm, ase.md.verlet, sksundae.cvode
-from springcheck import load_scene, simulate, engines
+from springcheck import load_scene, driver, engines
 scene = load_scene("spring")
 for label in engines.match(("*",)):
     if engines.refusal(scene, label) is None:
-        simulate.bare(scene, label)
+        driver.bare(scene, label)
 """
 
 

@@ -26,8 +26,8 @@ import numpy as np
 from arguments import arguments
 from springcheck import load_scene
 from springcheck.checks import compare, judge
+from springcheck.driver import run
 from springcheck.figures.style import save, style
-from springcheck.simulate import run
 from springcheck.studies.run.figure import of_runs
 
 METHODS = [

@@ -37,7 +37,7 @@ from time import perf_counter
 
 import numpy as np
 
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.engines.contract import Label
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
@@ -95,7 +95,7 @@ def false_alarms(seeds: int) -> None:
     scene, found, failed = springs(3, 300), [], 0
     for seed in range(1, seeds + 1):
         for name in names:
-            run = simulate.run(scene, Label(engine="own", method=name), seed=seed)
+            run = driver.run(scene, Label(engine="own", method=name), seed=seed)
             verdicts = checks.judge(scene, run)
             failed += any(v.passed is False for v in verdicts)
             found += [v.value for v in verdicts if v.passed is not None and v.unit.startswith("decades")]
@@ -119,7 +119,7 @@ def files(number: int) -> None:
         if name == "euler-maruyama":
             turn = min(turn, 0.5 * x)
         scene = springs(1, 1000, h=turn / w, m=m, k=m * w * w, rate=x * w / turn)
-        run = simulate.run(scene, Label(engine="own", method=name), seed=int(rng.integers(1, 10**8)))
+        run = driver.run(scene, Label(engine="own", method=name), seed=int(rng.integers(1, 10**8)))
         found = identify_thermal(run.t, run.q[:, 0], run.p[:, 0] / m)
         if found is None or not found.candidates:
             tally["nothing said"] += 1

@@ -1,6 +1,6 @@
 """The seconds per step of a study of precision are the engine's own: springcheck adds nothing to them.
 
-Claim: what the study times (`simulate.bare`: the engine started by springcheck, stepped in one call, read
+Claim: what the study times (`driver.bare`: the engine started by springcheck, stepped in one call, read
 once) lies within 5 % of the same engine driven by a bare loop written by hand below, without springcheck,
 measured in turn with it in this run; minimum of the repeats of each.  Runs take some 10 ms, so that some of
 three hundred fall between the interruptions of a busy machine.
@@ -38,7 +38,7 @@ from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
 from arguments import arguments
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.physics import scenefile as scenes
 
 M, K, Q, P = 3.7, 2.9, 0.3, 0.7
@@ -146,7 +146,7 @@ def main(repeats: int = 300) -> int:
         for name, (loop, steps) in BARE.items():
             h = scene.step * scene.steps / steps
             here = replace(scene, step=h, steps=steps, every=steps)
-            found = simulate.bare(here, engines.parse(name)).timing.run
+            found = driver.bare(here, engines.parse(name)).timing.run
             by_hand = loop(steps, h)
             best[name] = [min(best[name][0], by_hand / steps), min(best[name][1], found / steps)]
     print(f"{'':28}{'bare loop':>12}{'springcheck':>14}{'ratio':>8}")

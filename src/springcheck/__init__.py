@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from springcheck import plot
-    from springcheck.api import compare, exact, judge, read, run
+    from springcheck.api import compare, exact, identify, judge, read, run, simulate
     from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
@@ -40,33 +40,23 @@ _HOMES = {
     "chain": "physics.builders",
     "compare": "api",
     "exact": "api",
+    "identify": "api",
     "judge": "api",
     "load_scene": "physics.scenefile",
     "read": "api",
     "run": "api",
+    "simulate": "api",
     "spring": "physics.builders",
 }
-_MODULES = {"identify", "simulate"}
-"""Modules that are called as the public function of their name, which stands in `api`."""
-
-
-class _Function(ModuleType):
-    def __call__(self, *arguments: Any, **named: Any) -> Any:
-        return self.__wrapped__(*arguments, **named)
-
-    @property
-    def __wrapped__(self) -> Any:
-        """The function, for `help` and signatures."""
-        from springcheck import api
-
-        return getattr(api, self.__name__.rpartition(".")[2])
 
 
 class _Package(ModuleType):
+    """`identify` is the function here; the room of its name, which imports would put there, stays in
+    `springcheck.identify` for those who import from it."""
+
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in _MODULES and isinstance(value, ModuleType):
-            value.__class__ = _Function
-        super().__setattr__(name, value)
+        if name != "identify" or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
 
 
 sys.modules[__name__].__class__ = _Package
@@ -75,7 +65,7 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
-    if name in _MODULES or name == "plot":
+    if name == "plot":
         return import_module(f"{__name__}.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from springcheck import checks
-from springcheck import simulate as driver
+from springcheck import checks, driver
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions

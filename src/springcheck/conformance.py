@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.engines import Engine, Label
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import Floats
@@ -221,7 +221,7 @@ def _imports_nothing(label: Label) -> None:
 def _right(label: Label, scene: Scene) -> None:
     """Every verdict on a scene passes."""
     try:
-        run = simulate.run(scene, label)
+        run = driver.run(scene, label)
     except MethodError as error:
         # the line of the engine that raised stands in the message
         raise AssertionError(f"{label} does not run {scene.name}: {error}") from None
@@ -260,7 +260,7 @@ def _untouched(label: Label) -> None:
     """The scene is the caller's, and two runs of it are the same."""
     scene = _served(label)[0]
     q, p = scene.q.copy(), scene.p.copy()
-    one, other = simulate.run(scene, label), simulate.run(scene, label)
+    one, other = driver.run(scene, label), driver.run(scene, label)
     assert np.array_equal(scene.q, q), "the run has changed scene.q: copy it"
     assert np.array_equal(scene.p, p), "the run has changed scene.p: copy it"
     assert np.array_equal(one.q, other.q), "two runs of one scene differ: is a state shared between them?"
@@ -273,7 +273,7 @@ def _backwards(label: Label) -> None:
         return
     scene = replace(scene, step=-scene.step)
     try:
-        run = simulate.run(scene, label)
+        run = driver.run(scene, label)
     except MethodError:
         return
     assert_right(scene, run)
@@ -283,7 +283,7 @@ def _refuses(label: Label) -> None:
     """What it does not serve is refused with a reason, and never moved wrongly."""
     for scene in odd_scenes(label):
         try:
-            run = simulate.run(scene, label)
+            run = driver.run(scene, label)
         except MethodError as error:
             if error.__cause__ is None or isinstance(error.__cause__, SpringcheckError):
                 continue

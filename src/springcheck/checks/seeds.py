@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.checks.case import Case
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import reading
@@ -43,7 +43,7 @@ class Seeded:
 
     def run(self, scene: Scene, steps: int, seed: int | None = None) -> Trajectory:
         """A run of so many steps, each recorded."""
-        return simulate.run(replace(scene, steps=steps, every=1), self.label, seed=seed or self.seed)
+        return driver.run(replace(scene, steps=steps, every=1), self.label, seed=seed or self.seed)
 
     def at_rest(self) -> Scene:
         """The scene, every particle at rest in 0."""

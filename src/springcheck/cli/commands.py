@@ -117,8 +117,9 @@ def _columns(options: Namespace) -> list[str]:
 
 
 def _identify(options: Namespace) -> int:
-    from springcheck import identify, schemes
+    from springcheck import schemes
     from springcheck.doors import function
+    from springcheck.identify import identify_stepper
     from springcheck.identify.result import identification
     from springcheck.text.lines import plain as plain_line
 
@@ -129,7 +130,7 @@ def _identify(options: Namespace) -> int:
     if options.integrator is not None:
         # what it prints is not ours to show
         with redirect_stdout(sys.stderr):
-            found = {options.integrator: identify.identify_stepper(function.load(options.integrator))}
+            found = {options.integrator: identify_stepper(function.load(options.integrator))}
         answers = [(options.integrator, (found, []))]
     else:
         stated = {name: getattr(options, name) for name in ("mass", "stiffness", "friction", "step")}

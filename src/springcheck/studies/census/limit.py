@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck import simulate
+from springcheck import driver
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
@@ -41,7 +41,7 @@ def first_limit(scene: Scene, label: Label) -> float:
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
 
     def growth(h_omega: float) -> tuple[float, float]:
-        return _growth(simulate.run(replace(small, step=h_omega / omega), label))
+        return _growth(driver.run(replace(small, step=h_omega / omega), label))
 
     try:
         low, hidden = 0.0, 0.0

@@ -12,7 +12,7 @@ from typing import Unpack
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify
@@ -65,7 +65,7 @@ def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
     """The entry with its seconds a step: a short run is timed by its fastest repetition."""
     if not np.isnan(one.seconds):
         return one
-    runs = [simulate.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
+    runs = [driver.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
     timed = replace(one, seconds=min(run.timing.run for run in runs) / max(runs[0].outcome.step, 1))
     kept.keep(ENTRIES, str(label), timed)
     return timed
@@ -121,7 +121,7 @@ def stored(kept: keeper.Kept) -> Census:
 def entry(label: Label) -> Entry:
     """What one method is, by its states; its time is measured separately."""
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
-    orbit, run = simulate.run(blog, label), simulate.run(uneven, label)
+    orbit, run = driver.run(blog, label), driver.run(uneven, label)
     method = engines.method(label)
     found = None if method.adaptive else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.extremes.judging import Cell
@@ -48,7 +48,7 @@ def cells() -> list[Cell]:
         for what, scene in (("a spring", spring), ("friction", braked)):
             if engines.refusal(scene, label) and not engines.absence(label.engine):
                 try:
-                    simulate.run(replace(scene, steps=1, every=1), label)
+                    driver.run(replace(scene, steps=1, every=1), label)
                     answer = None
                 except SpringcheckError as error:
                     answer = str(error)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, engines, simulate
+from springcheck import checks, driver, engines
 from springcheck.checks.case import overflows
 from springcheck.engines.contract import Label, Stopped
 from springcheck.physics import exact
@@ -97,7 +97,7 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     for spec in specs:
         scene = grid.scene([spec], label, engines.method(label).requires)
         with np.errstate(all="ignore"):
-            run = simulate.run(scene, label)
+            run = driver.run(scene, label)
             case, limit = _within_range(checks.Case(trajectory=run, scene=scene))
             verdict = checks.closed_form(case)
             if verdict.passed is None and len(case.trajectory.t) > 1:

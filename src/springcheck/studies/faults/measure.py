@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, engines, schemes, simulate
+from springcheck import checks, driver, engines, schemes
 from springcheck.checks import Experiment, Run
 from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
@@ -197,10 +197,10 @@ def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
     labels = judged_labels()
     if options.output is None:
-        return study(simulate.run, labels, kept=Keeper(progress=progress, team=teams.of(options)))
+        return study(driver.run, labels, kept=Keeper(progress=progress, team=teams.of(options)))
     command = keeper.command("faults", list(map(engines.parse, labels)))
     with keeper.kept(options.output, command, **keeper.how(options, progress)) as kept:
-        found = study(simulate.run, labels, kept=kept)
+        found = study(driver.run, labels, kept=kept)
         record(kept, found)
     return found
 

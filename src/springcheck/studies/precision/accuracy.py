@@ -107,7 +107,7 @@ def _frequency(scene: Scene) -> float:
 
 
 class Errors:
-    """A sink for `simulate.play` that adds up the errors of one run of steps `h`."""
+    """A sink for `driver.play` that adds up the errors of one run of steps `h`."""
 
     def __init__(
         self, known: Truth, h: float, every: int, *, scheme: schemes.Scheme, judged: Scene | None = None

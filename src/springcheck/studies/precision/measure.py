@@ -23,7 +23,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from springcheck import engines, simulate
+from springcheck import driver, engines
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -255,7 +255,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
         scheme=scheme(sweep.method.scheme),
         judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
     )
-    record = simulate.play(scene, sweep.label, errors, planned=PLANNED)
+    record = driver.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
     if outcome.status != "complete":
         message = f"after {count(outcome.step, 'step')}: {outcome.message}"

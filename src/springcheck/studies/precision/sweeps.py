@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
@@ -91,9 +91,9 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
                 needed = coarsest(known, limit)
                 raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
             began = perf_counter()
-            simulate.bare(sweep.scene, label, planned=PLANNED)
+            driver.bare(sweep.scene, label, planned=PLANNED)
             sweep.first_start = perf_counter() - began
-            sweep.start = simulate.bare(sweep.scene, label, planned=PLANNED).timing.start
+            sweep.start = driver.bare(sweep.scene, label, planned=PLANNED).timing.start
         except MethodError as error:
             reason = str(error)
         except Stopped:

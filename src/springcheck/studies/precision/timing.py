@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import ceil
 from time import get_clock_info, perf_counter
 
-from springcheck import simulate
+from springcheck import driver
 from springcheck.engines.contract import Stopped
 from springcheck.errors import SpringcheckError
 from springcheck.physics.scene import Scene
@@ -53,7 +53,7 @@ class Clock:
     scene: Scene
     copies: int = 1
     count: int = 0
-    runs: list[simulate.Bare] = field(default_factory=list)
+    runs: list[driver.Bare] = field(default_factory=list)
     reads: list[float] = field(default_factory=list)
     gave_up: str = ""
     spent: float = 0.0
@@ -79,10 +79,10 @@ class Clock:
             if read:
                 self.reads.append(read.timing.run)
 
-    def _bare(self, *, copies: int = 1, read: bool = False) -> simulate.Bare | None:
+    def _bare(self, *, copies: int = 1, read: bool = False) -> driver.Bare | None:
         began = perf_counter()
         try:
-            return simulate.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+            return driver.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
         except Stopped as stop:
             self.gave_up = str(stop)
             return None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck import checks, engines, interrupts, simulate
+from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
@@ -118,7 +118,7 @@ def run(
     others: their report has it under `broke`.
     """
     path = Path(path)
-    seeds = {"seed": simulate.checked_seed(seed)} if scene.bath else {}
+    seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
     labels, left = choose(scene, methods)
     wrong: list[Broken] = []
     if faults:
@@ -148,7 +148,7 @@ def run(
             try:
                 with journal.draft(str(label), scene) as draft:
                     told = bar.of(label, scene.steps)
-                    made = simulate.play(scene, label, draft.append, progress=told, **seeds)
+                    made = driver.play(scene, label, draft.append, progress=told, **seeds)
                     draft.finish(keeper.attributes(made))
             except MethodError as error:
                 # what only shows as an engine starts; a method that was asked for by name must not go missing
@@ -188,7 +188,7 @@ class _Bar:
     def __init__(self, progress: Progress | None, parts: int) -> None:
         self._progress, self._parts, self._begun = progress, parts, -1
 
-    def of(self, label: Label, size: int) -> simulate.Progress | None:
+    def of(self, label: Label, size: int) -> driver.Progress | None:
         """Where the progress of the next part goes, in units of `size` for all of it."""
         if self._progress is None:
             return None
@@ -209,7 +209,7 @@ def _experiments(scene: Scene, labels: Sequence[Label], bar: _Bar) -> list[Verdi
     found: list[Verdict] = []
     for label in labels:
         progress = bar.of(label, len(checks.THOROUGH))
-        found += checks.judge_thoroughly(scene, str(label), simulate.run, progress=progress)
+        found += checks.judge_thoroughly(scene, str(label), driver.run, progress=progress)
     return found
 
 
@@ -355,7 +355,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 with journal.draft(name, mine) as draft:
                     told = bar.of(label, scene.steps)
                     seed = int(str(before["origin.seed"])) if scene.bath else None
-                    record = simulate.play(mine, label, draft.append, progress=told, seed=seed)
+                    record = driver.play(mine, label, draft.append, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
                 source = journal.sources()[name]
                 found.append(

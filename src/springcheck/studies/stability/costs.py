@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics import exact
@@ -116,7 +116,7 @@ def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
     if steps > most:
         return Cost(**common, force_calls=steps, outcome=f"not run: {steps:.1e} steps")
     try:
-        done = simulate.run(run, label)
+        done = driver.run(run, label)
     except MethodError as refused:
         return Cost(**common, outcome=str(refused))
     error = float("nan")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.checks.stats import line
 from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Extended, Floats
@@ -142,7 +142,7 @@ def _run(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats, Spr
     of_q, of_p = propagators.units(springs)
     # a thousandth of the scan's force leaves room to grow
     start = propagators.scene(springs, of_q * 1e-3, of_p * 0.7e-3, steps=steps)
-    run = simulate.run(start, label)
+    run = driver.run(start, label)
     return run, np.hypot(run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0]), springs
 
 

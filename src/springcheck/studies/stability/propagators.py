@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import engines, schemes, simulate
+from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats, Reals
@@ -108,7 +108,7 @@ Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
 
 def by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
     """The engine's own step; not a number where it does not end finite."""
-    run = simulate.run(scene, label)
+    run = driver.run(scene, label)
     if len(run.t) < 2:
         return np.full(scene.n, np.nan), np.full(scene.n, np.nan)
     return run.q[1], run.p[1]
@@ -184,7 +184,7 @@ def absence(label: Label) -> str | None:
     try:
         springs = Springs(label=label, turn=np.array([0.5]))
         a, _ = units(springs)
-        simulate.run(scene(springs, a, np.zeros(1)), label)
+        driver.run(scene(springs, a, np.zeros(1)), label)
     except MethodError as error:
         return str(error)
     return None
