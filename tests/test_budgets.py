@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2288,
     ("driver", "conformance", "doors"): 1130,
     ("checks",): 3628,
-    ("identify",): 7180,
+    ("identify",): 7213,
     ("formats", "store"): 4930,
     ("studies",): 1531,
     ("studies/*",): 9162,

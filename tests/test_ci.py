@@ -32,10 +32,6 @@ BUILD = {
 
 STATED = "--stiffness 2.9 --mass 3.7 --step 0.1"
 
-NOT_YET = pytest.mark.xfail(
-    reason="the states are told from every scheme, but not by their cause", strict=False
-)
-
 BUGS = [
     ("odeint_150.cpp", "velocity-verlet", STATED, "halves swapped"),
     ("erf_3594.c", "velocity-verlet", STATED, "drift of half the step"),
@@ -44,9 +40,9 @@ BUGS = [
     ("gym_907.py", "semi-implicit-euler", STATED, "not semi-implicit Euler, kick-drift, but explicit Euler"),
     ("f1tenth_52.js", "rk4", STATED, "not classical Runge-Kutta (RK4), but"),
     ("traer_2.js", "", STATED, "velocities would have to be 100 times as large"),
-    pytest.param("jorbit_85.py", "velocity-verlet", STATED.replace("0.1", "-0.1"), "forwards", marks=NOT_YET),
-    pytest.param("maple_47.rs", "velocity-verlet", STATED, "half a step", marks=NOT_YET),
-    pytest.param("mujoco_warp_1662.py", "", f"{STATED} --friction 0.4", "friction", marks=NOT_YET),
+    ("jorbit_85.py", "velocity-verlet", STATED.replace("0.1", "-0.1"), "each step is \\|h\\|, not h"),
+    ("maple_47.rs", "velocity-verlet", STATED, "velocity is that of half a step before"),
+    ("mujoco_warp_1662.py", "", f"{STATED} --friction 0.4", "implicit friction of the wrong sign"),
 ]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -313,3 +314,49 @@ def test_one_bad_frame_is_found_and_named(tmp_path: Path, monkeypatch: pytest.Mo
     assert "The motion is one of Position Verlet, but frame 137 is wrong: its velocity" in failed.why, (
         failed.why
     )
+
+
+@pytest.mark.parametrize(("sign", "word"), [(1, "before"), (-1, "after")])
+def test_a_restart_from_velocities_of_half_a_step_before_is_named(sign: int, word: str) -> None:
+    """ClickFF/MAPLE#47, openmm/openmm#4948."""
+    frame = iter(range(121))
+
+    def restarted(q, p, h, force, mass, share=1.0):  # type: ignore[no-untyped-def]
+        q, p = right(q, p, h, force, mass)
+        return q, p - share * sign * h / 2 * force(q) if next(frame) == 59 else p
+
+    found = identify(*run(restarted, 121), mass=M, stiffness=K)
+    assert f"from frame 60 on its velocity is that of half a step {word}" in found.statement
+    frame = iter(range(121))
+    found = identify(*run(partial(restarted, share=0.9), 121), mass=M, stiffness=K)
+    assert "but for one kick of" in found.statement
+    assert "at frame 60" in found.statement
+
+
+def test_a_motion_forwards_at_falling_times_is_told_from_velocities_of_the_wrong_sign() -> None:
+    """ben-cassese/jorbit#85, recorded with the times that were asked for."""
+    t, q, p = run(right, 121)
+    assert identify(-t, q, p, mass=M, step=-H).statement.startswith(
+        "The motion runs forwards while its times"
+    )
+    assert identify(t, q, -p, mass=M).statement.startswith("The velocities of all coordinates have the wrong")
+
+
+@pytest.mark.parametrize("friction", [0.4, None])
+def test_an_implicit_friction_of_the_wrong_sign_is_told_by_the_stated_stiffness(
+    friction: float | None,
+) -> None:
+    """google-deepmind/mujoco_warp#1662, with a joint's friction in place of the Coriolis force."""
+    c = 0.4
+
+    def subtracted(q, p, h, force, mass):  # type: ignore[no-untyped-def]
+        p = p + h * (force(q) - c * p / mass) / (1 - h * c / mass)
+        return q + h * p / mass, p
+
+    t, q, p = run(subtracted, 121)
+    found = identify(t, q, p, mass=M, stiffness=K, friction=friction)
+    assert not found.fits
+    assert "implicit friction of the wrong sign" in found.statement
+    # another friction is not that fault, and neither is a spring that is as stiff as it looks
+    assert "wrong sign" not in identify(t, q, p, mass=M, stiffness=K, friction=2 * c).statement
+    assert identify(t, q, p, mass=M, stiffness=K / (1 - H * c / M)).fits

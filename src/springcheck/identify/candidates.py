@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from springcheck.identify import arithmetic
-from springcheck.identify.evidence import title
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG
 from springcheck.identify.record import Record

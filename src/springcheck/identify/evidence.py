@@ -11,7 +11,6 @@ from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import FEW, Match, Terms, distinct
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import ELSEWHERE, SCHEMES
 
 FALLS = 12.0
 """Factor by which an explanation must bring the misfit down."""
@@ -49,13 +48,6 @@ class Evidence:
         # at rest in 0 nothing is rounded
         size = 8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1)
         return np.asarray(np.maximum(size, np.finfo(np.float64).tiny))
-
-
-def title(scheme: str) -> str:
-    """A scheme's name in a sentence, its first letter large."""
-    known = SCHEMES.get(scheme) or ELSEWHERE.get(scheme)
-    name = known.title if known else scheme
-    return name[0].upper() + name[1:]
 
 
 def matched(found: Map, terms: Terms) -> list[Match]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FALLS, Evidence, distance, matched, title
+from springcheck.identify.evidence import FALLS, Evidence, distance, matched
+from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Terms, distinct
 from springcheck.identify.interrupted import few_bad_frames

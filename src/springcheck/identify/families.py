@@ -19,7 +19,8 @@ from springcheck.schemes import ELSEWHERE, SCHEMES, Scheme, roundings
 
 Stage: TypeAlias = tuple[str, Fraction | str]
 """kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`
-(half of it by the old v, half by the new), and `remembered` (a force of the last half step's velocity)."""
+(half of it by the old v, half by the new), and `remembered` (a force of the last half step's velocity; also
+an implicit one whose derivative has the wrong sign)."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -170,7 +171,7 @@ def _ended(scheme: Scheme) -> Family:
     return _placed(own.name, "at the end of the step", SCALED, *own.stages, ("friction", ONE))
 
 
-KICK, DRIFT, DECAYS = ("kick", ONE), ("drift", ONE), ("friction", ONE)
+KICK, DRIFT, DECAYS, WRONG = ("kick", ONE), ("drift", ONE), ("friction", ONE), ("remembered", ONE)
 HALF_KICK, HALF_DRIFT, HALF_DECAY = ("kick", HALF), ("drift", HALF), ("friction", HALF)
 EULER, EULER_LATE, VERLET, POSITION = (
     "semi-implicit-euler", "semi-implicit-euler-drift-kick", "velocity-verlet", "position-verlet",
@@ -253,6 +254,13 @@ _FAULTS = (
 )  # fmt: skip
 
 
+def title(scheme: str) -> str:
+    """A scheme's name in a sentence, its first letter large."""
+    known = SCHEMES.get(scheme) or ELSEWHERE.get(scheme)
+    name = known.title if known else scheme
+    return name[0].upper() + name[1:]
+
+
 def _fault(name: str, cause: str, remedy: str) -> Family:
     return Family(
         name=f"fault: {name}", scheme=name, formula=name, cause=cause, remedy=remedy, path=20, limit=1.0
@@ -272,7 +280,7 @@ FAULTS = (
     *(
         _fault(
             f"{name} {side}",
-            f"{SCHEMES[name].title[0].upper()}{SCHEMES[name].title[1:]} whose velocities are one step {side} "
+            f"{title(name)} whose velocities are one step {side} "
             f"{'the' if side == 'behind' else 'of the'} positions",
             "write position and velocity of the same step",
         )
@@ -281,6 +289,18 @@ FAULTS = (
     ),
 )  # fmt: skip
 """One-step maps of schemes that are written down or recorded wrongly."""
+
+SUBTRACTED = tuple(
+    Family(
+        name=f"fault: {name}, friction subtracted", scheme=name, stages=stages, damped=True, laws=(IMPLICIT,),
+        path=roundings(SCHEMES[name]) + 3, limit=SCHEMES[name].limit,
+        cause=f"{title(name)} with an implicit friction of the wrong sign: it divides by m - h c, "
+        "not by m + h c",
+        remedy="add h times the derivative of the friction to the mass, do not subtract it",
+    )
+    for name, stages in ((EULER, (WRONG, DRIFT)), (EULER_LATE, (DRIFT, WRONG)))
+)  # fmt: skip
+"""Faults of two unknowns: each is a scheme with friction on another spring, told by the stated one."""
 
 HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
 
@@ -294,7 +314,9 @@ KNOWN_ELSEWHERE = tuple(
 )  # fmt: skip
 """Schemes that are named where none of the catalogue fits."""
 
-FAMILIES = {family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS, *KNOWN_ELSEWHERE)}
+FAMILIES = {
+    family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS, *SUBTRACTED, *KNOWN_ELSEWHERE)
+}
 
 
 def substeps(share: float, error: float) -> tuple[range, bool]:

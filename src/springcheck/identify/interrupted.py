@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import FALLS, Evidence, matched, title
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.evidence import FALLS, Evidence, matched
+from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import distinct
 from springcheck.identify.result import Explanation
@@ -24,6 +24,9 @@ APART = 2.0
 LARGER = 10.0
 """Size of some frames, of the median, from which a force that is not linear shows in them alone."""
 
+
+HALF_STEP = 1e-3
+"""Of half a step's kick, by which what is missing at a frame may differ from it."""
 
 AT_AN_END = 3
 """Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
@@ -138,13 +141,9 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
                 ("look at how the last frame is written"),
             )
         back = np.linalg.solve(b.astype(np.float64), off)
-        if abs(back[0]) < 1e-2 * abs(back[1]):
-            kick = back[1] * float(found.size[1] / e.record.interval)
-            return (
-                f"The motion is one{whose}, but for one kick of {kick:+.3g} of the velocity between frames "
-                f"{first} and {first + 1}",
-                "look for what acts at that step alone",
-            )
+        for kick, state, when in ((back, from_, first), (off, to, first + 1)):
+            if abs(kick[0]) < 1e-2 * abs(kick[1]):
+                return _kicked(e, found, float(kick[1]), float(state[0]), when, whose)
         digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
         return (
             f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and "
@@ -164,6 +163,25 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
     return (
         f"The motion is one{whose}, but not from frame {first} to frame {last + 1}",
         "look at what happens there, or give the part before it",
+    )
+
+
+def _kicked(e: Evidence, found: Map, kick: float, q: float, at: int, whose: str) -> tuple[str, str]:
+    """What one kick of the velocity in the state of a frame is, which stands there at `q` of its size."""
+    for match in matched(found, e.terms):
+        # half a step of the force there, T h F/m = -a s q of s steps: what a leapfrog is early by
+        half = match.a * match.stride * q * float(found.size[0] / found.size[1]) / 2
+        if abs(abs(kick) - abs(half)) < HALF_STEP * abs(half):
+            side = "before" if kick * half > 0 else "after"
+            return (
+                f"The motion is one{whose}, but from frame {at} on its velocity is that of half a step {side}"
+                ", as after a restart from a leapfrog's velocities",
+                "move a leapfrog's velocities by half a kick where they are read, or restart with one scheme",
+            )
+    size = kick * float(found.size[1] / e.record.interval)
+    return (
+        f"The motion is one{whose}, but for one kick of {size:+.3g} of the velocity at frame {at}",
+        "look for what acts at that step alone",
     )
 
 

@@ -93,14 +93,12 @@ def turned(record: Record, moving: list[int]) -> list[Explanation]:
     if not against:
         return []
     whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
-    return [
-        Explanation(
-            cause=f"The velocities of {whose} have the wrong sign: positions move against them",
-            remedy="change the sign of the velocities, or write the frames in the order of time",
-            misfit=0.0,
-            local=True,
-        )
-    ]
+    cause = f"The velocities of {whose} have the wrong sign: positions move against them"
+    remedy = "change the sign of the velocities, or write the frames in the order of time"
+    if against == moving and record.interval < 0:
+        cause = "The motion runs forwards while its times fall: each step is |h|, not h"
+        remedy = "look for abs(dt); if the step is right, all velocities have the wrong sign"
+    return [Explanation(cause=cause, remedy=remedy, misfit=0.0, local=True)]
 
 
 def _exchanged(record: Record, j: int) -> Iterator[Repair]:

@@ -8,8 +8,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, held_over, said_of
-from springcheck.identify.evidence import title
-from springcheck.identify.families import FAMILIES, HELD, Family
+from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.record import ROUNDING, SIZES, Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence

@@ -22,9 +22,8 @@ from springcheck.identify.candidates import (
     stated_stiffness,
 )
 from springcheck.identify.compare import compare, nearest
-from springcheck.identify.evidence import title
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, HELD, KNOWN_ELSEWHERE
+from springcheck.identify.families import FAMILIES, HELD, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
 from springcheck.identify.judged import judged
@@ -172,6 +171,7 @@ def _of_record(
         stated_fits = stride is None
     if stride is not None and stride > 0 and not stated_fits:
         notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
+    asked = friction
     if friction is not None:
         of_rate = [x for x in joints if candidates_of(record, moving, x, friction)]
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
@@ -183,7 +183,9 @@ def _of_record(
     if stated is None:
         return of_rotation(record, moving, found)
     found = of_unasked_friction(found) if friction is None else found
-    faults = faults_of(record, moving, maps, base, stated) if found.explanations and found.candidates else []
+    unlike = found.explanations and found.candidates
+    of = record, moving[0], maps[0], base[0], float(stated[moving[0]]), asked
+    faults = faults_of(*of) if unlike else []
     if faults:
         # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
         return replace(

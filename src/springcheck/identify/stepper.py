@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError
-from springcheck.identify.evidence import title
+from springcheck.identify.families import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
 from springcheck.identify.wrong import faults_like

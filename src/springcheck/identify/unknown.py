@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FALLS, Evidence, distance, title
+from springcheck.identify.evidence import FALLS, Evidence, distance
+from springcheck.identify.families import title
 from springcheck.identify.hypothesis import distinct
 from springcheck.identify.result import Explanation
 

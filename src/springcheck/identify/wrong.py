@@ -8,14 +8,13 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import Evidence, matched, title
-from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, Family
+from springcheck.identify.evidence import Evidence, matched
+from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Joint, Terms, distinct, same_map
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import misfit
-from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
 
@@ -210,16 +209,18 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
 
 
 def faults_of(
-    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], stated: Floats
+    record: Record, j: int, found: Map, terms: Terms, stiffness: float, friction: float | None
 ) -> list[Explanation]:
-    """Schemes written down wrongly that have the stated stiffness, where a right one has another."""
-    e = Evidence(
-        record=record, j=moving[0], found=maps[0], terms=terms[0], stiffness=float(stated[moving[0]])
-    )
+    """Schemes written down wrongly of the stated stiffness and friction, where a right one has others."""
+    e = Evidence(record=record, j=j, found=found, terms=terms, stiffness=stiffness)
+    rate = None if friction is None or record.mass is None else friction / float(record.mass[j])
+    joints = compare([found], [terms], _faults(), range(1, 3))
+    for x in compare([found], [terms], SUBTRACTED, range(1, 3)):
+        is_, error = (y * x.stride / float(record.interval) for y in (x.parts[0].g, x.parts[0].g_error))
+        if is_ > SURE * error and (rate is None or abs(is_ - rate) <= SURE * error + 1e-9 * rate):
+            joints.append(x)
     return [
-        _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x)
-        for x in compare([e.found], [e.terms], _faults(), range(1, 3))
-        if _rank(e, x) == 0
+        _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x) for x in joints if _rank(e, x) == 0
     ]
 
 
