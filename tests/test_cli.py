@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import store
+from springcheck import checks, store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
@@ -140,6 +140,9 @@ def test_list_names_every_scene_engine_and_check(capsys: pytest.CaptureFixture[s
     text = capsys.readouterr().out
     for word in (*scenes.names(), "own:euler", "openmm:verlet", "sundials:bdf", "step-defect"):
         assert word in text
+    assert max(map(len, text.splitlines())) <= 80
+    for check in (*checks.ALL, *checks.RANDOM):
+        assert f"{check.sentence} Applies to: {check.needs}." in " ".join(text.split())
     assert main(["list", "--json"]) == 0
     assert {scene["name"] for scene in document(capsys)["scenes"]} == set(scenes.names())
 

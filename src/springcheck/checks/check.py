@@ -112,7 +112,7 @@ def check(
     family: Family,
     requires: Collection[str] = (),
 ) -> Callable[[Callable[[Subject_contra], Finding | Chance | str]], Check[Subject_contra]]:
-    """Make a check of a function: its name and the first line of its docstring are the check's own."""
+    """Make a check of a function: its name and the first sentence of its docstring are the check's own."""
 
     def made(judge: Callable[[Subject_contra], Finding | Chance | str]) -> Check[Subject_contra]:
         return Check(
@@ -120,7 +120,10 @@ def check(
             short=short,
             family=family,
             requires=frozenset(requires),
-            sentence=(judge.__doc__ or "").partition("\n")[0],
+            sentence=" ".join((judge.__doc__ or "").partition("\n\n")[0].split())
+            .partition(". ")[0]
+            .rstrip(".")
+            + ".",
             judge=judge,
         )
 

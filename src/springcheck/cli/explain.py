@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
@@ -61,7 +62,7 @@ _CHECKS = {check.name: check for check in (*checks.ALL, *checks.RANDOM, *SEEDED)
 def check_lines(check: Any) -> Iterator[str]:
     """What holds where a check passes, how, and for what it applies; what it must reject."""
     yield f"{check.name}, a check of the {check.family}"
-    first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n")
+    first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n\n")
     yield _line(first)
     if rest.strip():
         yield ""
@@ -72,12 +73,6 @@ def check_lines(check: Any) -> Iterator[str]:
     if held:
         names = (fault.name + ("" if fault.size is None else f" of {fault.size:.0e}") for fault in held)
         yield _line(f"Must reject, and is held to it: {', '.join(names)}")
-
-
-def sentence(check: Any) -> str:
-    """What holds where a check passes, in one sentence."""
-    paragraph = inspect.cleandoc(check.judge.__doc__ or "").partition("\n\n")[0]
-    return " ".join(paragraph.split()).partition(". ")[0].removesuffix(".") + "."
 
 
 def _seen(check: Any) -> Iterator[str]:
@@ -196,4 +191,4 @@ def _sum(row: Sequence[Fraction]) -> str:
 
 
 def _line(text: str) -> str:
-    return " ".join(text.split())
+    return textwrap.fill(" ".join(text.split()), 80, break_long_words=False, break_on_hyphens=False)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
 from springcheck import checks, engines, schemes
+from springcheck.checks.seeds import SEEDED
 from springcheck.physics import scenefile as scenes
 
 
@@ -16,8 +18,8 @@ def listing() -> dict[str, Any]:
         "engines": [_engine(name) for name in engines.names()],
         "unusable_engines": engines.unusable(),
         "checks": [
-            {"name": check.name, "sentence": check.sentence}
-            for check in dict.fromkeys((*checks.ALL, *checks.RANDOM))
+            {"name": check.name, "sentence": check.sentence, "applies_to": check.needs}
+            for check in dict.fromkeys((*checks.ALL, *checks.RANDOM, *SEEDED))
         ],
     }
 
@@ -49,17 +51,24 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     yield "Scenes"
     width = max(len(scene["name"]) for scene in found["scenes"])
     for scene in found["scenes"]:
-        yield f"  {scene['name']:{width}}  {scene['title']}"
+        yield from _entry(scene["name"], width, scene["title"])
     yield "Engines and methods"
     for engine in found["engines"]:
         here = f"{engine['title']} {engine['version']}".strip()
-        yield f"  {engine['absence'] or here}, from {engine['origin']}"
+        yield from _entry(f"{engine['absence'] or here}, from {engine['origin']}", 0, "")
         for method in engine["methods"]:
-            yield f"    {method['method']:26}  {method['about']}"
+            yield from _entry(f"  {method['method']}", 28, method["about"])
         if engine["platforms"]:
-            yield f"    platforms, as METHOD@PLATFORM: {', '.join(engine['platforms'][:4])}"
-            yield f"      {', '.join(engine['platforms'][4:])}"
-    yield from (f"  {reason}" for reason in found["unusable_engines"].values())
+            yield from _entry("  platforms", 28, "as METHOD@PLATFORM: " + ", ".join(engine["platforms"]))
+    for reason in found["unusable_engines"].values():
+        yield from _entry(reason, 0, "")
     yield "Checks"
     for check in found["checks"]:
-        yield f"  {check['name']:14}  {check['sentence']}"
+        yield from _entry(check["name"], 16, f"{check['sentence']} Applies to: {check['applies_to']}.")
+
+
+def _entry(name: str, width: int, words: str) -> list[str]:
+    """A name and what it is, in lines of 80 columns."""
+    return textwrap.wrap(
+        f"{name:{width}}  {words}".rstrip(), 80, initial_indent="  ", subsequent_indent=" " * (width + 4)
+    )

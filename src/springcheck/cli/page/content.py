@@ -138,7 +138,7 @@ def gather(path: Path) -> Content:
         # what failed comes first
         methods=tuple(sorted(_methods(summary, verdicts), key=lambda one: not one.count(False))),
         explained={
-            check.name: (explain.sentence(check), tuple(explain.check_lines(check)))
+            check.name: (check.sentence, tuple(explain.check_lines(check)))
             for check in checks.ALL
             if any(verdict.check == check.name for verdict in verdicts)
         },
