@@ -15,6 +15,7 @@ import springcheck
 from springcheck import checks, driver, store
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
+from springcheck.studies.faults import baths
 from springcheck.studies.faults import measure as trial
 from springcheck.studies.faults.measure import examine
 from springcheck.studies.faults.result import Clean, FaultReport, Result
@@ -37,8 +38,7 @@ def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) ->
 
 def test_every_check_rejects_a_fault_that_it_must_reject() -> None:
     named = {check for fault in FAULTS for check in fault.caught_by}
-    every = {check.name for check in (*checks.CHECKS, *checks.THOROUGH)}
-    assert named == every
+    assert named == {check.name for check in checks.ALL} | set(baths.CHECKS)
 
 
 def test_there_are_at_least_thirty_faults_of_different_names() -> None:
@@ -127,6 +127,7 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     few = FAULTS[:2]
     monkeypatch.setattr(trial, "FAULTS", few)
     monkeypatch.setattr(trial, "CLEAN", 4)
+    monkeypatch.setattr(trial, "BATHS", 0)
     monkeypatch.setattr(trial, "_BATCH", 4)
     monkeypatch.setattr(trial, "BY_ENGINES", 0)
     monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))

@@ -169,12 +169,12 @@ def judge_thoroughly(
 
 def judge_seeds(scene: Scene, label: str, seed: int) -> list[Verdict]:
     """Every experiment with the seeds of a random method; one that it cannot serve does not apply."""
-    from springcheck.checks.seeds import SEEDED, Seeded
+    from springcheck.checks.seeds import SEEDED, by_engine
 
-    found = []
+    found, subject = [], by_engine(scene, label, seed)
     for one in SEEDED:
         try:
-            found.append(one(Seeded(scene=scene, label=label, seed=seed)))
+            found.append(one(subject))
         except MethodError as error:
             found.append(check.verdict(label, one.name, str(error)))
     return shared(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,22 +11,22 @@ import numpy as np
 from springcheck import driver, engines
 from springcheck.checks.case import Case
 from springcheck.checks.check import Chance, Finding, check
-from springcheck.checks.thermal import reading
+from springcheck.checks.thermal import HIDDEN, reading
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS, Stepper, chance
-from springcheck.thermal.draws import IN_AND_OUT, PER_ACT, SMALLEST
+from springcheck.physics.trajectory import Trajectory, of_scene
+from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
+from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, SMALLEST, law_of
 
 FEW = 8
 """Particles up to which each is pushed by itself."""
 
+LONG, UNLIKELY = 10_000, 1e-9
+"""Steps in which a collision is waited for at most, and the chance of none that is left."""
+
 COLLIDED = 30
 """Steps in which a collision is waited for."""
-
-LARGEST_DRAW = 8.0
-"""No draw of a run of a few steps is larger: its chance is 1e-15."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,15 +36,16 @@ class Seeded:
     scene: Scene
     label: str
     seed: int
+    scheme: Thermostat
+    """What it claims to run."""
+    scripted: bool
+    """Whether it takes a generator in the place of a seed."""
+    play: Callable[[Scene, Any], Trajectory]
+    """A run of a scene, by a seed or a generator.  May raise MethodError."""
 
-    @property
-    def method(self) -> Any:
-        """Its declaration."""
-        return engines.method(engines.parse(self.label))
-
-    def run(self, scene: Scene, steps: int, seed: int | None = None) -> Trajectory:
+    def run(self, scene: Scene, steps: int, seed: Any = None) -> Trajectory:
         """A run of so many steps, each recorded."""
-        return driver.run(replace(scene, steps=steps, every=1), self.label, seed=seed or self.seed)
+        return self.play(replace(scene, steps=steps, every=1), seed or self.seed)
 
     def at_rest(self) -> Scene:
         """The scene, every particle at rest in 0."""
@@ -54,23 +56,42 @@ class Seeded:
         """The scheme's own step on a scene."""
         assert scene.bath is not None
         return Stepper(
-            THERMOSTATS[self.method.scheme], h=scene.step, m=scene.m, rate=scene.bath.friction,
-            thermal=scene.thermal, width=np.longdouble, absolute=absolute,
+            self.scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal,
+            width=np.longdouble, absolute=absolute,
         )  # fmt: skip
 
-    def allowed(self, q: Floats, p: Floats) -> tuple[Extended, Extended]:
-        """What a step from a state (n,) may be off by."""
-        scheme = THERMOSTATS[self.method.scheme]
-        how = engines.arithmetic(engines.parse(self.label))
-        unit = (IN_AND_OUT + PER_ACT * len(scheme.acts)) * max(how.state, how.force)
-        draws = [np.full(len(q), LARGEST_DRAW)] * scheme.draws
+    def allowed(self, run: Trajectory, row: int = 0) -> tuple[Extended, Extended]:
+        """What a step from a frame of a run may be off by."""
+        q, p, how = run.q[row], run.p[row], run.arithmetic
+        unit = (IN_AND_OUT + PER_ACT * len(self.scheme.acts)) * max(how.state, how.force)
+        draws = [np.full(len(q), LARGEST_DRAW)] * self.scheme.draws
         of_q, of_p = self.stepper(self.scene, absolute=True)(
             np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble),
             self.scene.system.magnitude(), draws, True,
         )  # fmt: skip
-        if self.method.rebuilds_velocity:
+        if run.rebuilds_velocity:
             of_p = of_p + self.scene.m * of_q / abs(self.scene.step)
         return unit * of_q + SMALLEST, unit * of_p + SMALLEST
+
+
+def by_engine(scene: Scene, label: str, seed: int) -> Seeded:
+    """A method of an engine."""
+    parsed = engines.parse(label)
+    method = engines.method(parsed)
+
+    def play(scene: Scene, seed: Any) -> Trajectory:
+        if isinstance(seed, int):
+            return driver.run(scene, parsed, seed=seed)
+        q, p = np.empty((2, scene.steps + 1, scene.n))
+        q[0], p[0] = scene.q, scene.p
+        engines.start(scene, parsed, seed).advance(1, q[1:], p[1:])
+        return of_scene(
+            scene, q, p, label=label, scheme=method.scheme, arithmetic=engines.arithmetic(parsed),
+            rebuilds_velocity=method.rebuilds_velocity,
+        )  # fmt: skip
+
+    scheme = THERMOSTATS[method.scheme]
+    return Seeded(scene=scene, label=label, seed=seed, scheme=scheme, scripted=method.scripted, play=play)
 
 
 def _off(found: tuple[Any, Any], expected: tuple[Any, Any], allowed: tuple[Any, Any]) -> float:
@@ -80,7 +101,7 @@ def _off(found: tuple[Any, Any], expected: tuple[Any, Any], allowed: tuple[Any, 
 @check("map", family="noise")
 def noise_map(subject: Seeded) -> Finding | str:
     """One seed and two starts: the difference of the runs, which no noise reaches, is the scheme's map."""
-    scene, scheme = subject.scene, THERMOSTATS[subject.method.scheme]
+    scene, scheme = subject.scene, subject.scheme
     if scheme.collides:
         return "a collision leaves nothing of the difference of two momenta"
     if not scene.system.is_linear or scene.n > FEW:
@@ -97,7 +118,7 @@ def noise_map(subject: Seeded) -> Finding | str:
         d = [(a - b)[1:].astype(np.longdouble) for a, b in ((other.q, base.q), (other.p, base.p))]
         draws = [none] * scheme.draws
         ideal = subject.stepper(scene)(d[0][0], d[1][0], lambda q, p: force(q, p) - rest, draws)
-        both = [subject.allowed(run.q[1], run.p[1]) for run in (base, other)]
+        both = [subject.allowed(run, 1) for run in (base, other)]
         allowed = both[0][0] + both[1][0], both[0][1] + both[1][1]
         worst = max(worst, _off((d[0][1], d[1][1]), ideal, allowed))
     return Finding(worst, 1.0, "of what rounding allows", f"{2 * scene.n} pushes, roundings of both runs")
@@ -112,13 +133,13 @@ def noise_size(subject: Seeded) -> Finding | str:
         return "a linear scene with its rest in 0 is needed"
     assert scene.bath is not None
     # collisions come now and then; a factor of 2 is exact over any number of steps
-    collides = THERMOSTATS[subject.method.scheme].collides
+    collides = subject.scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
     hot = replace(scene, bath=Bath(temperature=4 * scene.bath.temperature, friction=scene.bath.friction))
     heavy = replace(scene.system.scaled(4.0), m=4 * scene.m)
     worst = 0.0
-    allowed = [4 * steps * x for x in subject.allowed(one.q[0], one.p[0])]
+    allowed = [4 * steps * x for x in subject.allowed(one)]
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
         expected = of_q * one.q[-1], of_p * one.p[-1]
         worst = max(worst, _off((other.q[-1], other.p[-1]), expected, (allowed[0], allowed[1])))
@@ -146,42 +167,54 @@ class Script:
 @check("script", family="noise")
 def noise_matrix(subject: Seeded) -> Finding | str:
     """A scripted generator reads the noise itself: what each unit draw does in a step, to rounding."""
-    scheme, scene = THERMOSTATS[subject.method.scheme], subject.scene
-    if not subject.method.scripted or scheme.uniform or scheme.collides:
+    scheme, scene = subject.scheme, subject.scene
+    if not subject.scripted or scheme.uniform or scheme.collides:
         return "it takes no generator of normal numbers"
     worst = 0.0
     for j in range(scheme.draws):
         unit = np.eye(scheme.draws)[j]
-        simulation = engines.start(replace(scene, steps=1), engines.parse(subject.label), Script(unit))
-        q, p = np.empty((2, 1, scene.n))
-        simulation.advance(1, q, p)
+        run = subject.run(scene, 1, Script(unit))
         draws = [np.full(scene.n, np.longdouble(x)) for x in unit]
         start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
         ideal = subject.stepper(scene)(*start, scene.system.potential_force, draws)
-        worst = max(worst, _off((q[0], p[0]), ideal, subject.allowed(scene.q, scene.p)))
+        worst = max(worst, _off((run.q[1], run.p[1]), ideal, subject.allowed(run)))
     return Finding(worst, 1.0, "of what rounding allows", f"{scheme.draws} unit draws")
 
 
 @check("seed", family="noise")
 def seed_kept(subject: Seeded) -> Finding | str:
     """Two runs of one seed are equal bit for bit, and another seed is another run."""
-    one, same, other = (subject.run(subject.scene, 20, subject.seed + i) for i in (0, 0, 1))
+    steps = 20
+    if subject.scheme.collides:
+        # two runs without a collision are equal whatever their seeds
+        rare = law_of(subject.scheme, subject.scene).collision * subject.scene.n
+        steps = max(steps, int(np.ceil(-np.log(UNLIKELY) / rare)))
+        if steps > LONG:
+            return f"in {LONG} steps a collision is not certain"
+    one, same, other = (subject.run(subject.scene, steps, subject.seed + i) for i in (0, 0, 1))
     differ = np.count_nonzero(np.any((one.q != same.q) | (one.p != same.p), axis=1))
-    if not np.any(one.p[1:] != other.p[1:]):
-        return Finding(21, 0.0, "frames", "another seed changes nothing: it is ignored")
+    if np.array_equal(one.p, other.p):
+        return Finding(steps + 1, 0.0, "frames", "another seed changes nothing: it is ignored")
     return Finding(differ, 0.0, "frames", "the same draws in the same order")
 
 
 @check("seeds", family="noise")
 def seeds_apart(subject: Seeded) -> Chance | str:
-    """The draws of one seed say nothing of those of the next."""
-    if THERMOSTATS[subject.method.scheme].collides:
+    """The draws of one seed say nothing of those of the next, wherever in the run and of whichever particle.
+
+    All draws in a row are held against those of the next seed at every distance up to half of the run.
+    """
+    if subject.scheme.collides:
         return "its draws come now and then"
-    x, y = (
-        reading(Case(trajectory=subject.run(subject.scene, 200, seed), scene=subject.scene)).draws
-        for seed in (subject.seed, subject.seed + 1)
-    )
-    return Chance(chance.pairs(x, y), f"correlation {np.mean(x * y):+.2e} of {x.size} draws")
+    steps = min(200, subject.scene.steps)
+    runs = [subject.run(subject.scene, steps, subject.seed + i) for i in (0, 1)]
+    both = [reading(Case(trajectory=run, scene=subject.scene)) for run in runs]
+    if not all(one.known for one in both):
+        return HIDDEN
+    x, y = (one.draws for one in both)
+    with np.errstate(all="ignore"):
+        found = chance.crossed(x.ravel(), y.ravel())
+    return Chance(found, f"largest correlation of {x.size} draws of each")
 
 
 SEEDED = (noise_map, noise_size, noise_matrix, seed_kept, seeds_apart)

@@ -16,6 +16,8 @@ from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.draws import Reading, law_of, read
 
+HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
+
 
 def reading(case: Case) -> Reading:
     """What the frames say of the draws behind them."""
@@ -53,6 +55,8 @@ def noise_direction(case: Case) -> Finding | str:
 def _draws(case: Case) -> tuple[Floats, Reading] | str:
     """Draws (f, n) as standard normal numbers."""
     found = reading(case)
+    if not found.known:
+        return HIDDEN
     scheme, x = THERMOSTATS[case.trajectory.scheme], found.draws
     if scheme.uniform:
         x = chance.normal_scores(x)
@@ -65,7 +69,9 @@ def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Flo
     found = _draws(case)
     if isinstance(found, str):
         return found
-    return Chance(probability(found[0]), f"{value(found[0])}, of {count(found[0].size, 'draw')}")
+    with np.errstate(all="ignore"):
+        # draws that nothing has are infinite
+        return Chance(probability(found[0]), f"{value(found[0])}, of {count(found[0].size, 'draw')}")
 
 
 @check("mean", family="noise", requires={"every-step"})

@@ -28,6 +28,18 @@ Part: TypeAlias = Fraction | Callable[[Any], Any]
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
 
+@dataclass(frozen=True, slots=True)
+class Decay:
+    """What a step leaves of a momentum, c(x), and what it takes, 1 - c(x), which small x leave digits of."""
+
+    left: Callable[[Any], Any]
+    lost: Callable[[Any], Any]
+
+    def __call__(self, x: Any) -> Any:
+        """What is left."""
+        return self.left(x)
+
+
 class Act(NamedTuple):
     """One stage: what is done, for which part, and by which draw of the step."""
 
@@ -66,14 +78,9 @@ class Thermostat:
         return any(act.kind == "collide" for act in self.acts)
 
 
-def _stretch(c2: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _stretch(c2: Decay) -> Callable[[Any], Any]:
     """How much longer than its step a GJ scheme kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
-
-    def q(x: Any) -> Any:
-        c = c2(x)
-        return np.sqrt(2 * (1 - c) / ((1 + c) * x))
-
-    return q
+    return lambda x: np.sqrt(2 * c2.lost(x) / ((2 - c2.lost(x)) * x))
 
 
 def _value(part: Part, x: Any) -> Any:
@@ -104,7 +111,8 @@ class Stepper:
         self._acts, self._sign = [], 1 if absolute else -1
         for kind, part, number in scheme.acts:
             c = _value(part, x)
-            noise = np.sqrt((1 - c) * (1 + c)) * size if kind == "exchange" else size
+            lost = part.lost(x) if isinstance(part, Decay) else 1 - c
+            noise = np.sqrt(lost * (2 - lost)) * size if kind == "exchange" else size
             if absolute and kind != "undamp":
                 c = -np.abs(c) if kind == "damp" else np.abs(c)
             self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
@@ -151,8 +159,8 @@ class Stepper:
         return q, p
 
 
-def _decay(share: int) -> Callable[[Any], Any]:
-    return lambda x: np.exp(-x / share)
+def _decay(share: int) -> Decay:
+    return Decay(lambda x: np.exp(-x / share), lambda x: -np.expm1(-x / share))
 
 
 def splitting(letters: str) -> tuple[Act, ...]:
@@ -189,29 +197,32 @@ def _by_letters(letters: str) -> Thermostat:
 
 
 def _seventh(x: Any) -> Any:
-    """The c in (0, 1) with x = (1 + c)/(1 - c) log(c)**2 / 2, by Newton on log c."""
-    y = -np.asarray(x, dtype=np.asarray(x).dtype)
-    y = np.where(y < -1, -np.sqrt(2 * np.abs(y)), y)
+    """The y > 0 with x = 2 y**2 coth y, by Newton: log c = -2 y solves x = (1 + c)/(1 - c) log(c)**2 / 2."""
+    y = np.where(np.asarray(x) < 1, x / 2, np.sqrt(np.abs(x) / 2))
     for _ in range(60):
-        c = np.exp(y)
-        f = (1 + c) / (1 - c) * y * y / 2
-        slope = (1 + c) / (1 - c) * y + c / (1 - c) ** 2 * y * y
-        change = (f - x) / slope
+        change = (2 * y * y / np.tanh(y) - x) / (4 * y / np.tanh(y) - 2 * (y / np.sinh(y)) ** 2)
         y = y - change
-        if np.all(np.abs(change) <= np.finfo(c.dtype).eps * np.abs(y)):
+        if np.all(np.abs(change) <= np.finfo(y.dtype).eps * np.abs(y)):
             break
-    return np.exp(y)
+    return y
 
 
-GJ: dict[str, Callable[[Any], Any]] = {
-    "i": lambda x: (1 - x / 2) / (1 + x / 2),
-    "ii": lambda x: np.exp(-x),
-    "iii": lambda x: 1 - x,
-    "iv": lambda x: (np.sqrt(1 + 4 * x) - 1) / (2 * x),
-    "v": lambda x: 1 / (1 + x),
-    "vi": lambda x: 1 / (1 + x / 2) ** 2,
-    "vii": _seventh,
-    "viii": lambda x: 1 / (np.sqrt(x * x + 1) + x),
+def _root(x: Any) -> Any:
+    return np.sqrt(1 + 4 * x)
+
+
+GJ: dict[str, Decay] = {
+    "i": Decay(lambda x: (1 - x / 2) / (1 + x / 2), lambda x: x / (1 + x / 2)),
+    "ii": _decay(1),
+    "iii": Decay(lambda x: 1 - x, lambda x: x),
+    "iv": Decay(lambda x: 2 / (1 + _root(x)), lambda x: 4 * x / (1 + _root(x)) ** 2),
+    "v": Decay(lambda x: 1 / (1 + x), lambda x: x / (1 + x)),
+    "vi": Decay(lambda x: 1 / (1 + x / 2) ** 2, lambda x: x * (1 + x / 4) / (1 + x / 2) ** 2),
+    "vii": Decay(lambda x: np.exp(-2 * _seventh(x)), lambda x: -np.expm1(-2 * _seventh(x))),
+    "viii": Decay(
+        lambda x: 1 / (np.hypot(1, x) + x),
+        lambda x: x * (1 + x / (np.hypot(1, x) + 1)) / (np.hypot(1, x) + x),
+    ),
 }
 """The decay c2 of each GJ scheme as a function of x = gamma h."""
 
@@ -236,11 +247,11 @@ def _gj_half(number: str) -> Thermostat:
     c2 = GJ[number]
 
     def root(x: Any) -> Any:
-        return np.sqrt((1 - c2(x)) / x)
+        return np.sqrt(c2.lost(x) / x)
 
     noise = _times(HALF, root)
     acts = (
-        Act("damp", lambda x: 1 - c2(x)), Act("noise", noise, 0), Act("kick", root), Act("noise", noise, 1),
+        Act("damp", c2.lost), Act("noise", noise, 0), Act("kick", root), Act("noise", noise, 1),
         Act("drift", root),
     )  # fmt: skip
     return Thermostat(

@@ -112,10 +112,17 @@ def neighbours(x: Floats) -> float:
     return of_normal(float(np.sum(x[1::2] * around)) / math.sqrt(size)) if size > 0 else 0.0
 
 
-def pairs(x: Floats, y: Floats) -> float:
-    """Of the products of draws x with other draws y of one shape."""
-    size = float(np.sum(x * x))
-    return of_normal(float(np.sum(x * y)) / math.sqrt(size)) if size > 0 else 0.0
+def crossed(x: Floats, y: Floats) -> float:
+    """Of the products of draws x (n,) with other draws y (n,) up to half of them later or earlier: the
+    largest of all sums, each of which is normal given x."""
+    n = len(x)
+    turned = np.fft.rfft(y, 2 * n) * np.conj(np.fft.rfft(x, 2 * n))
+    sums, squares = np.fft.irfft(turned, 2 * n), np.concatenate([[0.0], np.cumsum(x * x)])
+    far = np.arange(n // 2)
+    # y later than x, by the first of x; y earlier, by the last
+    later, earlier = squares[n - far], squares[n] - squares[far]
+    z = np.concatenate([sums[far] / np.sqrt(later), sums[-far[1:]] / np.sqrt(earlier[1:])])
+    return min(1.0, len(z) * of_normal(float(np.max(np.abs(z))))) if np.all(np.isfinite(z)) else 0.0
 
 
 def count(hits: int, n: int, p: float) -> float:

@@ -21,6 +21,9 @@ PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
 
 
+LARGEST_DRAW = 8.0
+"""No draw of a run of a few steps is larger: its chance is 1e-15."""
+
 SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
 """What an operation may lose to underflow: at rest in 0 nothing is rounded."""
 
@@ -38,8 +41,20 @@ class Reading:
     """By how many roundings states contradict each other; None where some draws reach every state."""
     roundings: int
     """What `across` may be."""
+    error: Floats
+    """What rounding may leave of each draw, (f-1, n), or of two a step (2, f-1, n)."""
     hits: NDArray[np.bool_] | None = None
     """Where collisions took place, (f-1, n)."""
+
+    @property
+    def known(self) -> bool:
+        """Whether rounding moves no chance of the draws by much.
+
+        Their sum has a standard deviation of sqrt(N); errors of one sign may add up to a twentieth of that,
+        which changes a chance of 1e-7 by a third.
+        """
+        error = self.error if self.hits is None else self.error[self.hits]
+        return bool(np.sum(error) <= 0.05 * np.sqrt(error.size))
 
 
 def law_of(scheme: Thermostat, scene: Scene) -> Law:
@@ -79,24 +94,26 @@ class _Reader:
         start, end = (z[0][:-1], z[1][:-1]), (z[0][1:], z[1][1:])
         if self.scheme.collides:
             return self._collided(start, end)
-        draws, far, allowed = self._solved(start, end, hit=False)
+        draws, across, unit, unseen = self._solved(start, end, hit=False)
         c = self.scheme.carried
         if draws.shape[0] == 1:
-            across = far / allowed
             one = np.asarray(draws[0], np.float64)
-            return Reading(
-                draws=_whitened(one) if c else one, across=np.asarray(across, np.float64),
-                roundings=self.roundings,
-            )  # fmt: skip
-        if c:
-            # the last draw of each step is the first of the next; that of the start is not in the record
-            off = np.abs(draws[0][1:] - draws[1][:-1]) / (allowed[0][1:] + allowed[1][:-1])
-            return Reading(
-                draws=np.asarray(draws[1], np.float64), across=np.asarray(off, np.float64),
-                roundings=self.roundings,
-            )  # fmt: skip
-        rows = draws.transpose(1, 0, 2).reshape(-1, draws.shape[2])
-        return Reading(draws=np.asarray(rows, np.float64), across=None, roundings=self.roundings)
+            return self._reading(_whitened(one) if c else one, across, unit[0])
+        if not c:
+            return self._reading(draws.transpose(1, 0, 2).reshape(-1, draws.shape[2]), None, unit)
+        # the last draw of each step is the first of the next; that of the start is not in the record
+        off = np.abs(draws[0][1:] - draws[1][:-1]) / (unit[0][1:] + unit[1][:-1])
+        off = np.where(unseen[1:] | unseen[:-1], np.maximum(across[1:], across[:-1]), off)
+        return self._reading(draws[1], off, unit[1])
+
+    def _reading(
+        self, draws: Reals, across: Reals | None, unit: Reals, hits: NDArray[np.bool_] | None = None
+    ) -> Reading:
+        return Reading(
+            draws=np.asarray(draws, np.float64), error=np.asarray(self.roundings * unit, np.float64),
+            across=None if across is None else np.asarray(across, np.float64),
+            roundings=self.roundings, hits=hits,
+        )  # fmt: skip
 
     def _collided(self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]) -> Reading:
         """A step without a collision is known to rounding; any other has one draw."""
@@ -104,13 +121,11 @@ class _Reader:
         q, p = self.stepper(*start, self._force, list(none), False, end[0])
         of_q, of_p = self._allowed(start, none)
         straight = np.maximum(np.abs(end[0] - q) / of_q, np.abs(end[1] - p) / of_p)
-        draws, far, allowed = self._solved(start, end, hit=True)
+        draws, across, unit, _ = self._solved(start, end, hit=True)
         hits = ~(straight <= self.roundings)
-        across = np.where(hits, far / allowed, straight)
-        return Reading(
-            draws=np.where(hits, np.asarray(draws[0], np.float64), np.nan),
-            across=np.asarray(across, np.float64), roundings=self.roundings, hits=hits,
-        )  # fmt: skip
+        return self._reading(
+            np.where(hits, draws[0], np.nan), np.where(hits, across, straight), unit[0], hits
+        )
 
     def _force(self, q: Reals, p: Reals) -> Reals:
         return self.scene.system.potential_force(q, p)
@@ -125,17 +140,21 @@ class _Reader:
 
     def _solved(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool
-    ) -> tuple[Extended, Extended, Extended]:
-        """Draws (u, f-1, n); of one draw how far the other number of the state is off, and what that may be
-        off by; of two the rounding of each."""
+    ) -> tuple[Extended, Extended, Extended, NDArray[np.bool_]]:
+        """Draws (u, f-1, n); by how many roundings the state contradicts them, (f-1, n); one rounding of a
+        draw; and where that hides it, so that no draw and any draw differ by less than what is allowed.
+
+        Of one draw it is the other number of the state that contradicts it; of two none does where they show.
+        """
         u = self.directions.shape[1]
         found = np.zeros((u, *start[0].shape), np.longdouble)
 
         def at(draws: Extended) -> Extended:
-            each = np.tensordot(self.directions, draws, axes=1)
-            return np.stack(self.stepper(*start, self._force, list(each), hit, end[0]))
+            those = np.tensordot(self.directions, draws, axes=1)
+            return np.stack(self.stepper(*start, self._force, list(those), hit, end[0]))
 
-        target = np.stack(end)
+        target, none = np.stack(end), at(found)
+        each = np.stack([at(_unit(u, j, found)) - none for j in range(u)])
         for _ in range(6):
             now = at(found)
             slopes = np.stack([at(found + _unit(u, j, found)) - now for j in range(u)])
@@ -151,13 +170,23 @@ class _Reader:
                 self.scene.system.is_linear and _ == 1
             ):
                 break
-        of = self._allowed(start, np.tensordot(self.directions, found, axes=1))
+        of = np.stack(self._allowed(start, np.tensordot(self.directions, found, axes=1)))
         if u == 1:
-            first = 0 if self.of_q else 1
+            unit = of[first][None] / np.abs(slopes[0][first])
             turn = np.abs(slopes[0][1 - first] / slopes[0][first])
-            return found, np.abs(target - at(found))[1 - first], of[1 - first] + turn * of[first]
-        allowed = np.stack([np.abs(d) * of[0] + np.abs(b) * of[1], np.abs(a) * of[1] + np.abs(c) * of[0]])
-        return found, found, allowed / np.abs(a * d - b * c)
+            across = np.abs(target - at(found))[1 - first] / (of[1 - first] + turn * of[first])
+        else:
+            unit = np.stack([np.abs(d) * of[0] + np.abs(b) * of[1], np.abs(a) * of[1] + np.abs(c) * of[0]])
+            unit, across = unit / np.abs(a * d - b * c), np.zeros_like(of[0])
+        unseen = ~(self.roundings * np.max(unit, axis=0) <= 1)
+        if np.any(unseen):
+            # what no draw explains is then at most the largest one
+            of = np.stack(
+                self._allowed(start, np.zeros((self.scheme.draws, *found.shape[1:]), np.longdouble))
+            )
+            noise = LARGEST_DRAW * np.sum(np.abs(each), axis=0) / self.roundings
+            across = np.where(unseen, np.max(np.abs(target - none) / (of + noise), axis=0), across)
+        return found, across, unit, unseen
 
 
 def _unit(u: int, j: int, like: Extended) -> Extended:

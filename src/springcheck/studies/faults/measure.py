@@ -11,20 +11,22 @@ import numpy as np
 
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import Experiment, Run
+from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring
-from springcheck.physics.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import baths, clean, steppers
 from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import Keeper, Piece
 from springcheck.studies.tables import Documents
+from springcheck.thermal import THERMOSTATS
 
 
 @cache
@@ -46,6 +48,8 @@ def scene(where: Where) -> Scene:
     if where == "orbit":
         q, p = [0.3, -0.5, 0.8], [0.7, 1.1, -0.4]
         return spring(m=3.7, k=2.9, q=q, p=p, places=np.arange(3), name=where, title="")
+    if where in ("bath", "wide bath"):
+        return baths.springs({"bath": 40, "wide bath": 250}[where], name=where)
     steps = 2100 if where == "long spring" else 200
     return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
 
@@ -54,6 +58,8 @@ SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law
 """Experiments that do not look at the scene, and take most of the time."""
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
+BATHS = 160
+"""Random scenes in a bath; each meets one thermostat."""
 BY_ENGINES = 40
 """Random scenes for each method of the engines."""
 SMALLEST, LARGEST = 1e-20, 0.3
@@ -66,6 +72,11 @@ Passed = Callable[[str, float | None], bool | None]
 """Whether a fault of this size passes this check; None where that does not apply."""
 
 
+def checks_of(fault: Fault) -> tuple[str, ...]:
+    """By name: those of thermostats, or those of everything else."""
+    return baths.CHECKS if fault.random else tuple(one.name for one in checks.ALL)
+
+
 def probe(fault: Fault) -> Passed:
     """One fault on its scene, judged at any size; what is computed once is kept."""
     where = scene(fault.scene)
@@ -75,12 +86,16 @@ def probe(fault: Fault) -> Passed:
         return {v.check: v.passed for v in checks.judge(where, fault.run(where, size=size))}
 
     @cache
-    def bench(size: float | None) -> checks.Bench:
+    def subject(size: float | None) -> Any:
+        if fault.random:
+            return baths.subject(fault, size)
         return checks.Bench(scene=where, label=fault.name, run=partial(fault.run, size=size))
 
     @cache
     def passed(check: str, size: float | None) -> bool | None:
-        return recorded(size)[check] if check in RECORDED else _EXPERIMENTS[check](bench(size)).passed
+        if check in RECORDED:
+            return recorded(size).get(check)
+        return _EXPERIMENTS[check](subject(size)).passed if check in checks_of(fault) else None
 
     return passed
 
@@ -105,18 +120,20 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     return high
 
 
-RECORDED = {check.name: check for check in checks.CHECKS}
-_EXPERIMENTS: dict[str, Experiment] = {check.name: check for check in checks.THOROUGH}
+RECORDED = {check.name: check for check in (*checks.CHECKS, *checks.RANDOM)}
+_EXPERIMENTS: dict[str, Any] = {
+    **{check.name: check for check in checks.THOROUGH},
+    **{check.name: check for check in SEEDED},
+}
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:
     """What the checks say of a fault at its size in the table, and down to which size they see it."""
-    passed = probe(fault)
-    names = (*RECORDED, *_EXPERIMENTS)
-    rejected = tuple(name for name in names if passed(name, fault.size) is False)
+    passed, every = probe(fault), checks_of(fault)
+    rejected = tuple(name for name in every if passed(name, fault.size) is False)
     found: dict[str, float] = {}
     if limits and fault.size is not None:
-        for name in names:
+        for name in every:
             if passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
                 continue
             limit = smallest(passed, name, fault.size)
@@ -138,6 +155,16 @@ def clean_scene(seed: int) -> Clean:
     where = clean.random_scene(rng)
     scheme = schemes.SCHEMES[str(rng.choice(_FIXED))]
     return _judged(where, f"plain:{scheme.name}", _plain(scheme), seed, _QUICK)
+
+
+def clean_bath(seed: int) -> Clean:
+    """A random scene in a bath by a right thermostat, one of all, through every check of thermostats."""
+    rng = np.random.default_rng([2028, seed])
+    where = baths.random_scene(rng)
+    right = Fault("thermostat", "", (), baths.broken(), scheme=str(rng.choice(list(THERMOSTATS))))
+    subject = baths.subject(right, None, where, seed + 1)
+    verdicts = checks.judge(where, right.run(where, seed=seed + 1)) + [one(subject) for one in SEEDED]
+    return _counted(checks.shared(verdicts), f"plain:{right.scheme}", seed)
 
 
 def clean_laws(name: str) -> Clean:
@@ -172,7 +199,10 @@ def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Ex
         verdicts = checks.judge(where, run(where, label))
     except MethodError:
         return Clean(runs=0, verdicts=0, alarms=())
-    verdicts += checks.judge_thoroughly(where, label, run, experiments)
+    return _counted(verdicts + checks.judge_thoroughly(where, label, run, experiments), label, seed)
+
+
+def _counted(verdicts: Sequence[Verdict], label: str, seed: int) -> Clean:
     return Clean(
         runs=1,
         verdicts=sum(verdict.passed is not None for verdict in verdicts),
@@ -230,7 +260,9 @@ def study(run: Run | None = None, labels: Sequence[str] = (), *, kept: Keeper | 
     """
     faults = [_piece(RESULTS, fault.name, partial(_examine, fault.name)) for fault in FAULTS]
     cleans = [_piece(CLEANS, f"laws of {name}", partial(clean_laws, name)) for name in _FIXED]
-    scenes: list[tuple[str, Callable[[int], Clean], int]] = [("random scenes", clean_scene, CLEAN)]
+    scenes: list[tuple[str, Callable[[int], Clean], int]] = [
+        ("random scenes", clean_scene, CLEAN), ("random baths", clean_bath, BATHS),
+    ]  # fmt: skip
     if run is not None:
         scenes += [(label, partial(clean_engine, run, label), BY_ENGINES) for label in labels]
     cleans += [

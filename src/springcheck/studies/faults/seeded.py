@@ -1,13 +1,14 @@
 """The ways in which an engine is broken: small pure functions over a plain engine.
 
-A fault's `make(scene, scheme, size)` moves the scene wrongly and records it as if all were well.
+A fault's `make(scene, scheme, size)` moves the scene wrongly and records it as if all were well; one of a
+thermostat takes a seed as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
-Make: TypeAlias = Callable[[Scene, schemes.Scheme, float], Trajectory]
-Where: TypeAlias = Literal["spring", "chain", "long spring", "orbit"]
+Make: TypeAlias = Callable[..., Trajectory]
+Where: TypeAlias = Literal["spring", "chain", "long spring", "orbit", "bath", "wide bath"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +38,18 @@ class Fault:
     """Size in the table; None where the fault has no size."""
     scene: Where = "spring"
 
-    def run(self, scene: Scene, label: str = "", *, size: float | None = None) -> Trajectory:
-        """The broken engine's trajectory of a scene."""
+    @property
+    def random(self) -> bool:
+        """Whether it is a thermostat."""
+        return schemes.scheme(self.scheme).has("random")
+
+    def run(
+        self, scene: Scene, label: str = "", *, size: float | None = None, seed: Any = None
+    ) -> Trajectory:
+        """The broken engine's trajectory of a scene; `seed` is that of a thermostat."""
         chosen = size if size is not None else self.size
-        made = self.make(scene, schemes.SCHEMES[self.scheme], 0.0 if chosen is None else chosen)
+        drawn = (1 if seed is None else seed,) if self.random else ()
+        made = self.make(scene, schemes.scheme(self.scheme), 0.0 if chosen is None else chosen, *drawn)
         return replace(made, label=label or self.name)
 
 

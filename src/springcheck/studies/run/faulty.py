@@ -34,12 +34,15 @@ class Broken:
         size = self.fault.size if self.size is None else self.size
         return self.fault.about + ("" if size is None else f" ({size:.0e})")
 
-    def play(self, scene: Scene, draft: Draft) -> None:
-        """Record it.  MethodError where it makes no sense of the scene."""
+    def play(self, scene: Scene, draft: Draft, seed: int | None = None) -> None:
+        """Record it; `seed` is that of a run in a bath.  MethodError where it makes no sense of the scene."""
+        if self.fault.random != (scene.bath is not None):
+            needed = "a bath: --temperature or [bath] gives one" if self.fault.random else "no bath"
+            raise MethodError(f"--fault {self.fault.name}: it needs a scene with {needed}")
         if scene.steps * scene.n > MOST_NUMBERS:
             raise MethodError(f"--fault {self.fault.name}: {scene.steps} steps are too many for it")
         try:
-            made = self.fault.run(scene, self.label, size=self.size)
+            made = self.fault.run(scene, self.label, size=self.size, seed=seed)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             raise MethodError(
                 f"--fault {self.fault.name}: it cannot be had on scene {scene.name}, only on a "

@@ -162,7 +162,7 @@ def run(
         for one in wrong:
             if one.label not in resumed:
                 with journal.draft(one.label, scene) as draft:
-                    one.play(scene, draft)
+                    one.play(scene, draft, **seeds)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)

@@ -1,0 +1,191 @@
+"""What is wrong with thermostats: their draws, their seeds, their numbers, their stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from springcheck import checks, schemes
+from springcheck.checks.seeds import SEEDED, Seeded
+from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.faults import clean
+from springcheck.studies.faults.clean import walls
+from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.studies.faults.steppers import trajectory
+from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
+from springcheck.thermal.catalogue import HALF, ONE, Act
+
+Draws: TypeAlias = Callable[[Sequence[Floats], Scene, float], Any]
+"""(right draws so far, each (n,) and the last one due; scene, size) -> what is used in place of the last."""
+
+CHECKS: tuple[str, ...] = (*(one.name for one in checks.RANDOM), *(one.name for one in SEEDED))
+"""What judges thermostats."""
+
+A, B = Act("drift", HALF), Act("kick", HALF)
+O = THERMOSTATS["baoab"].acts[2]  # noqa: E741 - the letter of the literature
+
+
+def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
+    """Unlike particles on unlike springs in a bath: nothing is 1."""
+    m, k = np.geomspace(0.7, 9.0, n), np.geomspace(5.0, 1.9, n)
+    return Scene(
+        m=m, q=np.full(n, 0.3), p=np.full(n, 0.2), terms=(walls(k, np.zeros(n)),), step=0.35, steps=steps,
+        name=name, bath=Bath(temperature=1.7, friction=0.8),
+    )  # fmt: skip
+
+
+def random_scene(rng: np.random.Generator) -> Scene:
+    """A random scene of `clean` in a bath of any temperature, of gamma h from 1e-3 to 0.9."""
+    scene = clean.random_scene(rng, steps=300)
+    h = abs(scene.step)
+    bath = Bath(temperature=10 ** rng.uniform(-6, 6), friction=np.exp(rng.uniform(-6.9, -0.1)) / h)
+    return replace(scene, every=1, step=h, bath=bath)
+
+
+def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122) -> Seeded:
+    """A fault as what experiments with seeds look at, on three springs or another scene."""
+    return Seeded(
+        scene=scene or springs(3), label=fault.name, seed=seed, scheme=THERMOSTATS[fault.scheme],
+        scripted=True, play=lambda where, seed: fault.run(where, size=size, seed=seed),
+    )  # fmt: skip
+
+
+def broken(
+    draws: Draws = lambda right, scene, x: right[-1],
+    *,
+    runs: str | Sequence[Act] = "",
+    seed: Callable[[Any], Any] = lambda seed: seed,
+    **numbers: Callable[[Scene, float], Any],
+) -> Make:
+    """A thermostat with other draws, under another scheme (by name, or by its stages), from another seed, or
+    with other numbers: (scene, size) -> the factor of h, m, rate, thermal, k or collision."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float, start: Any = 1) -> Trajectory:
+        assert scene.bath is not None
+        claims = THERMOSTATS[scheme.name]
+        of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else None
+        of = of or Thermostat(name="broken", title="", acts=tuple(runs))  # type: ignore[arg-type]
+        f = {name: factor(scene, size) for name, factor in numbers.items()}
+        stepper = Stepper(
+            replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
+            rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
+            width=np.float64,
+        )  # fmt: skip
+        # a script of draws stands for every generator
+        source = start if hasattr(start, "standard_normal") else seed(start)
+        rng = source if hasattr(source, "standard_normal") else np.random.default_rng(source)
+        right: list[Floats] = []
+
+        def some(number: int) -> list[Any]:
+            found = []
+            for _ in range(number):
+                uniform = np.sqrt(12) * (rng.random(scene.n) - 0.5) if claims.uniform else None
+                right.append(rng.standard_normal(scene.n) if uniform is None else uniform)
+                found.append(draws(right, scene, size))
+            return found
+
+        def force(q: Reals, p: Reals) -> Reals:
+            return np.asarray(scene.system.potential_force(q, p) * f.get("k", 1.0))
+
+        q, p = np.empty((2, scene.frames, scene.n))
+        a, b = q[0], p[0] = scene.q, scene.p
+        carried = some(of.carried)
+        with np.errstate(all="ignore"):
+            for i in range(1, scene.steps + 1):
+                taken = [*carried, *some(of.fresh)]
+                hit = None
+                if of.collides:
+                    hit = rng.random(scene.n) < f.get("collision", 1.0) * stepper.collision
+                a, b = stepper(a, b, force, taken, hit)  # type: ignore[assignment]
+                carried = taken[len(taken) - of.carried :]
+                if i % scene.every == 0:
+                    q[i // scene.every], p[i // scene.every] = a, b
+        return trajectory(scene, scheme, q, p)
+
+    return make
+
+
+def by(factor: Callable[[Scene, float], Any]) -> Draws:
+    """Draws that are too large by a factor."""
+    return lambda right, scene, x: right[-1] * factor(scene, x)
+
+
+def of_rank(change: Callable[[Floats], Any]) -> Draws:
+    """Draws of another distribution: of a number in (0, 1) that is uniform."""
+
+    def draws(right: Sequence[Floats], scene: Scene, x: float) -> Any:
+        from scipy.special import ndtr
+
+        return change(ndtr(right[-1]))
+
+    return draws
+
+
+def heavy(rank: Floats) -> Any:
+    """Student's distribution of five degrees of freedom, of variance 1."""
+    from scipy.special import stdtrit
+
+    return stdtrit(5, rank) * np.sqrt(0.6)
+
+
+def forgetting(scene: Scene) -> float:
+    """gamma h of a scene in a bath."""
+    assert scene.bath is not None
+    return scene.step * scene.bath.friction
+
+
+def again(period: int) -> Draws:
+    """The generator begins anew after so many draws."""
+    return lambda right, scene, x: right[(len(right) - 1) % period]
+
+
+def neighbour(right: Sequence[Floats], scene: Scene, x: float) -> Any:
+    """A part of each draw is that of the step before."""
+    return (right[-1] + x * right[-2]) / np.sqrt(1 + x * x) if len(right) > 1 else right[-1]
+
+
+class Row:
+    """One stream of numbers for all seeds, each of which begins at its own place."""
+
+    def __init__(self, seed: Any) -> None:
+        self._rng, self._at, self._ahead = np.random.default_rng(1), int(seed) % 1000, np.empty(0)
+
+    def standard_normal(self, n: int) -> Floats:
+        """The next n numbers."""
+        while len(self._ahead) < self._at + n:
+            self._ahead = np.concatenate([self._ahead, self._rng.standard_normal(1000 + n)])
+        found, self._ahead = self._ahead[self._at : self._at + n], self._ahead[self._at + n :]
+        self._at = 0
+        return found
+
+
+class Each:
+    """A generator of its own for each particle, of the seed and the number of the particle."""
+
+    def __init__(self, seed: Any) -> None:
+        self._seed, self._rngs = int(seed), list[np.random.Generator]()
+
+    def standard_normal(self, n: int) -> Floats:
+        """One number of each."""
+        self._rngs = self._rngs or [np.random.default_rng(self._seed + i) for i in range(n)]
+        return np.array([rng.standard_normal() for rng in self._rngs])
+
+
+STAGES = {
+    "half kick lost": (B, A, O, A),
+    "old force": (B, A, O, A, Act("held", HALF)),
+    "whole drifts": (B, Act("drift", ONE), O, Act("drift", ONE), B),
+}
+"""Splittings that have lost a letter or a number."""
+
+
+def jumping(scene: Scene, scheme: schemes.Scheme, size: float, seed: Any = 1) -> Trajectory:
+    """BAOAB with noise in positions too."""
+    acts = (B, A, O, A, B, Act("jump", lambda x: size * x))
+    return broken(runs=acts)(scene, scheme, size, seed)
