@@ -96,13 +96,14 @@ class System:
         found = [(row["particle"], mp.mpf(row["coefficient"])) for row in self.table.get("damping", ())]
         return found + [(row["loop"], mp.mpf(row["resistance"])) for row in self.table.get("resistor", ())]
 
-    def series(self, q: list[Any], p: list[Any]) -> Series:
-        """Taylor coefficients of the motion from (q, p), up to ORDER."""
+    def series(self, q: list[Any], p: list[Any], t: Any) -> Series:
+        """Taylor coefficients of the motion from (q, p) at the time t, up to ORDER."""
         n = len(self.m)
         u: Series = [[q[i], p[i] / self.m[i]] for i in range(n)]
         laws: list[Any] = [_Quartic(row) for row in self.table.get("quartic", ())]
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
+        laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
         springs, friction = self.springs(), self.friction()
         for order in range(ORDER):
             force = [mp.mpf(0)] * n
@@ -173,12 +174,31 @@ class _Morse:
         force[self.b] -= tension
 
 
-def moved(system: System, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:
-    """The state a time t later, in so many steps of a power series each."""
+class _Driven:
+    """A driving force, or a spring of modulated stiffness: the cosine by its own series about the time t."""
+
+    def __init__(self, row: dict[str, Any], t: Any) -> None:
+        self.i, self.row = row["particle"], {name: mp.mpf(x) for name, x in row.items()}
+        self.w, self.angle = self.row["frequency"], self.row["frequency"] * t + self.row.get("phase", 0)
+        self.x: list[Any] = []
+        self.k: list[Any] = []
+
+    def add(self, u: Series, order: int, force: list[Any]) -> None:
+        cosine = self.w**order * mp.cos(self.angle + order * mp.pi / 2) / mp.factorial(order)
+        if "amplitude" in self.row:
+            force[self.i] += self.row["amplitude"] * cosine
+            return
+        self.x.append(u[self.i][order] - (self.row.get("at", 0) if order == 0 else 0))
+        self.k.append(self.row["stiffness"] * ((order == 0) + self.row["depth"] * cosine))
+        force[self.i] -= _product(self.k, self.x, order)
+
+
+def moved(system: System, start: Any, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:
+    """The state a time t after the start, in so many steps of a power series each."""
     q, p = state
     h = t / pieces
-    for _ in range(pieces):
-        u = system.series(q, p)
+    for piece in range(pieces):
+        u = system.series(q, p, start + piece * h)
         q = [mp.polyval(x[::-1], h) for x in u]
         p = [
             m * mp.polyval([j * x[j] for j in range(len(x) - 1, 0, -1)], h)
@@ -223,8 +243,9 @@ def make(name: str) -> dict[str, Any]:
     before = 0
     for count in at:
         pieces = max(1, 2 * (count - before))
-        coarse = moved(system, step * (count - before), pieces, coarse)
-        fine = moved(system, step * (count - before), pieces + pieces // 2 + 1, fine)
+        coarse = moved(system, step * before, step * (count - before), pieces, coarse)
+        more = pieces + pieces // 2 + 1
+        fine = moved(system, step * before, step * (count - before), more, fine)
         before = count
         for one, other in zip([*coarse[0], *coarse[1]], [*fine[0], *fine[1]], strict=True):
             if abs(one - other) > mp.mpf(10) ** -DIGITS * max(abs(one), 1e-3):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
 from springcheck.checks.stretch import Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
+from springcheck.physics.driven import CLOCK
 from springcheck.physics.term import Term
 
 T = TypeVar("T")
@@ -35,6 +36,17 @@ class Case(Claim):
         if work not in self._made:
             self._made[work] = work(self)
         return self._made[work]  # type: ignore[no-any-return]
+
+    @cached_property
+    def clocked(self) -> Case:
+        """The case with a clock beside the particles, which stands at the time of each frame; itself where no
+        force depends on the time."""
+        if not self.scene.system.is_driven:
+            return self
+        run = self.trajectory
+        t = (self.steps * run.step)[:, None]
+        q, p = np.hstack([run.q, t]), np.hstack([run.p, np.full_like(t, CLOCK)])
+        return replace(self, trajectory=replace(run, q=q, p=p), scene=self.scene.system.clocked)
 
     @cached_property
     def steps(self) -> Integers:

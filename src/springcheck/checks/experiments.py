@@ -152,7 +152,7 @@ def _shifted(
     return np.asarray(q, np.float64), np.asarray(p, np.float64)
 
 
-@check("reverse", family="map", requires={"one-step", "undamped", "reversible"})
+@check("reverse", family="map", requires={"one-step", "undamped", "reversible", "autonomous"})
 def reversibility(bench: Bench) -> Finding | str:
     """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
     scheme = bench.scheme
@@ -236,7 +236,7 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     return float(ends / size) if size > 0 else 0.0
 
 
-@check("mirror", family="repeat", requires={"one-step", "undamped"})
+@check("mirror", family="repeat", requires={"one-step", "undamped", "autonomous"})
 def mirror(bench: Bench) -> Finding | str:
     """A negative step does what flipped momenta do, bit for bit."""
     steps = min(bench.scene.steps, 20)

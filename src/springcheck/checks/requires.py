@@ -99,6 +99,9 @@ _ALL = (
         lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
     Requirement("solution", "an exact solution", _unless(
         lambda x: exact.has_true_motion(x.scene), "the exact solution of this scene has no closed form")),
+    Requirement("autonomous", "forces that do not depend on the time", _unless(
+        lambda x: not x.scene.system.is_driven,
+        "a force depends on the time, and a run that starts later or goes back would meet another one")),
     Requirement("undamped", "no friction", _trait(
         "undamped", "friction contracts area and lets a phase decay, and going back does not undo it")),
     Requirement("one-area", "modes that lose area at one rate", _unless(
@@ -117,14 +120,14 @@ _ALL = (
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.state <= 2.0**-53,
         "the rounding of its forces hides that of its steps")),
     Requirement("linear", "a linear scene", _trait(
-        "linear", "an anharmonic scene's step is no matrix; the step defect judges it")),
+        "linear", "the step of an anharmonic or driven scene is no matrix; the step defect judges it")),
     Requirement("unmixed", "springs that act at one time", _unless(
         lambda x: not x.law.has("mixes"),
         "slow and fast springs act at different times: no normal mode stays by itself")),
     Requirement("modes", "normal modes", _unless(
         lambda x: x.scene.system.has_modes,
-        "no closed form of the discrete motion: the scene is anharmonic, or friction couples its modes, "
-        f"or more than {MOST_JOINED} particles are joined")),
+        "no closed form of the discrete motion: the scene is anharmonic or driven, or friction couples its "
+        f"modes, or more than {MOST_JOINED} particles are joined")),
     Requirement("few", f"{LARGEST} particles at most", _unless(
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),
     Requirement("resolved", "a step that doubles resolve", _too_long),

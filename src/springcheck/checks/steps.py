@@ -32,7 +32,7 @@ def bridges(case: Case) -> bool:
 def step_defect(case: Case) -> Finding | str:
     """Each step is the scheme's own step, to rounding."""
     # `arithmetic` asks for it too
-    return case.once(_step_defect)
+    return case.clocked.once(_step_defect)
 
 
 def _step_defect(case: Case) -> Finding | str:
@@ -112,6 +112,7 @@ def first_off(case: Case) -> int | None:
     """The first frame that is not the scheme's own after the frame before; None where none is."""
     if missing(case, MAP):
         return None
+    case = case.clocked
     bound, told = _allowed(case)
     off = ~(_in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:]) <= bound) & told
     return int(np.argmax(off)) + 1 if np.any(off) else None
@@ -193,6 +194,7 @@ def arithmetic(case: Case) -> Finding | str:
     plain = Arithmetic()
     if named.state <= plain.state and named.force <= plain.force and not named.quantum:
         return "plain double precision: the step defect says it all"
+    case = case.clocked
     seen = case.once(_step_defect)
     if isinstance(seen, str):
         return seen

@@ -37,6 +37,9 @@ EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 
+DRIVEN = frozenset({"drive", "modulated-spring"})
+"""The terms of a method whose force may also depend on the time."""
+
 EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
 
 

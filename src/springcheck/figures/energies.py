@@ -49,23 +49,23 @@ def energy(runs: Runs, exact: Exact) -> Figure:
     whole = abs(start - unit) <= 1e-12 * unit
     unit = start if whole else unit
     of = "initial energy" if whole else "initial T + |V|"
-    damped = scene.system.is_damped and exact.known
+    changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(scene.system.energy(q, p), np.float64)
 
     def off(run: Trajectory) -> Floats:
-        right = energies(*exact.at(run)) if damped else start
+        right = energies(*exact.at(run)) if changes else start
         return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
 
     found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
     dt, t_unit = runs.time_unit
     true: Floats | None = None
-    if damped and (truth := true_motion(scene, runs.every)) is not None:
+    if changes and (truth := true_motion(scene, runs.every)) is not None:
         true = energies(*truth[1:]) / unit
         upper.plot(dt * truth[0], true, **TRUTH)
-    elif not scene.system.is_damped:
+    elif scene.system.keeps_energy:
         true = np.full(2, start / unit)
         upper.axhline(start / unit, **TRUTH)
     ys = _scale(upper, list(found.values()), true)
@@ -73,10 +73,10 @@ def energy(runs: Runs, exact: Exact) -> Figure:
     upper.set_ylabel(f"energy / {of}")
     runs.note(upper, lambda run: ys.leaves(found[run.label]))
     _decades(lower, runs, off)
-    lower.set_ylabel(f"|energy - {'exact' if damped else 'initial'}| / {of}")
+    lower.set_ylabel(f"|energy - {'exact' if changes else 'initial'}| / {of}")
     lower.set_xlabel(with_unit("time t", t_unit))
     lower.ticklabel_format(axis="x", useOffset=False)
-    said = [] if scene.system.is_damped else _findings(runs, found)
+    said = _findings(runs, found) if scene.system.keeps_energy else []
     overlay.heading(figure, f"{scene.title}: energy" + "".join(f"; {one}" for one in said[:MOST_FINDINGS]))
     runs.legend(figure, truth=true is not None)
     return figure

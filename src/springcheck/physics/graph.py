@@ -8,7 +8,24 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Spring
+from springcheck.physics.terms import Spring, WallSpring
+
+
+def is_uniform_chain(m: Floats, terms: Sequence[Term]) -> bool:
+    """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
+    walls = [term for term in terms if isinstance(term, WallSpring)]
+    links = [term for term in terms if isinstance(term, Spring)]
+    if len(walls) != 1 or len(links) != 1 or len(m) < 2 or np.any(m != m[0]):
+        return False
+    wall, link = walls[0], links[0]
+    row = np.arange(len(m) - 1)
+    return bool(
+        np.array_equal(wall.i, [0, len(m) - 1])
+        and np.array_equal(link.a, row)
+        and np.array_equal(link.b, row + 1)
+        and np.all(wall.k == wall.k[0])
+        and np.all(link.k == wall.k[0])
+    )
 
 
 def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:

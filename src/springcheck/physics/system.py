@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals
+from springcheck.physics.driven import with_clock
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.term import Term, in_pieces
-from springcheck.physics.terms import Damping, Spring, WallSpring
+from springcheck.physics.terms import Damping
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -50,6 +51,21 @@ class System:
         return all(term.is_linear for term in self.terms)
 
     @cached_property
+    def is_driven(self) -> bool:
+        """Whether some force depends on the time."""
+        return any(term.kind == "drive" for term in self.terms)
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether the exact motion does: without friction and drives."""
+        return not (self.is_damped or self.is_driven)
+
+    @cached_property
+    def clocked(self) -> Scene:
+        """The scene with a clock beside its particles (see `driven`); itself where no force needs one."""
+        return with_clock(self.scene) if self.is_driven else self.scene
+
+    @cached_property
     def is_separate(self) -> bool:
         """Whether no term joins two particles: n independent systems side by side."""
         return all(term.bodies == 1 for term in self.terms)
@@ -62,19 +78,7 @@ class System:
     @cached_property
     def is_uniform_chain(self) -> bool:
         """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
-        walls = [term for term in self.terms if isinstance(term, WallSpring)]
-        links = [term for term in self.terms if isinstance(term, Spring)]
-        if len(walls) != 1 or len(links) != 1 or self.n < 2 or np.any(self.m != self.m[0]):
-            return False
-        wall, link = walls[0], links[0]
-        row = np.arange(self.n - 1)
-        return bool(
-            np.array_equal(wall.i, [0, self.n - 1])
-            and np.array_equal(link.a, row)
-            and np.array_equal(link.b, row + 1)
-            and np.all(wall.k == wall.k[0])
-            and np.all(link.k == wall.k[0])
-        )
+        return graph.is_uniform_chain(self.m, self.terms)
 
     @cached_property
     def has_modes(self) -> bool:
@@ -327,9 +331,8 @@ class System:
 
     @property
     def _is_away_from_rest(self) -> bool:
-        return bool(np.any(self.scene.p != 0)) or any(
-            np.any(x.elongation(self.scene.q) != 0) for x in self.terms
-        )
+        stretched = (np.any(x.elongation(self.scene.q) != 0) for x in self.terms)
+        return bool(np.any(self.scene.p != 0)) or any(stretched)
 
     @cached_property
     def amplitudes(self) -> tuple[Floats, Floats]:
@@ -364,14 +367,11 @@ class System:
     @cached_property
     def in_single(self) -> Scene:
         """The scene as an engine keeps it that holds the parameters of its potential in single precision."""
-        return self._with(term.in_single() for term in self.terms)
+        return self.scene.derived(terms=tuple(term.in_single() for term in self.terms))
 
     def scaled(self, factor: float) -> Scene:
         """The scene with every force of its potential multiplied by a factor."""
-        return self._with(term.scaled(factor) for term in self.terms)
-
-    def _with(self, terms: Iterable[Term]) -> Scene:
-        return self.scene.derived(terms=tuple(terms))
+        return self.scene.derived(terms=tuple(term.scaled(factor) for term in self.terms))
 
     def tiled(self, copies: int) -> Scene:
         """So many copies of the scene side by side, which do not act on each other."""

@@ -1,4 +1,4 @@
-"""The terms that there are: springs, quartic potentials, pendulums, Morse bonds and friction.
+"""The terms that there are: springs, quartic potentials, pendulums, Morse bonds, friction, and the driven.
 
 To add one, write its class with its law and put `@register` before it, here or in a file of your own: the
 ten lines are shown in data/README.md.
@@ -14,11 +14,12 @@ import numpy as np
 
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
 
 __all__ = [
-    "Column", "Cosine", "Damping", "Morse", "OnPairs", "OnParticles", "Quartic", "Spring", "Term",
-    "WallSpring", "known", "register",
+    "Column", "Cosine", "Damping", "Drive", "ModulatedSpring", "Morse", "OnPairs", "OnParticles", "Quartic",
+    "Spring", "Term", "WallSpring", "known", "register",
 ]  # fmt: skip
 
 
@@ -231,7 +232,7 @@ class Damping(Term):
 
 
 _KNOWN: dict[str, type[Term]] = {
-    term.key: term for term in (WallSpring, Spring, Quartic, Cosine, Morse, Damping)
+    term.key: term for term in (WallSpring, Spring, Quartic, Cosine, Morse, Damping, Drive, ModulatedSpring)
 }
 
 T = TypeVar("T", bound=type[Term])

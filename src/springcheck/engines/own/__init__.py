@@ -7,6 +7,7 @@ are there for whoever names them, in a scene's `include` or by `--method`.
 from __future__ import annotations
 
 from springcheck.engines.contract import (
+    DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
     SPRINGS,
@@ -45,7 +46,7 @@ def _method(scheme: Scheme) -> Method:
         name=NAMES.get(scheme.name, scheme.name),
         scheme=scheme.name,
         about=ABOUT.get(scheme.name, scheme.title),
-        terms=SPRINGS | {"damping"} if scheme.has("implicit") else EVERY_FORCE,
+        terms=DRIVEN | (SPRINGS | {"damping"} if scheme.has("implicit") else EVERY_FORCE),
         kinds=frozenset({"particles", "circuit", "rotor"}),
         requires=_requires(scheme),
         default=scheme.name in ABOUT,

@@ -1,4 +1,8 @@
-"""Any scheme of fixed step by NumPy, where the compiled loops have not all of its stages or of its terms."""
+"""Any scheme of fixed step by NumPy, where the compiled loops have not all of its stages or of its terms.
+
+A clock among the particles, which a force that depends on the time needs, is set to i h before step i: the
+stages move it from there, and no rounding of the sum of all steps is in it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,8 @@ class Vectors:
     """A scene carried through the steps of a scheme, its forces those of its own terms."""
 
     def __init__(self, scheme: Scheme, scene: Scene, step: float) -> None:
+        self._n, self._done = scene.n, 0
+        scene = scene.system.clocked
         system = scene.system
         self._scheme, self._h, self._m = scheme, step, scene.m
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
@@ -26,12 +32,14 @@ class Vectors:
         with np.errstate(all="ignore"):
             for row in range(len(q)):
                 for _ in range(every):
+                    self._q[self._n :] = self._done * self._h
+                    self._done += 1
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
                         rate=self._law.rate, parts=self._parts, stiffness=self._law.stiffness,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
-                q[row], p[row] = self._q, self._p
+                q[row], p[row] = self._q[: self._n], self._p[: self._n]
 
 
 def _kept(force: Force, damped: bool) -> Force:

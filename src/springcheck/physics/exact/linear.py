@@ -130,7 +130,7 @@ def doubt(scene: Scene, _: Any, t: np.longdouble) -> tuple[Extended, Extended]:
     |t f| min(t, 1/w) at most (variation of constants).
     """
     system, found = scene.system, scene.system.modes
-    reach, speed, phase, hold = _reach(found, t)
+    reach, speed, phase, hold = reaches(found, t)
     if found.waves:
         return _of_waves(scene, t)[:2]
     joined = found.vectors is not None
@@ -163,7 +163,7 @@ def _of_waves(scene: Scene, t: np.longdouble) -> tuple[Extended, Extended, np.lo
     where n + 1 has large factors (Bluestein); the exact motion passes the error of the start on as it is.
     """
     found = scene.system.modes
-    reach, speed, phase, hold = _reach(found, t)
+    reach, speed, phase, hold = reaches(found, t)
     last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (scene.n + 1)) * EPS
     y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
     # friction is taken for one rate where it is one but for rounding
@@ -183,7 +183,7 @@ def _length(x: Extended) -> Extended:
     return np.asarray(np.sqrt(np.sum(x * x)))
 
 
-def _reach(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
+def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
     """Bounds of |u|, of |v|, of the phase that its last digits come to, and of what a kick of 1 moves u by,
     from the start to time t, for each mode (n,)."""
     u, v, slow, fast = found.start.sizes

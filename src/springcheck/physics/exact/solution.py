@@ -67,6 +67,15 @@ def solution(system: System) -> Solution | None:
     if system.has_modes:
         whole = _Group(particles=np.arange(system.n), scene=system.scene, found=True, law=linear.LINEAR)
         return Solution(n=system.n, groups=(whole,))
+    if system.is_driven:
+        from springcheck.physics.exact.mathieu import MATHIEU
+        from springcheck.physics.exact.response import RESPONSE
+
+        for law in (RESPONSE, MATHIEU):
+            if ready := law.prepare(system.scene):
+                here = _Group(particles=np.arange(system.n), scene=system.scene, found=ready, law=law)
+                return Solution(n=system.n, groups=(here,))
+        return None
     from springcheck.physics.exact.bond import MORSE
     from springcheck.physics.exact.pendulum import COSINE
     from springcheck.physics.exact.quartic import QUARTIC

@@ -184,7 +184,7 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     copies = len(chosen)
     energy = _energies(many, q, p, copies)
     right = np.broadcast_to(energy[0], energy.shape).copy()
-    if many.system.is_damped:
+    if not many.system.keeps_energy:
         steps = np.arange(len(q)) * many.every
         if many.system.is_separate and many.system.is_linear:
             right = np.asarray(

@@ -34,7 +34,7 @@ class Tally:
         if self._known:
             steps = checks.Case(trajectory=piece, scene=scene).steps
             q, p = exact.true_motion(scene, steps, piece.step)
-            if scene.system.is_damped:
+            if not scene.system.keeps_energy:
                 right = np.asarray(scene.system.energy(q, p), np.float64)
             # not max(), which leaves out what is no number
             here = np.max(self._norm(piece.q - q, piece.p - p))

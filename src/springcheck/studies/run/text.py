@@ -133,11 +133,13 @@ def _runs(runs: Sequence[MethodRun]) -> TextTable:
 
 def _energy(scene: Scene) -> str:
     """What the column of energies holds."""
-    if not scene.system.is_damped:
+    system = scene.system
+    if system.keeps_energy:
         return "(H - H0)/|H0| where it is largest"
+    changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
     if has_true_motion(scene):
-        return "(H - H exact)/|H0| where it is largest, the exact loss by friction taken off"
-    return "(H - H0)/|H0| where it is largest, the loss by friction in it"
+        return f"(H - H exact)/|H0| where it is largest, the exact {' and '.join(changes)} taken off"
+    return f"(H - H0)/|H0| where it is largest, the {' and '.join(changes)} in it"
 
 
 def _error(x: float) -> str:
@@ -347,6 +349,7 @@ def _not_covered(scene: Scene) -> Lines:
     left = [f"motion along {' and '.join(missing)}"] if missing else []
     left += ["periodic boxes", "constraints"]
     left += [] if scene.system.is_damped or scene.bath else ["friction"]
+    left += [] if scene.system.is_driven else ["drives"]
     return [plain(f"Not exercised here: {', '.join(left)}", "dim")]
 
 

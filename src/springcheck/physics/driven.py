@@ -1,0 +1,136 @@
+"""Terms whose force depends on the time: a driving force, and a spring of modulated stiffness.
+
+The time is a coordinate (see `System.clocked`): the position of a clock, which moves by 1 a unit of time and
+which nothing acts on.  On the extended states the motion is autonomous, so that the stages of a scheme decide
+where within a step each force is evaluated (Hairer, Lubich & Wanner, Geometric Numerical Integration,
+VIII.2.1, the extended phase space).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.term import Column, Origin, Term
+
+CLOCK = 2.0**-500
+"""Mass of the clock [M], whose momentum is the same number: it moves by 1 a unit of time, and its energy is
+nothing beside that of any motion."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Driven(Term):
+    """What both have: frequency and phase, and where the time is read."""
+
+    kind: ClassVar[Origin] = "drive"
+    ends: ClassVar[tuple[str, ...]] = ("i",)
+    i: Integers
+    frequency: Floats
+    """Angular frequency [1/T]."""
+    phase: Floats
+    clock: bool = False
+    """Whether the last coordinate of every state is the time; without it the force is that at t = 0."""
+
+    def wave(self, q: Reals) -> Reals:
+        """cos(frequency t + phase) of each row at states q (..., n) -> (..., s)."""
+        time = q[..., -1:] if self.clock else np.zeros((*q.shape[:-1], 1), q.dtype)
+        return np.asarray(np.cos(self.frequency * time + self.phase))
+
+    def turned(self, size: Reals) -> Reals:
+        """Roundings of `wave`: its own, and those of an angle at times of this size (..., n) -> (..., s)."""
+        time = np.abs(size[..., -1:]) if self.clock else 0
+        return np.asarray(1 + np.abs(self.frequency) * time + np.abs(self.phase))
+
+    def separated(self, q: Reals) -> tuple[Self, Reals]:
+        alone, where = Term.separated(self, q)
+        return alone, np.concatenate([where, q[..., -1:]], axis=-1) if self.clock else where
+
+    def __getstate__(self) -> dict[str, Any]:
+        return Term.__getstate__(self) | ({"clock": True} if self.clock else {})
+
+
+_TURNS = (Column("frequency", "frequency", single=False), Column("phase", "phase", 0.0, single=False))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drive(_Driven):
+    """Driving forces on particles i: amplitude cos(frequency t + phase).  amplitude [M L/T2].
+
+    They have no energy: what a drive does to the energy is its work.
+    """
+
+    key: ClassVar[str] = "drive"
+    formula: ClassVar[str] = "force amplitude cos(frequency t + phase)"
+    columns: ClassVar[tuple[Column, ...]] = (Column("amplitude", "amplitude", single=False), *_TURNS)
+    amplitude: Floats
+
+    @staticmethod
+    def potential(u: Reals, *_: Floats) -> Reals:
+        return np.zeros_like(u)
+
+    @staticmethod
+    def second(u: Reals, amplitude: Floats, *_: Floats) -> Reals:
+        return np.zeros_like(amplitude)
+
+    def pull(self, q: Reals) -> Reals:
+        return -self.amplitude * self.wave(q)
+
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        self.scatter(np.abs(self.amplitude) * self.turned(q if near is None else near), out)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModulatedSpring(_Driven):
+    """Springs from particles i to fixed points: V = k/2 (1 + depth cos(frequency t + phase)) (q - at)**2.
+
+    k [M/T2], at [L].  Mathieu's equation; their energy is counted without the modulation, whose work it is
+    that changes it.
+    """
+
+    key: ClassVar[str] = "modulated-spring"
+    formula: ClassVar[str] = "k/2 (1 + depth cos(frequency t + phase)) (q - at)**2"
+    origin: ClassVar[str] = "at"
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("stiffness", "k"),
+        Column("depth", "depth"),
+        *_TURNS,
+        Column("at", "at", 0.0, single=False),
+    )
+    k: Floats
+    depth: Floats
+    at: Floats
+
+    @staticmethod
+    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(0.5 * (k * u * u))
+
+    @staticmethod
+    def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:
+        """At most: `curvature` is what it is at a time."""
+        return np.asarray(np.abs(k) * (1 + np.abs(depth)))
+
+    def pull(self, q: Reals) -> Reals:
+        return np.asarray(self.curvature(q) * self.elongation(q))
+
+    def curvature(self, q: Reals) -> Reals:
+        return np.asarray(self.k * (1 + self.depth * self.wave(q)))
+
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        size = self.most_stretch(np.abs(q)) + np.abs(self.at)
+        turned = 1 + np.abs(self.depth) * self.turned(q if near is None else near)
+        self.scatter(np.abs(self.k) * turned * size, out)
+
+
+def with_clock(scene: Any) -> Any:
+    """A scene with a clock as its last coordinate, which stands at the time: its states are (..., n + 1)."""
+    q, p, m = (np.append(x, y) for x, y in ((scene.q, 0.0), (scene.p, CLOCK), (scene.m, CLOCK)))
+    terms = tuple(replace(term, clock=True) if isinstance(term, _Driven) else term for term in scene.terms)
+    places = None if scene.places is None else np.append(scene.places, 3 * scene.particles)
+    return scene.derived(q=q, p=p, m=m, terms=terms, places=places)

@@ -1,0 +1,147 @@
+"""The exact solution of springs of modulated stiffness, by Floquet: Mathieu's equation.
+
+The state a period later is a matrix times that of now.  Within a period the matrix from its start to each
+node of a grid is a product of Taylor series in time, whose step turns by less than half a radian.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from springcheck.physics.arrays import Extended
+from springcheck.physics.driven import ModulatedSpring
+from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+TAYLOR_ORDER = 22
+"""Of the series: the next term is (1/2)**23/23!, 5e-30 of the first."""
+
+MOST_NODES = 1 << 14
+"""Of a period: a modulation so slow that it takes more is left out."""
+
+
+class _Mode(NamedTuple):
+    """One particle: u'' = -w2 (1 + depth cos(W t + phase)) u, its start (u, v), and its matrices."""
+
+    w2: np.longdouble
+    depth: np.longdouble
+    turn: np.longdouble
+    phase: np.longdouble
+    start: Extended
+    node: np.longdouble
+    """Distance of the nodes [T]."""
+    nodes: Extended
+    """What takes (u, v) from the start to each node of a period (j + 1, 2, 2), the last its end."""
+
+    @property
+    def rate(self) -> float:
+        """The largest frequency, that of the spring or of the modulation [1/T]."""
+        return float(np.maximum(np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth))), np.abs(self.turn)))
+
+
+def prepare(scene: Scene) -> tuple[_Mode, ...] | None:
+    """None where anything else acts, or where a period is too long."""
+    term = scene.terms[0]
+    if not isinstance(term, ModulatedSpring) or len(scene.terms) > 1 or not one_each(scene):
+        return None
+    found = []
+    for i, k, depth, frequency, phase, at in term.rows():
+        m, q, p = (np.longdouble(x[i]) for x in (scene.m, scene.q, scene.p))
+        start = np.array([q - np.longdouble(at), p / m])
+        deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
+        none = np.empty(0, np.longdouble)
+        blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, np.longdouble(0), none)
+        if frequency == 0 or not 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES:
+            return None
+        found.append((i, _with_nodes(blank)))
+    return tuple(mode for _, mode in sorted(found, key=lambda one: one[0]))
+
+
+def _with_nodes(mode: _Mode) -> _Mode:
+    period = 2 * PI / np.abs(mode.turn)
+    count = int(np.ceil(2 * mode.rate * float(period)))
+    step = period / count
+    steps = _series(mode, step * np.arange(count), np.full(count, step))
+    nodes = [np.asarray(np.eye(2), np.longdouble)]
+    for one in steps:
+        nodes.append(np.asarray(one @ nodes[-1], np.longdouble))
+    return mode._replace(node=step, nodes=np.stack(nodes))
+
+
+def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
+    """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
+    angle = mode.turn * t + mode.phase
+    waves, factor = [], np.longdouble(1)
+    for j in range(TAYLOR_ORDER):
+        # the j-th derivative of the cosine: cos, -sin, -cos, sin
+        wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
+        waves.append(mode.depth * factor * wave + (1 if j == 0 else 0))
+        factor = factor * mode.turn / (j + 1)
+    # both unit starts at once, coefficients (order, 2, f)
+    u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
+    for j in range(TAYLOR_ORDER):
+        total = sum((waves[i] * u[j - i] for i in range(j + 1)), np.zeros_like(u[0]))
+        u.append(np.asarray(-mode.w2 * total / ((j + 1) * (j + 2)), np.longdouble))
+    y, v = np.zeros_like(u[0]), np.zeros_like(u[0])
+    for j in reversed(range(len(u))):
+        y = y * s + u[j]
+        v = v * s + j * u[j] if j else v
+    return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
+
+
+def _powers(matrix: Extended, n: np.ndarray) -> Extended:
+    """Powers n (f,), of either sign, of a matrix (2, 2) of determinant 1: (f, 2, 2)."""
+    (a, b), (c, d) = matrix
+    inverse = np.array([[d, -b], [-c, a]])
+    out = np.broadcast_to(np.eye(2, dtype=np.longdouble), (len(n), 2, 2))
+    base, left = np.where((n < 0)[:, None, None], inverse, matrix), np.abs(n)
+    while np.any(left):
+        out = np.where((left % 2 == 1)[:, None, None], out @ base, out)
+        base, left = base @ base, left // 2
+    return out
+
+
+def motion(scene: Scene, found: tuple[_Mode, ...], t: Extended) -> States:
+    """Exact q and p (f, n) at times t (f, 1) [T]."""
+    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    term = scene.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    at = np.zeros(scene.n)
+    at[term.i] = term.at
+    for i, mode in enumerate(found):
+        period = 2 * PI / np.abs(mode.turn)
+        n = np.floor(t[:, 0] / period).astype(np.int64)
+        rest = t[:, 0] - n * period
+        j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
+        last = _series(mode, mode.node * j, rest - mode.node * j)
+        whole = last @ mode.nodes[j] @ _powers(mode.nodes[-1], n)
+        q[:, i], v = (whole @ mode.start).T
+        p[:, i] = v * scene.m[i]
+    return q + at, p
+
+
+def doubt(scene: Scene, found: tuple[_Mode, ...], t: np.longdouble) -> States:
+    """Bounds (n,) of the errors of `motion`: roundings of the angle turned through, times the largest state.
+
+    In the coordinates (rate u, v) no power of the matrix of a period is larger than the condition number of
+    its eigenvectors times that of its spectral radius.
+    """
+    u, v = np.empty((2, scene.n), dtype=np.longdouble)
+    for i, mode in enumerate(found):
+        scale = np.array([mode.rate, 1.0])
+        scaled = (mode.nodes * scale[:, None] / scale).astype(np.float64)
+        values, vectors = np.linalg.eig(scaled[-1])
+        periods = float(np.abs(t) * np.abs(mode.turn) / (2 * PI)) + 1
+        within = np.max(np.linalg.norm(scaled, axis=(1, 2)))
+        grown = within * np.linalg.cond(vectors) * max(float(np.max(np.abs(values))), 1.0) ** periods
+        size = grown * np.hypot(*(mode.start * scale)) * LAST * (1 + mode.rate * np.abs(t))
+        u[i], v[i] = size / mode.rate, size
+    return u, v * scene.m
+
+
+MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
+"""A whole scene of springs of modulated stiffness, one on each particle."""

@@ -1,0 +1,186 @@
+"""Forces that depend on the time: their exact solution, where in a step each scheme takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, schemes
+from springcheck.errors import SceneError
+from springcheck.physics import exact
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Drive, ModulatedSpring, Spring, Term, WallSpring
+
+ONE = np.array([0])
+SCENES = ("driven-spring", "mathieu-stable", "mathieu-tongue")
+OWN = [f"own:{'euler' if x.name == 'explicit-euler' else x.name}" for x in schemes.SCHEMES.values()
+       if x.has("one-step") and not x.has("mixes") and not x.has("friction")]  # fmt: skip
+
+
+def driven(m: float, k: float, c: float, drive: tuple[float, float, float], **more: Any) -> Scene:
+    """A driven spring; without stiffness or friction where that is 0."""
+    amplitude, frequency, phase = drive
+    terms: list[Term] = [Drive(i=ONE, amplitude=amplitude, frequency=frequency, phase=phase)]
+    terms += [WallSpring(i=ONE, k=k, at=0.0)] if k else []
+    terms += [Damping(i=ONE, c=c)] if c else []
+    given = {"q": [0.3], "p": [0.7], "step": 0.1, "steps": 50} | more
+    return Scene(m=np.array([m]), terms=tuple(terms), **given)
+
+
+def by_exponential(scene: Scene, steps: int) -> tuple[Any, Any]:
+    """q and p by the exponential of the matrix of (q, p, cos, sin), in 50 digits."""
+
+    def of(key: str, field: str) -> Any:
+        return next((mpmath.mpf(float(getattr(x, field)[0])) for x in scene.terms if x.key == key), 0)
+
+    m, k, c = mpmath.mpf(float(scene.m[0])), of("wall-spring", "k"), of("damping", "c")
+    force, w, phase = (of("drive", name) for name in ("amplitude", "frequency", "phase"))
+    matrix = mpmath.matrix([[0, 1 / m, 0, 0], [-k, -c / m, force, 0], [0, 0, 0, -w], [0, 0, w, 0]])
+    start = [
+        mpmath.mpf(float(scene.q[0])),
+        mpmath.mpf(float(scene.p[0])),
+        mpmath.cos(phase),
+        mpmath.sin(phase),
+    ]
+    end = mpmath.expm(matrix * steps * mpmath.mpf(scene.step)) * mpmath.matrix(start)
+    return end[0], end[1]
+
+
+W = float(np.sqrt(2.9 / 3.7))
+
+
+@pytest.mark.parametrize(
+    ("k", "c", "frequency"),
+    [
+        (2.9, 0.11, 0.87), (2.9, 0.0, W), (2.9, 0.0, W * (1 + 1e-9)), (2.9, 0.0, 1.01 * W), (2.9, 0.0, 0.0),
+        (2.9, 2 * np.sqrt(2.9 * 3.7), 0.87), (2.9, 40.0, 3.0), (2.9, 0.11, 31.0), (0.0, 0.0, 0.87),
+        (0.0, 0.0, 0.0), (0.0, 0.6, 1e-7), (-2.9, 0.0, 0.87), (2.9, 0.11, -0.87),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("step", [0.1, -0.05])
+def test_the_exact_solution_is_that_of_the_matrix_exponential_at_resonance_too(
+    k: float, c: float, frequency: float, step: float
+) -> None:
+    scene = driven(3.7, k, c, (0.43, frequency, 0.6), step=step)
+    for steps in (1, 7, 400):
+        q, p = exact.true_motion(scene, np.array([steps]), scene.step)
+        assert scene.system.solution is not None
+        dq, dp = scene.system.solution.doubt(steps * step)
+        with mpmath.workdps(50):
+            for found, right, doubt in zip(
+                (q[0, 0], p[0, 0]), by_exponential(scene, steps), (dq, dp), strict=True
+            ):
+                off = abs(mpmath.mpf(np.format_float_scientific(found, precision=25)) - right)
+                assert off <= mpmath.mpf(float(doubt[0]))
+
+
+def test_a_drive_on_a_chain_moves_its_modes() -> None:
+    """Against RK4 in steps so short that it is exact to 1e-11."""
+    scene = Scene(
+        m=[3.7, 1.3], q=[0.3, -0.2], p=[0.7, 0.1], step=0.002, steps=1000,
+        terms=(WallSpring(i=ONE, k=2.9, at=0.1), Spring(a=[0], b=[1], k=[1.7], rest=[0.4]),
+               Drive(i=[1], amplitude=0.43, frequency=0.87, phase=0.6)),
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "own:rk4")
+    q, p = exact.true_motion(scene, np.array([1000]), scene.step)
+    assert np.max(np.abs(run.q[-1] - q)) < 1e-11
+    assert np.max(np.abs(run.p[-1] - p)) < 1e-11
+
+
+TIMES = {
+    "own:euler": {0.0}, "own:semi-implicit-euler": {0.0}, "own:semi-implicit-euler-drift-kick": {1.0},
+    "own:implicit-euler": {1.0}, "own:velocity-verlet": {0.0, 1.0}, "own:position-verlet": {0.5},
+    "own:implicit-midpoint": {0.5}, "own:trapezoidal": {0.0, 1.0}, "own:rk4": {0.0, 0.5, 1.0},
+    "own:rk2-heun": {0.0, 1.0}, "own:rk2-midpoint": {0.5},
+}  # fmt: skip
+"""Of a step, where its scheme takes the time: written down here once more, from textbooks."""
+
+
+@pytest.mark.parametrize("label", TIMES)
+def test_a_free_particle_feels_the_drive_at_the_abscissae_of_the_scheme(label: str) -> None:
+    """From rest p' - p is h times a mean of the force at the abscissae, and depends on no other time."""
+    scene = driven(3.7, 0.0, 0.0, (0.43, 0.87, 0.6), p=[0.0], steps=1)
+    kick = springcheck.simulate(scene, label).p[1, 0] / scene.step
+    at = np.array(sorted(TIMES[label]))
+    forces = 0.43 * np.cos(0.87 * 0.1 * at + 0.6)
+    weights = {1: [1.0], 2: [0.5, 0.5], 3: [1 / 6, 4 / 6, 1 / 6]}[len(at)]
+    assert kick == pytest.approx(weights @ forces, rel=1e-14)
+
+
+@pytest.mark.parametrize("label", OWN)
+@pytest.mark.parametrize("name", SCENES)
+def test_every_own_method_takes_a_driven_scene_to_rounding(name: str, label: str) -> None:
+    scene = replace(scenes.load_scene(name), steps=60)
+    verdicts = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert verdicts["step-defect"].passed is True
+    assert not [v.check for v in verdicts.values() if v.passed is False]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_frames_several_steps_apart_are_judged_too(name: str) -> None:
+    scene = replace(scenes.load_scene(name), steps=70, every=7)
+    for label in ("own:velocity-verlet", "own:rk4", "own:implicit-midpoint"):
+        run = springcheck.simulate(scene, label)
+        found = checks.judge(scene, run)
+        assert [v.passed for v in found if v.check == "step-defect"] == [True]
+        later = replace(run, t=run.t + 7 * scene.step)
+        assert any(v.passed is False for v in checks.judge(scene, later) if v.check == "step-defect")
+
+
+def multiplier(scene: Scene, label: str, steps: int) -> complex:
+    """Floquet multiplier of largest size of a method, whose steps divide the period of the modulation."""
+    period = 2 * np.pi / scene.terms[0].frequency[0]  # type: ignore[attr-defined]
+    scene = replace(scene, step=period / steps, steps=steps, every=steps)
+    ends = []
+    for q, p in ((1.0, 0.0), (0.0, 1.0)):
+        run = springcheck.simulate(replace(scene, q=[q], p=[p]), label)
+        ends.append([run.q[-1, 0], run.p[-1, 0]])
+    return complex(max(np.linalg.eigvals(np.array(ends)), key=abs))
+
+
+@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
+def test_the_floquet_multiplier_is_that_of_mathieus_functions(name: str) -> None:
+    """By Taylor series in 30 digits, and by the characteristic exponent of Hill's determinant."""
+    scene = scenes.load_scene(name)
+    term = scene.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    w2, depth, drive = (float(x) for x in (term.k[0] / scene.m[0], term.depth[0], term.frequency[0]))
+    # Mathieu's own form y'' + (a - 2 r cos 2x) y = 0, x = W t/2; the shift of the phase is no matter
+    a, r = 4 * w2 / drive**2, -2 * w2 * depth / drive**2
+    # Hill's determinant, Whittaker & Watson 19.42: sin(pi nu/2)^2 = D(0) sin(pi sqrt(a)/2)^2, 2 nu a period
+    orders = 2.0 * np.arange(-60, 61)
+    hill = np.eye(121) + np.diag(r / (orders[:-1] ** 2 - a), 1) + np.diag(r / (orders[1:] ** 2 - a), -1)
+    square = np.linalg.det(hill) * np.sin(np.pi * np.sqrt(a) / 2) ** 2
+    # cos(pi nu) = 1 - 2 sin(pi nu/2)^2 is half of the trace over a period pi of x
+    half = 1 - 2 * square
+    with mpmath.workdps(30):
+
+        def slope(t: Any, y: Any) -> list[Any]:
+            return [y[1], -(a - 2 * r * mpmath.cos(2 * t)) * y[0]]
+
+        ends = [mpmath.odefun(slope, 0, start, tol=1e-20)(mpmath.pi) for start in ([1, 0], [0, 1])]
+        trace = float((ends[0][0] + ends[1][1]) / 2)
+    # what rows beyond the N-th add to the determinant falls as r^2/N^3
+    assert half == pytest.approx(trace, abs=r * r / 60**3)
+    size = abs(trace) + np.sqrt(max(trace * trace - 1, 0.0))
+    assert (size > 1.1) == (name == "mathieu-tongue")
+    found = multiplier(scene, "own:yoshida4", 256)
+    assert found.real == pytest.approx(-size if size > 1 else trace, abs=3e-6)
+    assert abs(found) == pytest.approx(max(size, 1.0), abs=3e-6)
+
+
+def test_a_scene_file_of_a_drive_reads_back_the_same() -> None:
+    for name in SCENES:
+        scene = scenes.load_scene(name)
+        assert scenes.parse(scene.to_toml(), name=name).digest == scene.digest
+
+
+def test_a_drive_needs_finite_numbers() -> None:
+    with pytest.raises(SceneError, match="frequency"):
+        driven(3.7, 2.9, 0.0, (0.43, float("nan"), 0.0))
