@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2291,
     ("driver", "conformance", "doors"): 1130,
     ("checks",): 3687,
-    ("identify",): 7213,
+    ("identify",): 7296,
     ("formats", "store"): 4930,
     ("studies",): 1531,
     ("studies/*",): 9496,

@@ -559,3 +559,52 @@ def test_a_clock_that_adds_up_and_is_written_as_text_keeps_its_step(digits: int,
     assert found.scheme == "velocity-verlet"
     # of 16 digits times are doubles, whose sum is no longer known to the bit
     assert abs(found.step / h - 1) < (1e-12 if digits == 16 else 1e-16)
+
+
+@pytest.mark.parametrize("recorded", ["its own clock", "i h"])
+@pytest.mark.parametrize("h", [0.1, 0.013])
+def test_a_program_that_steps_to_i_h_is_named(recorded: str, h: float) -> None:
+    """REBOUND's `integrate(i h)`: a last step that is shortened, or one of a rounding more, in halves."""
+    t, q, v, frames = 0.0, 0.3, 0.19, [(0.0, 0.3, 0.19)]
+    for i in range(1, 401):
+        while i * h - t > 2.0**-52 * i * h:
+            dt = min(h, i * h - t)
+            q, t = q + dt / 2 * v, t + dt / 2
+            v = v - dt * (K / M * q)
+            q, t = q + dt / 2 * v, t + dt / 2
+        frames.append((t, q, v))
+    t_all, q_all, v_all = np.array(frames).T
+    assert not np.array_equal(t_all, h * np.arange(401))
+    t_all = t_all if recorded != "i h" else h * np.arange(401)
+    found = identify(t_all, q_all, v=v_all, **STATED)
+    assert (found.scheme, found.stride, found.fits, found.precision) == ("position-verlet", 1, True, "double")
+    assert "position-verlet" in [x.scheme for x in identify(t_all, q_all, v=v_all).candidates]
+    # a step that is longer by 1e-12, every other time, is none of a clock's roundings
+    wrong = v_all * (1 + 1e-12 * (-1.0) ** np.arange(401))
+    assert not identify(t_all, q_all, v=wrong, **STATED).fits
+
+
+@pytest.mark.parametrize("stride", [1, 5])
+def test_friction_of_the_half_steps_velocity_is_named_by_its_first_step_too(stride: int) -> None:
+    """LAMMPS' `fix viscous`: the force has the friction of the velocity half a step ago, and of the first
+    velocity in the first step."""
+    g, q, v = 0.05, 0.3, 0.19
+    a, frames = -K / M * q - g * v, [(q, v)]
+    for i in range(100 * stride):
+        v = v + H / 2 * a
+        q = q + H * v
+        a = -K / M * q - g * v
+        v = v + H / 2 * a
+        frames += [(q, v)] if (i + 1) % stride == 0 else []
+    q_all, v_all = np.array(frames).T
+    found = identify(H * stride * np.arange(101), q_all, v=v_all, **STATED, friction=g * M)
+    assert (found.scheme, found.fits, found.stride) == ("velocity-verlet", True, stride), found
+    assert "of the velocity half a step ago" in found.statement
+    assert found.friction[0] == pytest.approx(g, rel=1e-9)
+    blind = identify(H * stride * np.arange(101), q_all, v=v_all)
+    assert {x.scheme for x in blind.candidates} == {"velocity-verlet"}
+    v_all[0] *= 1 + 1e-9
+    wrong = identify(H * stride * np.arange(101), q_all, v=v_all, **STATED)
+    assert not wrong.fits
+    assert "frame 0 does not belong to it" in wrong.statement
+    assert "BBK" not in wrong.statement

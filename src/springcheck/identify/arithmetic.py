@@ -157,6 +157,23 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     return out
 
 
+CLOCK_ROUNDINGS = 4.0
+"""Roundings of a time by which each step may be longer or shorter than the times show: a program that steps
+to i h halves the last step, or adds one of a rounding, and its clock rounds each of them."""
+
+
+def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
+    """What is missing (c, f - 1, 2), counted in `unit`, but for what the clock's rounding of each step does
+    to it."""
+    d = 1e-6
+    change = _slipped(matches, found, d) - _slipped(matches, found, -d)
+    way = found.z[:-1].astype(np.float64) @ np.swapaxes(change.astype(np.float64) / (2 * d), 1, 2)
+    weight = way / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
+    longer = np.sum(weight * signed, axis=2) / np.maximum(np.sum(weight * way, axis=2), 1e-300)
+    room = CLOCK_ROUNDINGS * record.clock
+    return np.asarray(signed - np.clip(longer, -room, room)[:, :, None] * way)
+
+
 TOGETHER = 128
 """Matches whose defects are worked out at once, so that their arrays stay small."""
 
@@ -226,11 +243,16 @@ def _defects(
         ulp = _largest(missing, 2.0**-52 * size)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
     usual = 4 + 2 * np.sqrt(stride) * parts
-    rounded = ulp
-    if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
-        rounded = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
     # those of an uneven clock follow its times
-    plain = rounded <= np.where(follows, path, np.minimum(path, usual))
+    most_ulp = np.where(follows, path, np.minimum(path, usual))
+    rounded = ulp
+    if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
+        uneven = _stepped_to(record, found, matches, signed, size)
+        rounded = np.where(stride == 1, _largest(np.abs(uneven), 2.0**-52 * size), ulp)
+    if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
+        unlike = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
+        rounded = np.where(stride > 1, unlike, rounded)
+    plain = rounded <= most_ulp
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

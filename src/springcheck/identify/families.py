@@ -177,6 +177,8 @@ EULER, EULER_LATE, VERLET, POSITION = (
     "semi-implicit-euler", "semi-implicit-euler-drift-kick", "velocity-verlet", "position-verlet",
 )  # fmt: skip
 
+OF_HALF_A_STEP_AGO = f"{VERLET}, friction of the velocity half a step ago"
+
 DAMPED = (
     *(_of(s, damped=True) for s in _ON_A_SPRING if _is_written_out(s)),
     _placed(EULER, "after the kick", DECAY, KICK, DECAYS, DRIFT),

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import FALLS, Evidence, matched
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, title
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import distinct
+from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct
+from springcheck.identify.maps import powers, unit
+from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.text.wording import either
 
 FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""
@@ -32,6 +36,53 @@ AT_AN_END = 3
 """Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
 
 
+FEWEST_PAIRS = 8
+"""Pairs beside the bad ones from which they make one motion."""
+
+SCHEMES_SAID = 2
+"""Schemes that a sentence names of those that fit the rest of a motion."""
+
+START_OFF = 64.0
+"""Roundings that each step may leave over of a start that is predicted."""
+
+
+def remembered(
+    record: Record, moving: list[int], maps: list[Map], terms: list[Terms]
+) -> tuple[Record, list[Map], list[Joint]]:
+    """The frames but the first, their maps, and Verlet with the friction of the velocity half a step ago,
+    where it made them: its first step has none, and the force has the friction of the first velocity."""
+    if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in maps):
+        return record, maps, []
+    parts = None if record.parts is None else (record.parts[0][1:], record.parts[1][1:])
+    later = replace(
+        record, q=record.q[1:], v=record.v[1:], q_quantum=record.q_quantum[1:], parts=parts,
+        v_quantum=record.v_quantum[1:], slips=None if record.slips is None else record.slips[1:],
+    )  # fmt: skip
+    found = [fit(later, j) for j in moving]
+    joints = compare(found, terms, (FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
+    return later, found, [x for x in joints if _begins(record, moving, found, x)]
+
+
+def _first_off(found: Map) -> float:
+    """By which factor the first pair misses more than the later half of the others."""
+    off = np.max(np.abs(found.misses()), axis=1) * found.weight
+    return float(off[0] / max(np.max(off[len(off) // 2 :]), 1e-300))
+
+
+def _begins(record: Record, moving: list[int], maps: list[Map], joint: Joint) -> bool:
+    """Whether a first step with the friction of the first velocity leads to the second frame."""
+    for j, found, part in zip(moving, maps, joint.parts, strict=True):
+        a, g = np.array([part.a], np.longdouble), np.array([part.g], np.longdouble)
+        first, later = (unit(FAMILIES[name], a, g) for name in (f"{VERLET}, damped", OF_HALF_A_STEP_AGO))
+        b = powers(later[0], part.stride)[-1] @ first[0]
+        step = record.interval / part.stride
+        z = np.stack([record.q[:2, j] - found.centre[0], record.v[:2, j] * step], axis=1)
+        size = np.abs(z[0]) @ np.abs(b.T) + np.abs(z[1]) + abs(found.centre[0])
+        if np.any(np.abs(z[1] - z[0] @ b.T) > START_OFF * part.stride * ROUNDING * np.max(size)):
+            return False
+    return True
+
+
 def few_bad_frames(e: Evidence) -> list[Explanation]:
     """A motion that a few pairs of frames interrupt."""
     kept = np.ones(e.pairs, dtype=bool)
@@ -45,7 +96,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
         kept = now
         found = fit(e.record, e.j, kept=kept)
     bad = np.flatnonzero(~kept)
-    if not len(bad) or np.count_nonzero(kept) < 8:
+    if not len(bad) or np.count_nonzero(kept) < FEWEST_PAIRS:
         return []
     if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
         # what falls off from frame to frame has no few bad ones
@@ -65,7 +116,8 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if float(np.max(size[bad])) < min(2 * float(np.min(size[kept])), middle / LARGER):
         # an error of one size shows where a motion that grows or dies is smallest
         return []
-    whose = f" of {title(fitting[0].scheme)}" if fitting else _damped(found, e)
+    names = list(dict.fromkeys(title(x.scheme) for x in fitting))
+    whose = f" of {either(names)}" if 0 < len(names) <= SCHEMES_SAID else "" if fitting else _damped(found, e)
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
     ranks = np.argsort(np.argsort(size))[bad]
@@ -93,9 +145,10 @@ def _damped(found: Map, e: Evidence) -> str:
     joints = compare([found], [e.terms], distinct(damped=True), range(1, 2))
     if not joints:
         return ""
-    best = FAMILIES[min(joints, key=lambda x: x.plainness).family]
-    law = " ".join(x for x in ("with", best.laws[0], best.place) if x)
-    return f" of {title(best.scheme)} {law}"
+    every = [FAMILIES[x.family] for x in joints]
+    names = list(dict.fromkeys(title(x.scheme) for x in every))
+    law = f"{every[0].laws[0]} {every[0].place}".strip() if len(every) == 1 else "friction"
+    return f" of {either(names)} with {law}" if len(names) <= SCHEMES_SAID else " with friction"
 
 
 def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:

@@ -109,7 +109,7 @@ def of_unasked_friction(found: Identification) -> Identification:
             part = "h k/m" if n == 1 else f"h k/({n} m)"
             cause = (
                 f"{one.scheme} with a friction c/m = {rate:.6g} that was not stated and is {part}: the mark "
-                "of a scheme that is written down wrongly, or of an implicit one, and of no damper"
+                "of a scheme that is written down wrongly, or of an implicit one; state the friction if not"
             )
             wrong = Explanation(
                 cause=cause, remedy="compare the factors 1/2 of the step with the scheme's", misfit=0.0

@@ -26,6 +26,7 @@ from springcheck.identify.explain import explain
 from springcheck.identify.families import FAMILIES, HELD, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
+from springcheck.identify.interrupted import remembered
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import (
     LEAPFROG,
@@ -148,6 +149,11 @@ def _of_record(
         joints, terms = find(record, apart, base, stride)
         explained = _explained(record, moving, apart, joints, terms)
         maps = apart if explained else maps
+    if not explained:
+        later, maps_later, joints = remembered(record, moving, maps, base)
+        if explained := _explained(later, moving, maps_later, joints, base):
+            record, maps = later, maps_later
+            notes.append("the first step has the friction of the first velocity: none is half a step old")
     if not explained:
         joints = compare(maps, base, KNOWN_ELSEWHERE, FEW)
         explained = _explained(record, moving, maps, sorted(joints, key=lambda x: x.stride)[:1], base)
