@@ -15,13 +15,13 @@ BUDGETS = {
     ("thermal",): 1247,
     ("engines/own",): 1667,
     ("engines/openmm", "engines/ase", "engines/sundials"): 977,
-    ("engines",): 2291,
+    ("engines",): 2292,
     ("driver", "conformance", "doors"): 1130,
     ("checks",): 3687,
     ("identify",): 7296,
     ("formats", "store"): 4930,
     ("studies",): 1531,
-    ("studies/*",): 9496,
+    ("studies/*",): 9531,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5075,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -112,20 +112,20 @@ def held(n: float) -> Trajectory:
     ("n", "name"), [(2, "force-held-2"), (7, "force-held-7"), (np.inf, "force-held-rk4")]
 )
 def test_a_held_force_is_told_from_its_map(n: float, name: str) -> None:
-    assert census._held(load_scene("spring-uneven"), held(n)) == name
+    scene, run = load_scene("spring-uneven"), held(n)
+    assert census._name(scene, run, census._identified(scene, run)) == name
 
 
 @pytest.mark.parametrize("n", [1.5, 2.5])
 def test_a_held_force_over_no_whole_number_of_substeps_is_none(n: float) -> None:
-    assert census._held(load_scene("spring-uneven"), held(n)) == ""
+    scene, run = load_scene("spring-uneven"), held(n)
+    assert census._name(scene, run, census._identified(scene, run)) == "none that is known"
 
 
 def test_states_of_another_scheme_are_no_held_force() -> None:
     scene = load_scene("spring-uneven")
     for label in ("own:implicit-euler", "own:semi-implicit-euler"):
-        found = census._held(scene, driver.run(scene, label))
-        assert found in ("", "force-held-1")
-        assert not found
+        assert census._held(scene, census._identified(scene, driver.run(scene, label))) == ""
 
 
 def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify
+from springcheck.identify.families import FAMILIES
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
@@ -182,27 +183,18 @@ def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
         return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))
-    return _held(scene, run) or "none that is known"
+    return _held(scene, found) or "none that is known"
 
 
-def _held(scene: Scene, run: Trajectory) -> str:
-    """A force held over n substeps, whose map [[1 - g a, h/m], [-h k, 1]] has g = (n + 1)/2n, or ""."""
+def _held(scene: Scene, found: Identification | None) -> str:
+    """A force held over n substeps, whose map has the determinant 1 + a (n - 1)/2n, a = h**2 k/m; or ""."""
     m, k = _spring(scene)
-    h, found = scene.step, _map(run)
-    a = h * h * k / m
-    g = (1 - found[0, 0]) / a
-    expected = np.array([[1 - g * a, h / m], [-h * k, 1.0]])
-    scale = np.array([[1, 1 / np.sqrt(m * k)], [np.sqrt(m * k), 1]])
-    # 200 states of a motion of size 1: the fit of their map is good to some hundred roundings
-    error = max(1e-12, 100 * run.arithmetic.state)
-    off = max(1e-10, error / a)
-    if np.any(np.abs(found - expected) > error * scale) or not g + off >= 0.5:
-        return ""
-    if abs(g - 0.5) < off:
-        return "force-held-rk4"
-    n = 1 / (2 * g - 1)
-    whole, doubt = round(n), max(1e-8, 2 * off) * n * n
-    return f"force-held-{whole}" if 2 <= whole <= MOST_SUBSTEPS and abs(n - whole) < min(doubt, 0.2) else ""
+    if found is not None and found.scheme == "held-force":
+        n = 1 / (1 - 2 * (found.determinant[0] - 1) * m / (scene.step**2 * k))
+        return f"force-held-{round(n)}" if 2 <= round(n) <= MOST_SUBSTEPS else ""
+    # over no end of substeps, as RK4 does of a force that is set before the step
+    endless = found is not None and found.statement == FAMILIES["fault: old force"].cause
+    return "force-held-rk4" if endless else ""
 
 
 def _agrees(scene: Scene, claimed: str, found: str) -> bool:

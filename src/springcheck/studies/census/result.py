@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,17 @@ class Entry:
     """The least h omega at which the measured map grows; 0: it always does; NaN: not known, or adaptive."""
     bounded: bool
     """Whether no map up to h omega = 4 grows; `limit` is infinity then."""
+    thermostat: str = ""
+    """The heat bath that is on, as its scheme's title; "" where none is."""
+    constraint: str = ""
+    """What is held rigid, and by which algorithm; "" where nothing is."""
+    configurational: float = nan
+    """k <x**2>/kT where a thermostat is on."""
+    configurational_error: float = nan
+    """Its standard error."""
+    kinetic: float = nan
+    """m <v**2>/kT where a thermostat is on."""
+    kinetic_error: float = nan
     amplitude: float
     """Of the blog's spring after its 200 steps; 1 is exact."""
     force_calls: float

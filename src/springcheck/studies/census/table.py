@@ -20,6 +20,8 @@ COLUMNS = {
     "method": "engine and attachment",
     "about": "what is called",
     "version": "version",
+    "thermostat": "thermostat",
+    "constraint": "constraint",
     "scheme": "scheme, from the states",
     "velocity": "stored velocity",
     "substeps": "steps inside",
@@ -28,12 +30,25 @@ COLUMNS = {
     "precision": "arithmetic",
     "limit": "first limit, h omega",
     "amplitude": "amplitude of the blog's spring (exact: 1)",
+    "configurational": "configurational temperature, k<x2>/kT",
+    "kinetic": "kinetic temperature, m<v2>/kT",
     "forces": "forces a step",
     "note": "note",
     "command": "command that makes the row",
 }
 
-WATCHED = ("scheme", "velocity", "substeps", "friction", "det", "precision", "limit", "amplitude")
+WATCHED = (
+    "thermostat",
+    "constraint",
+    "scheme",
+    "velocity",
+    "substeps",
+    "friction",
+    "det",
+    "precision",
+    "limit",
+    "amplitude",
+)
 """Columns of which a change is said; versions are named beside it."""
 
 MARK = '<meta name="generator" content="springcheck census">'
@@ -81,6 +96,8 @@ def _row(x: Row) -> dict[str, str]:
         "method": x["method"],
         "about": x.get("about", ""),
         "version": x["version"],
+        "thermostat": x.get("thermostat") or "none",
+        "constraint": x.get("constraint") or "none",
         "scheme": " or ".join(schemes.title(name) for name in x["found"].split(" or "))
         if named
         else x["found"],
@@ -91,6 +108,8 @@ def _row(x: Row) -> dict[str, str]:
         "precision": x["precision"],
         "limit": limit,
         "amplitude": f"{x['amplitude']:.4f}",
+        "configurational": _share(x, "configurational"),
+        "kinetic": _share(x, "kinetic"),
         "forces": f"{x['force_calls']:.3g}",
         "note": "; ".join(filter(None, (x.get("note", ""), "" if x["agrees"] else "DECLARED OTHERWISE"))),
         "command": x.get("command", f"springcheck census --method {x['method']}"),
@@ -99,6 +118,18 @@ def _row(x: Row) -> dict[str, str]:
 
 def _number(x: float | None, least: float) -> str:
     return "-" if x is None else "0" if abs(x) < least else f"{x:+.3g}"
+
+
+def _share(x: Row, name: str) -> str:
+    """A temperature of the bath's and its standard error."""
+    value, error = x.get(name), x.get(f"{name}_error")
+    return "-" if value is None else f"{value:.4f}" if error is None else f"{value:.4f} +- {error:.1g}"
+
+
+def engine(row: Mapping[str, str]) -> str:
+    """The engine of a row: of a program what its version names first."""
+    name = row["method"].partition(":")[0]
+    return row["version"].split(" ")[0].lower() if name == "command" else name
 
 
 def as_csv(found: Sequence[Mapping[str, str]]) -> str:
@@ -114,7 +145,7 @@ def as_csv(found: Sequence[Mapping[str, str]]) -> str:
 
 def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, Any]]) -> str:
     """The page: a table to filter and sort; CSV and JSON are in it."""
-    engines = {row["method"].partition(":")[0] for row in found}
+    engines = set(map(engine, found))
     shown = {"CSV": ("text/csv", as_csv(found)), "JSON": ("application/json", json.dumps(list(documents)))}
     links = " ".join(
         f'<a download="engines.{name.lower()}" href="data:{kind};base64,'
