@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, schemes
+from springcheck import checks, engines, schemes
+from springcheck.doors import function
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Drive, ModulatedSpring, Spring, Term, WallSpring
+from springcheck.studies.faults import drives, measure, steppers, table
 
 ONE = np.array([0])
 SCENES = ("driven-spring", "mathieu-stable", "mathieu-tongue")
@@ -184,3 +186,85 @@ def test_a_scene_file_of_a_drive_reads_back_the_same() -> None:
 def test_a_drive_needs_finite_numbers() -> None:
     with pytest.raises(SceneError, match="frequency"):
         driven(3.7, 2.9, 0.0, (0.43, float("nan"), 0.0))
+
+
+def sentence(scene: Scene, run: Any) -> str:
+    """Why the states fail, with what they show."""
+    verdicts = checks.explained(scene, run, checks.judge(scene, run), lambda *_: "")
+    assert [v.check for v in verdicts if v.passed is False][:1] == ["step-defect"]
+    return next(v.why for v in verdicts if v.passed is False)
+
+
+MISPLACED = {
+    "late-drive": "of a step later than velocity Verlet takes it",
+    "held-drive": "held over it, where velocity Verlet takes it at the start and the end",
+    "drive-of-the-step-before": "the start of the step before and the start of the step where velocity",
+    "drive-phase": "the phase of the drive has the wrong sign",
+    "drive-over-mass": "the amplitude of the drive is divided by the mass",
+    "drive-in-degrees": "the phase of the drive is taken for degrees",
+    "drive-in-cycles": "the angular frequency of the drive is taken for cycles",
+}
+
+
+@pytest.mark.parametrize("fault", table.DRIVES, ids=lambda fault: fault.name)
+def test_a_drive_that_is_wrong_is_rejected_and_named(fault: Any) -> None:
+    scene = measure.scene(fault.scene)
+    assert MISPLACED[fault.name] in sentence(scene, fault.run(scene))
+
+
+@pytest.mark.parametrize(
+    ("scheme", "other", "said"),
+    [
+        ("semi-implicit-euler", "semi-implicit-euler-drift-kick", ""),
+        ("explicit-euler", "implicit-euler", ""),
+        ("semi-implicit-euler", "late", "the end of the step where semi-implicit Euler, kick-drift takes it"),
+    ],
+)
+def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, said: str) -> None:
+    scene = replace(scenes.load_scene("driven-spring"), steps=60)
+    law = schemes.SCHEMES[scheme]
+    if other == "late":
+        run = steppers.record(scene, law, drives.late(scene, law, 1.0))
+    else:
+        run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
+    why = sentence(scene, run)
+    assert (said in why) if said else ("What the states show: the drive" not in why)
+
+
+@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
+def test_a_modulation_at_the_wrong_time_is_named_too(name: str) -> None:
+    scene = replace(scenes.load_scene(name), steps=60)
+    law = schemes.SCHEMES["rk4"]
+    assert "the start of the step, held over it" in sentence(
+        scene, steppers.record(scene, law, drives.held(scene, law, 0.0))
+    )
+
+
+def ours(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any]:
+    p = p + h / 2 * force(q, p)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q, p, force.t + h)
+
+
+def forgetful(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any]:
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def test_a_function_is_told_the_time_and_judged_by_where_it_takes_it() -> None:
+    scene = replace(scenes.load_scene("mathieu-stable"), steps=60)
+    engines.bring(function.engine([f"{__name__}:ours", f"{__name__}:forgetful"]), "here")
+    right, wrong = (springcheck.simulate(scene, f"stepper:{name}") for name in ("ours", "forgetful"))
+    assert right.scheme == wrong.scheme == "velocity-verlet"
+    assert not [v for v in checks.judge(scene, right) if v.passed is False]
+    assert "the start of the step, held over it" in sentence(scene, wrong)
+
+
+@pytest.mark.parametrize("label", ["scipy:radau", "scipy:dop853", "sundials:adams", "sundials:bdf"])
+@pytest.mark.parametrize("name", SCENES)
+def test_solvers_with_a_time_of_their_own_keep_their_tolerance(name: str, label: str, need: Any) -> None:
+    need(label)
+    scene = replace(scenes.load_scene(name), steps=100, tolerance=1e-9)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert found["tolerance"].passed is True

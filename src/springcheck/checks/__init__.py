@@ -22,7 +22,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.checks import check, experiments, laws, thermal
+from springcheck.checks import check, driven, experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import shared
@@ -138,7 +138,8 @@ def explained(
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
         return list(verdicts)
-    said = shown(scene, run, first_off(Case(trajectory=run, scene=scene)) or 0)
+    case = Case(trajectory=run, scene=scene)
+    said = driven.found(case) or shown(scene, run, first_off(case) or 0)
     why = f"{first.why}. What the states show: {said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, schemes
-from springcheck.engines import EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
+from springcheck.engines import DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper
 from springcheck.physics.arrays import Floats
+from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme
 
@@ -102,7 +103,7 @@ def engine(specs: Sequence[str], stated: Callable[[str], str] = lambda name: "")
         scheme = stated(name)
         known = schemes.scheme(scheme).name if scheme else _identified(function)
         about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
-        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE)
+        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE | DRIVEN)
     return Engine(
         name="stepper",
         title=f"the function {specs[0]}" if len(specs) == 1 else "functions",
@@ -149,22 +150,37 @@ def _file(function: Callable[..., Any]) -> str:
         return ""
 
 
+class _Pull:
+    """What a function is given as `force`: force(q, p, t), the last two left out where they are not needed.
+
+    `t` is the time at which the step starts, at which the force is taken unless the function says a time.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.calls, self.t = 0, 0.0
+        self._total, _ = timed(scene)
+
+    def __call__(self, q: Any, p: Any = None, t: float | None = None) -> Any:
+        self.calls += 1
+        here = np.atleast_1d(np.asarray(q, np.float64))
+        there = np.zeros_like(here) if p is None else np.atleast_1d(np.asarray(p, np.float64))
+        found = self._total(self.t if t is None else t, here, there)
+        return float(found[0]) if np.ndim(q) == 0 else found
+
+
 class _Steps:
     """The function, step by step: with numbers for one particle, or with arrays where it wants them."""
 
     def __init__(self, function: Callable[..., Any], scene: Scene, step: float, where: str) -> None:
-        self.force_calls = 0
         self._function, self._h, self._where = function, step, where
         self._q, self._p, self._m = scene.q.copy(), scene.p.copy(), scene.m
         self._n, self._arrays = scene.n, scene.n > 1
-        self._total = scene.system.force
+        self._force, self._done = _Pull(scene), 0
 
-    def _force(self, q: Any, p: Any = None) -> Any:
-        self.force_calls += 1
-        here = np.atleast_1d(np.asarray(q, np.float64))
-        there = np.zeros_like(here) if p is None else np.atleast_1d(np.asarray(p, np.float64))
-        found = self._total(here, there)
-        return float(found[0]) if np.ndim(q) == 0 else found
+    @property
+    def force_calls(self) -> int:
+        """Calls of the force by the function."""
+        return self._force.calls
 
     def _call(self, arrays: bool) -> tuple[Floats, Floats]:
         if arrays:
@@ -207,6 +223,8 @@ class _Steps:
         with np.errstate(all="ignore"):
             for row in range(len(q)):
                 for _ in range(every):
+                    self._force.t = self._done * self._h
+                    self._done += 1
                     try:
                         self._q, self._p = self._step()
                     except OverflowError as error:

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
+    DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
     Engine,
@@ -43,9 +44,9 @@ from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 
 __all__ = [
-    "ANY_POTENTIAL", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label", "Method",
-    "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file", "guarded",
-    "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
+    "ANY_POTENTIAL", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label",
+    "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
+    "guarded", "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
     "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable",
 ]  # fmt: skip
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.engines.contract import (
+    DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
     Engine,
@@ -22,6 +23,7 @@ from springcheck.engines.contract import (
     version_of,
 )
 from springcheck.physics.arrays import Floats
+from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import Scheme, solver
 
@@ -41,10 +43,11 @@ class _Solver:
         self.force_calls = 0
         self._n, self._h, self._done = scene.n, step, 0
         n, m, system = scene.n, scene.m, scene.system
+        force, jacobian = timed(scene)
 
         def slope(t: float, y: Floats) -> Floats:
             self.force_calls += 1
-            return np.concatenate([y[n:] / m, system.force(y[:n], y[n:])])
+            return np.concatenate([y[n:] / m, force(t, y[:n], y[n:])])
 
         sizes = np.concatenate(system.amplitudes)
         options: dict[str, Any] = {
@@ -52,7 +55,7 @@ class _Solver:
             "atol": scene.tolerance * np.where(sizes > 0, sizes, 1.0),
         }
         if name in ("Radau", "BDF", "LSODA"):
-            options["jac"] = lambda t, y: system.jacobian(y[:n])
+            options["jac"] = lambda t, y: jacobian(t, y[:n])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self._solver = getattr(integrate, name)(
@@ -104,7 +107,7 @@ ENGINE = Engine(
                 name,
                 f"scipy-{name}",
                 f"scipy.integrate.{solver}, as solve_ivp steps it",
-                EVERY_FORCE,
+                EVERY_FORCE | DRIVEN,
                 adaptive=True,
                 kinds=EVERY_KIND,
             )

@@ -31,10 +31,23 @@ WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
 
 
+class _Timeless:
+    """A force that may be asked for at a time, of which it knows nothing."""
+
+    t = 0.0
+
+    def __init__(self, law: Callable[..., Any]) -> None:
+        self._law = law
+
+    def __call__(self, q: Any, p: Any = 0.0, t: float = 0.0) -> Any:
+        return self._law(q, p)
+
+
 def _one(
     step: Stepper, q: float, p: float, h: float, force: Callable[..., Any], mass: float
 ) -> tuple[float, float]:
     """One step of the student's; numbers first, arrays of one particle where it wants to index them."""
+    force = _Timeless(force)
     try:
         try:
             out = step(q, p, h, force, mass)
@@ -78,7 +91,8 @@ def identify_stepper(step: Stepper) -> Identification:
 
     It is driven over three springs of uneven mass, stiffness and step, backwards in time, and over an
     anharmonic well, where the order of a scheme shows that on a spring can look higher than it is.
-    ``force`` may be called as force(q) or force(q, p).  The numbers are those of the first spring.
+    ``force`` may be called as force(q), force(q, p) or force(q, p, t), and knows the time at which the step
+    starts as ``force.t``.  The numbers are those of the first spring.
 
     Raises MethodError where the callable fails or returns no pair of finite numbers.
     """

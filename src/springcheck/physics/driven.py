@@ -8,6 +8,7 @@ VIII.2.1, the extended phase space).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -134,3 +135,18 @@ def with_clock(scene: Any) -> Any:
     terms = tuple(replace(term, clock=True) if isinstance(term, _Driven) else term for term in scene.terms)
     places = None if scene.places is None else np.append(scene.places, 3 * scene.particles)
     return scene.derived(q=q, p=p, m=m, terms=terms, places=places)
+
+
+def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], Callable[[float, Floats], Floats]]:
+    """What a solver with a time of its own asks for: the force (t, q, p) -> (n,) [M L/T2], and (t, q) -> the
+    derivatives (2n, 2n) of (p/m, force) by (q, p)."""
+    system, n = scene.system, scene.n
+    if not system.is_driven:
+        return lambda t, q, p: system.force(q, p), lambda t, q: system.jacobian(q)
+    clocked = system.clocked.system
+    kept = np.append(np.arange(n), np.arange(n + 1, 2 * n + 1))
+
+    def force(t: float, q: Floats, p: Floats) -> Floats:
+        return np.asarray(clocked.force(np.append(q, t), np.append(p, CLOCK))[:n], np.float64)
+
+    return force, lambda t, q: clocked.jacobian(np.append(q, t))[np.ix_(kept, kept)]

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_FORCE, EVERY_KIND, SPRINGS, Engine, by_default, deferred, named
+from springcheck.engines.contract import (
+    DRIVEN,
+    EVERY_FORCE,
+    EVERY_KIND,
+    SPRINGS,
+    Engine,
+    by_default,
+    deferred,
+    named,
+)
 
+_TERMS = EVERY_FORCE | DRIVEN
 _SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 
 ENGINE = Engine(
@@ -12,10 +22,8 @@ ENGINE = Engine(
     distribution="scikit-sundae",
     module="sksundae",
     methods=named(
-        by_default("adams", "adams", "CVODE, Adams-Moulton of orders 1 to 12", EVERY_FORCE, **_SOLVER),
-        by_default(
-            "bdf", "bdf", "CVODE, backward differentiation of orders 1 to 5", EVERY_FORCE, **_SOLVER
-        ),
+        by_default("adams", "adams", "CVODE, Adams-Moulton of orders 1 to 12", _TERMS, **_SOLVER),
+        by_default("bdf", "bdf", "CVODE, backward differentiation of orders 1 to 5", _TERMS, **_SOLVER),
         by_default(
             "ida", "ida", "IDA: Kirchhoff's laws as they stand, unsolved for the currents",
             SPRINGS | {"damping"}, adaptive=True, kinds=frozenset({"circuit"}),

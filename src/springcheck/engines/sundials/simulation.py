@@ -19,6 +19,7 @@ from springcheck.engines.contract import Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
+from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 
 KINDS = {"adams": "Adams", "bdf": "BDF", "ida": "IDA"}
@@ -153,7 +154,7 @@ class _Solver:
         self.asked: set[float] | None = None
         """Times at which the force was asked for, where somebody counts them."""
         n, m = scene.n, scene.m
-        force = scene.system.force
+        force, slopes = timed(scene)
         as_matrix = _suits_matrix(scene)
         slope, pull = _matrix(scene) if as_matrix else (np.empty(0), np.empty(0))
         pulled = bool(np.any(pull))
@@ -162,7 +163,7 @@ class _Solver:
             self._called(t)
             q, p = y[:n], y[n:]
             yp[:n] = p / m
-            yp[n:] = force(q, p)
+            yp[n:] = force(t, q, p)
 
         def by_matrix(t: float, y: Floats, yp: Floats) -> None:
             self._called(t)
@@ -171,7 +172,7 @@ class _Solver:
                 np.add(yp, pull, out=yp)
 
         def jacobian(t: float, y: Floats, yp: Floats, jacobian: Floats) -> None:
-            jacobian[:] = slope if as_matrix else scene.system.jacobian(y[:n])
+            jacobian[:] = slope if as_matrix else slopes(t, y[:n])
 
         self._n, self._step, self._done = n, step, 0
         atol = absolute_tolerance(scene)

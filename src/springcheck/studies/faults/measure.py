@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -15,7 +16,7 @@ from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring
+from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies import team as teams
@@ -48,6 +49,12 @@ def scene(where: Where) -> Scene:
     if where == "orbit":
         q, p = [0.3, -0.5, 0.8], [0.7, 1.1, -0.4]
         return spring(m=3.7, k=2.9, q=q, p=p, places=np.arange(3), name=where, title="")
+    if where == "driven":
+        drive = Drive(
+            i=np.array([0]), amplitude=0.43 * np.ones(1), frequency=0.87 * np.ones(1), phase=0.6 * np.ones(1)
+        )
+        alone = spring(m=3.7, k=2.9, q=0.3, p=0.7, c=0.11, step=0.1, steps=200, name=where, title="")
+        return replace(alone, terms=(*alone.terms, drive))
     if where in ("bath", "wide bath"):
         return baths.springs({"bath": 40, "wide bath": 250}[where], name=where)
     steps = 2100 if where == "long spring" else 200

@@ -21,8 +21,15 @@ Step: TypeAlias = Callable[[int, Floats, Floats], State]
 """(number of the step from 0, q, p) -> the next (q, p)."""
 
 
-def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None) -> Step:
-    """The scheme's own step in double precision, with the scene's force or another."""
+Clock: TypeAlias = Callable[[int], tuple[float, float]]
+"""Number of a step from 0 -> the time at which it starts, and by how much that moves on a unit of time."""
+
+
+def textbook(
+    scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None, clock: Clock | None = None
+) -> Step:
+    """The scheme's own step in double precision, with the scene's force or another; a clock for a drive."""
+    n, scene = scene.n, scene.system.clocked
     pull = force or scene.system.force
     m, h = scene.m, scene.step
     stiff: Reals | Slope | None = None
@@ -34,8 +41,11 @@ def textbook(scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None
     rate = scene.system.friction_rates if scene.system.is_damped else None
 
     def one(i: int, q: Floats, p: Floats) -> State:
+        if len(m) > n:
+            time, pace = clock(i) if clock else (i * h, 1.0)
+            q, p = np.append(q, time), np.append(p, pace * scene.p[n])
         a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate)
-        return np.asarray(a, np.float64), np.asarray(b, np.float64)
+        return np.asarray(a[:n], np.float64), np.asarray(b[:n], np.float64)
 
     return one
 

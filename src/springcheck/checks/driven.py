@@ -1,0 +1,145 @@
+"""What the states of a driven scene show where they are not those of its scheme: the time, or the drive.
+
+Each hypothesis is the scheme's own step with another clock, or another drive; the one that leaves no more
+than rounding is what happened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from springcheck.checks.case import Case
+from springcheck.checks.requires import MAP, missing
+from springcheck.physics.arrays import Extended, Reals
+from springcheck.physics.driven import CLOCK
+from springcheck.physics.scene import Scene
+
+PARTS = {-1.0: "the start of the step before", 0.0: "the start", 0.5: "the middle", 1.0: "the end",
+         2.0: "the end of the next step"}  # fmt: skip
+"""Places within a step, in words."""
+
+SLACK = 4.0
+"""Bounds that a right hypothesis stays within: allowances are those of the scheme's own states."""
+
+NEWTON_STEPS = 4
+"""Newton steps of the search for a time: the force is linear in a small shift but for its curvature."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Clock:
+    """Where in a step the time is taken: later by a part of it, and held over the stages, or not."""
+
+    later: float = 0.0
+    held: bool = False
+
+
+def found(case: Case) -> str:
+    """In one sentence, or "" where nothing here is what happened or no force depends on the time."""
+    if not case.scene.system.is_driven or missing(case, MAP) or case.trajectory.every > 1:
+        return ""
+    case = case.clocked
+    title, right = case.scheme.title, _abscissae(case)
+    for clock in (*(_Clock(later=s) for s in (-1.0, -0.5, 0.5, 1.0)),
+                  *(_Clock(later=s, held=True) for s in (0.0, 0.5, 1.0))):  # fmt: skip
+        taken = {clock.later} if clock.held else {c + clock.later for c in right}
+        if taken != right and _fits(case, clock):
+            held = ", held over it," if clock.held and len(right) > 1 else ""
+            return (
+                f"the drive is taken at {_words(taken)} of the step{held} where {title} takes it at "
+                f"{_words(right)}"
+            )
+    for words, scene in _other_drives(case.scene):
+        if _fits(replace(case, scene=scene), _Clock()):
+            return words
+    later = _later(case)
+    if later and _fits(case, _Clock(later=later)):
+        return f"the drive is taken {later:.6g} of a step later than {title} takes it"
+    return ""
+
+
+def _words(places: set[float]) -> str:
+    return " and ".join(PARTS.get(c, f"{c:g}") for c in sorted(places))
+
+
+def _abscissae(case: Case) -> set[float]:
+    """Where within its step, from 0 to 1, the scheme evaluates the force."""
+    met: list[Reals] = []
+    start = (x[:1].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
+    case.step(*start, met=met)
+    first = float(case.trajectory.q[0, -1])
+    return {round((float(at[0, -1]) - first) / case.trajectory.step, 6) + 0.0 for at in met}
+
+
+def _off(case: Case, clock: _Clock) -> Extended:
+    """How far the particles are from the scheme's step by this clock (2, f-1, n)."""
+    run = case.trajectory
+    q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
+    q[:, -1] += clock.later * np.longdouble(run.step)
+    p[:, -1] = 0 if clock.held else CLOCK
+    off = np.stack(case.step(q, p)) - np.stack([run.q[1:], run.p[1:]])
+    return np.asarray(off[..., :-1])
+
+
+def _fits(case: Case, clock: _Clock) -> bool:
+    allowed = np.stack(case.allowance)[..., :-1] * case.roundings * SLACK
+    with np.errstate(all="ignore"):
+        return bool(np.all(np.abs(_off(case, clock)) <= allowed))
+
+
+def _later(case: Case) -> float:
+    """By which part of a step the time is taken later, by least squares in units of the allowance."""
+    unit, later, change = np.stack(case.allowance)[..., :-1], 0.0, 1e-6
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_STEPS):
+            off = _off(case, _Clock(later=later)) / unit
+            slope = (_off(case, _Clock(later=later + change)) / unit - off) / change
+            move = float(np.sum(off * slope) / np.sum(slope * slope))
+            if not np.isfinite(move):
+                return 0.0
+            later -= move
+    return later
+
+
+def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Scenes with another drive, and what that is."""
+    m = scene.m
+    changes: tuple[tuple[str, Any], ...] = (
+        ("the drive does not act", lambda x: {"amplitude": 0 * x.amplitude}),
+        ("the phase of the drive has the wrong sign", lambda x: {"phase": -x.phase}),
+        ("the phase of the drive is left out", lambda x: {"phase": 0 * x.phase}),
+        ("the drive has the wrong sign", lambda x: {"phase": x.phase + np.pi}),
+        ("the drive goes by the sine, not by the cosine", lambda x: {"phase": x.phase - np.pi / 2}),
+        ("the phase of the drive is taken for degrees", lambda x: {"phase": x.phase * np.pi / 180}),
+        ("the angular frequency of the drive is taken for cycles in a unit of time",
+         lambda x: {"frequency": 2 * np.pi * x.frequency}),
+        ("the angular frequency of the drive is divided by 2 pi, as if it were cycles in a unit of time",
+         lambda x: {"frequency": x.frequency / (2 * np.pi)}),
+        ("the amplitude of the drive is divided by the mass", lambda x: {"amplitude": x.amplitude / m[x.i]}),
+        ("the amplitude of the drive is multiplied by the mass",
+         lambda x: {"amplitude": x.amplitude * m[x.i]}),
+        ("the drive has twice its amplitude", lambda x: {"amplitude": 2 * x.amplitude}),
+        ("the drive has half of its amplitude", lambda x: {"amplitude": x.amplitude / 2}),
+    )  # fmt: skip
+    for words, change in changes:
+        terms = []
+        for term in scene.terms:
+            given: Any = term
+            if term.kind == "drive":
+                known = {c.field for c in term.columns}
+                # what is the amplitude of a force is the depth of a modulation
+                like = given if "amplitude" in known else _Deep(given)
+                new = {("depth" if x not in known else x): y for x, y in change(like).items()}
+                given = replace(given, **new)
+            terms.append(given)
+        yield words, scene.derived(terms=tuple(terms))
+
+
+class _Deep:
+    """A modulated spring with its depth for an amplitude."""
+
+    def __init__(self, term: Any) -> None:
+        self.i, self.phase, self.frequency, self.amplitude = term.i, term.phase, term.frequency, term.depth
