@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2296,
     ("driver", "conformance", "doors"): 1148,
     ("checks",): 3833,
-    ("identify",): 7310,
+    ("identify",): 7339,
     ("formats", "store"): 4930,
     ("studies",): 1531,
     ("studies/*",): 9596,

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.noise import Noise
@@ -39,6 +40,10 @@ LEAST_LEFT = 1 / 16
 """Of the rounding of a state, what one step leaves over at least in the mean square: numbers that happen to
 be exact leave less, and say no more."""
 
+ENOUGH = 8
+"""Residuals to spare from which what they leave over shows how large it is; fewer may be small by chance, and
+count as no smaller than a rounding by that share."""
+
 LEAST_NOISE = 1e-30
 """Share of the largest noise that a pair counts with at least."""
 
@@ -48,6 +53,9 @@ mistake."""
 
 KURTOSIS = 0.8
 """Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
+
+CHANCE = 1e-6
+"""Of a constant that is none."""
 
 ERRORS = 5.0
 """Standard errors that chance does not exceed: 6e-7."""
@@ -286,7 +294,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
         once = True if odds > CERTAIN and best.chi2 <= expected else False if odds < -CERTAIN else None
         if best.chi2 > expected:
             best = other
-    scale = max(best.chi2 / max(freedom, 1), LEAST_LEFT if record.fine else 1.0)
+    scale = max(best.chi2 / max(freedom, 1), _least(freedom) if record.fine else 1.0)
     covariance = best.inverse[:4, :4] * scale
     if not record.fine:
         covariance = covariance * repeats(z)
@@ -310,6 +318,11 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     )  # fmt: skip
 
 
+def _least(freedom: int) -> float:
+    """What so many residuals to spare leave over at least in the mean square, in squares of a rounding."""
+    return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
+
+
 def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
     """Sizes (f - 1,) that the rounding of each pair is relative to."""
     away = np.sqrt(np.sum((z - centre).astype(np.float64) ** 2, axis=1))
@@ -326,11 +339,14 @@ def _constant_part(
     """The plainest of no constant, an equilibrium and any constant that explains the states, and the clock's
     slips where steps follow them."""
     numbers, slips, centred = 2 * len(process), None, 0
-    least = LEAST_LEFT if record.fine else 1.0
+    least = _least(numbers - 6) if record.fine else 1.0
 
     def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
         """Whether unknowns more remove so much of chi-squared; by chance each removes 1."""
-        return old.cost - new.cost > least_gain * max(new.chi2 / max(numbers - 6, 1), least)
+        spare = max(numbers - 6, 1)
+        # a few residuals are small by chance: Fisher's F, of one unknown more
+        least_gain = max(least_gain, float(fdtri(1, spare, 1 - CHANCE)))
+        return old.cost - new.cost > least_gain * max(new.chi2 / spare, least)
 
     best = _minimum(z, sigma, process, start, 0, None)
     if record.slips is not None and numbers > 20:
