@@ -268,3 +268,76 @@ def test_solvers_with_a_time_of_their_own_keep_their_tolerance(name: str, label:
     scene = replace(scenes.load_scene(name), steps=100, tolerance=1e-9)
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert found["tolerance"].passed is True
+
+
+def uneven() -> Scene:
+    """Two masses on springs, driven at two frequencies, the second at another distance from the wall."""
+    return Scene(
+        m=[3.7, 1.7], q=[0.3, 1.3], p=[0.7, -0.7], step=0.1, steps=120, every=3,
+        terms=(WallSpring(i=ONE, k=2.9, at=0.2), Spring(a=[0], b=[1], k=[1.9], rest=[0.9]),
+               Drive(i=[1, 0], amplitude=[0.43, 0.23], frequency=[0.87, 1.87], phase=[0.6, -0.3])),
+    )  # fmt: skip
+
+
+MODULATED = ("openmm:verlet", "openmm:leapfrog", "openmm:euler", "openmm:semi-implicit-euler",
+             "openmm:nose-hoover", "lammps:external")  # fmt: skip
+
+
+@pytest.mark.parametrize("label", [*MODULATED, "lammps:bond"])
+@pytest.mark.parametrize("step", [0.1, -0.07])
+def test_engines_take_drives_where_their_schemes_do(label: str, step: float, need: Any) -> None:
+    need(label)
+    scene = replace(uneven(), step=step)
+    verdicts = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert verdicts["step-defect"].passed is True
+    assert not [v.check for v in verdicts.values() if v.passed is False]
+
+
+@pytest.mark.parametrize("label", MODULATED)
+def test_engines_take_modulations_where_their_schemes_do(label: str, need: Any) -> None:
+    need(label)
+    scene = replace(scenes.load_scene("mathieu-tongue"), steps=60)
+    assert not [v for v in checks.judge(scene, springcheck.simulate(scene, label)) if v.passed is False]
+
+
+def test_a_driven_particle_with_friction_is_moved_by_langevin_dynamics_at_no_temperature(need: Any) -> None:
+    need("openmm:langevin-middle")
+    scene = replace(scenes.load_scene("driven-spring"), steps=60)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, "openmm:langevin-middle"))}
+    assert found["step-defect"].passed is True
+
+
+def test_openmm_with_its_time_held_over_a_step_of_four_stages_is_told(need: Any) -> None:
+    """RK4 of a CustomIntegrator whose global parameter is set from outside, before each step."""
+    need("openmm:verlet")
+    mm = pytest.importorskip("openmm")
+    scene = driven(3.7, 2.9, 0.0, (0.43, 0.87, 0.6), steps=40)
+    system, h = mm.System(), scene.step
+    system.addParticle(3.7)
+    force = mm.CustomExternalForce("0.5*2.9*x^2-0.43*cos(0.87*time+0.6)*x")
+    force.addGlobalParameter("time", 0.0)
+    force.addParticle(0, [])
+    system.addForce(force)
+    rk4 = mm.CustomIntegrator(h)
+    for name in ("x0", "v0", "k1", "k2", "k3", "l1", "l2", "l3"):
+        rk4.addPerDofVariable(name, 0)
+    for name, what in (
+        ("x0", "x"), ("v0", "v"), ("k1", "v"), ("l1", "f/m"), ("x", "x0+dt/2*k1"), ("k2", "v0+dt/2*l1"),
+        ("l2", "f/m"), ("x", "x0+dt/2*k2"), ("k3", "v0+dt/2*l2"), ("l3", "f/m"), ("x", "x0+dt*k3"),
+        ("v", "v0+dt*(l1+2*l2+2*l3+f/m)/6"), ("x", "x0+dt*(k1+2*k2+2*k3+v0+dt*l3)/6"),
+    ):  # fmt: skip
+        rk4.addComputePerDof(name, what)
+    context = mm.Context(system, rk4, mm.Platform.getPlatformByName("Reference"))
+    context.setPositions([[0.3, 0, 0]])
+    context.setVelocities([[0.7 / 3.7, 0, 0]])
+    states = [(0.3, 0.7)]
+    for i in range(scene.steps):
+        context.setParameter("time", i * h)
+        rk4.step(1)
+        state = context.getState(positions=True, velocities=True)
+        states.append((state.getPositions()[0][0]._value, 3.7 * state.getVelocities()[0][0]._value))
+    q, p = np.array(states).T[:, :, None]
+    run = steppers.trajectory(scene, schemes.SCHEMES["rk4"], q, p)
+    assert "the start of the step, held over it, where classical Runge-Kutta (RK4) takes it at" in sentence(
+        scene, run
+    )

@@ -18,6 +18,7 @@ import numpy as np
 
 from springcheck.engines import bonds
 from springcheck.engines.contract import (
+    DRIVEN,
     EVERY_POTENTIAL,
     SPRINGS,
     Engine,
@@ -31,6 +32,7 @@ from springcheck.engines.contract import (
 )
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
+from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
@@ -100,9 +102,14 @@ class _Run:
         self._each = {"external": 0, "respa": INNER}.get(method.name, 1)
         x = self._build(scene, method.name)
         if ours:
-            self._pull(scene)
+            self._pull(scene, step)
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
-        for line in (*moved, f"timestep {step!r}", "thermo_modify lost ignore"):
+        for line in (
+            *moved,
+            *(() if ours else _drives(scene, step)),
+            f"timestep {step!r}",
+            "thermo_modify lost ignore",
+        ):
             self._lammps.command(line)
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
@@ -158,13 +165,13 @@ class _Run:
             command(f"fix bond{number} all restrain bond {a + 1} {b + 1} {0.5 * k!r} {0.5 * k!r} {rest!r}")
         return np.asarray(x)
 
-    def _pull(self, scene: Scene) -> None:
-        where, force = scene.where, scene.system.force
+    def _pull(self, scene: Scene, h: float) -> None:
+        where, (force, _) = scene.where, timed(scene)
         still = np.zeros(scene.n)
 
         def pull(_: Any, step: int, atoms: int, tags: Any, x: Floats, f: Floats) -> None:
             self.force_calls += 1
-            f.reshape(-1)[where] = force(x.reshape(-1)[where], still)
+            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where], still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
         self._lammps.set_fix_external_callback("pull", pull, None)
@@ -186,6 +193,19 @@ class _Run:
         if self._on_a_line:
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
         self.force_calls += every * len(q) * self._each
+
+
+def _drives(scene: Scene, h: float) -> Iterator[str]:
+    """Driving forces as `fix addforce` by a variable of the number of the step, row by row."""
+    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    for term in scene.terms:
+        for row, (i, amplitude, w, phase) in enumerate(term.rows() if term.key == "drive" else ()):
+            particle, axis = divmod(int(places[i]), 3)
+            force = ["0.0"] * 3
+            force[axis] = f"v_drive{row}"
+            yield f"group drive{row} id {particle + 1}"
+            yield f'variable drive{row} equal "({amplitude!r})*cos(({w!r})*(step*({h!r}))+({phase!r}))"'
+            yield f"fix drive{row} drive{row} addforce {' '.join(force)}"
 
 
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
@@ -248,10 +268,13 @@ ENGINE = Engine(
     distribution="lammps",
     extra="lammps",
     methods=named(
-        by_name("spring-self", "velocity-verlet", "fix spring/self, fix nve", frozenset({"wall-spring"})),
-        by_name("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS),
+        by_name(
+            "spring-self", "velocity-verlet", "fix spring/self, fix nve", frozenset({"wall-spring", "drive"})
+        ),
+        by_name("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS | {"drive"}),
         # r-RESPA would leave the force of `fix external` out, without a word
-        by_name("external", "velocity-verlet", "fix external, set by callback, fix nve", EVERY_POTENTIAL),
+        by_name("external", "velocity-verlet", "fix external, set by callback, fix nve",
+                EVERY_POTENTIAL | DRIVEN),
         by_name(
             "respa", "respa8", "run_style respa: bonds 8 times a step, fix spring/self and restrain once",
             SPRINGS, Need.FAST_SPRINGS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
+    DRIVEN,
     EVERY_POTENTIAL,
     Engine,
     Need,
@@ -15,6 +16,7 @@ from springcheck.engines.contract import (
 )
 
 _TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL}
+_DRIVEN = _TERMS | DRIVEN
 
 _ON_A_LINE = _TERMS - {"morse"}
 """The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
@@ -33,32 +35,32 @@ ENGINE = Engine(
     platforms=_PLATFORMS,
     methods=named(
         by_default(
-            "verlet", "velocity-verlet", "VerletIntegrator, started and read synchronised", _TERMS,
+            "verlet", "velocity-verlet", "VerletIntegrator, started and read synchronised", _DRIVEN,
             rebuilds_velocity=True,
         ),
         by_default(
-            "leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", _TERMS,
+            "leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", _DRIVEN,
             rebuilds_velocity=True,
             note="velocities half a step early, as documented; openmm#4929"),
         # its growing motion would turn a Morse bond over, of which OpenMM knows only the length
-        by_default("euler", "explicit-euler", "explicit Euler by CustomIntegrator", _TERMS - {"morse"},
+        by_default("euler", "explicit-euler", "explicit Euler by CustomIntegrator", _DRIVEN - {"morse"},
             note="a CustomIntegrator of ours, as a user may write it"),
         by_default(
-            "semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator", _TERMS
+            "semi-implicit-euler", "semi-implicit-euler", "kick-drift Euler by CustomIntegrator", _DRIVEN
         ),
         by_default(
             "langevin-middle", "langevin-middle",
-            "LangevinMiddleIntegrator at T = 0, started and read synchronised", _TERMS | {"damping"},
+            "LangevinMiddleIntegrator at T = 0, started and read synchronised", _DRIVEN | {"damping"},
             Need.DAMPING, one_friction=True,
         ),
         by_default("mts", "respa8", "MTSIntegrator, fast springs 8 times a step", _TERMS, Need.FAST_SPRINGS),
         by_name(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
-            _TERMS | {"damping"}, Need.DAMPING, one_friction=True,
+            _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
         by_name(
             "nose-hoover", "semi-implicit-euler",
-            "NoseHooverIntegrator without a thermostat, handed p0 as it is", _TERMS,
+            "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
         ),
     ),
     thermostats=named(

@@ -16,12 +16,16 @@ is the same by now, bit for bit.
 OpenMM takes no negative step.  A run backwards in time is the run forwards of reflected momenta: every
 scheme here turns into its own -h under that reflection, because the force does not depend on p.
 Friction does, and goes forwards only.
+
+A drive is an energy in which the time is a global parameter.  OpenMM's own integrators hold it over a step,
+so it is set before each: their force is taken once, where the step starts.  A `CustomIntegrator` sets it
+itself, from the number of its step.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -32,6 +36,7 @@ from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
 
@@ -70,6 +75,12 @@ CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 """Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or
 multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
+
+DRIVEN_ENERGY = {
+    "drive": ("-({amplitude!r})*cos(({frequency!r})*time+({phase!r}))*x", ()),
+    "modulated-spring": ("0.5*k*(1+({depth!r})*cos(({frequency!r})*time+({phase!r})))*(x-at)^2", ("k", "at")),
+}
+"""The same of what depends on the time, with the numbers in it that every platform keeps as double."""
 
 SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
@@ -150,6 +161,9 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         if term.key in CUSTOM_TERMS and not isinstance(term, WallSpring):
             for force in _custom(scene, term, origins):
                 system.addForce(force)
+        elif term.key in DRIVEN_ENERGY:
+            for force in _driven(scene, term, origins):
+                system.addForce(force)
     return system, np.concatenate([start, np.reshape(fixed, (-1, 3))])
 
 
@@ -178,6 +192,23 @@ def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
         rows = along == axis
         for particles, values in zip(ends[rows].tolist(), columns[rows].tolist(), strict=True):
             add(*particles, values)
+        yield force
+
+
+def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
+    """A drive, or a modulated spring, row by row, as energies of a particle and of the time."""
+    energy, names = DRIVEN_ENERGY[term.key]
+    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    for i, *numbers in term.rows():
+        given = dict(zip((column.field for column in term.columns), numbers, strict=True))
+        particle, axis = divmod(int(places[i]), 3)
+        # a force that is constant in space does not know where positions are counted from
+        wanted = energy.format(**given).replace("*x", f"*{'xyz'[axis]}").replace("(x-", f"({'xyz'[axis]}-")
+        force = mm.CustomExternalForce(wanted)
+        force.addGlobalParameter("time", 0.0)
+        for name in names:
+            force.addPerParticleParameter(name)
+        force.addParticle(particle, [given[x] - (origins[i] if x == "at" else 0.0) for x in names])
         yield force
 
 
@@ -217,7 +248,7 @@ def _thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syst
 
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
-    step = abs(step)
+    signed, step = step, abs(step)
     if name in ("verlet", "leapfrog"):
         return mm.VerletIntegrator(step)
     if name == "mts":
@@ -228,6 +259,10 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         made = mm.LangevinIntegrator if name == "langevin" else mm.LangevinMiddleIntegrator
         return made(0.0, float(scene.system.friction_rates[0]), step)
     integrator = mm.CustomIntegrator(step)
+    if scene.system.is_driven:
+        integrator.addGlobalVariable("done", 0)
+        integrator.addComputeGlobal("time", f"done*({signed!r})")
+        integrator.addComputeGlobal("done", "done+1")
     if name == "euler":
         integrator.addPerDofVariable("v0", 0)
         integrator.addComputePerDof("v0", "v")
@@ -277,7 +312,10 @@ class _Context:
         if arithmetic(label).parameters == "single":
             # the half kicks below must be those of the springs that OpenMM feels
             scene = scene.system.in_single
+        if scene.system.is_driven and arithmetic(label).state > 2.0**-53:
+            raise MethodError(f"{label}: the time of a drive is a parameter, kept in single precision there")
         self.force_calls, self.off_axis = 0, 0.0
+        self._done, self._step, self._driven = 0, step, scene.system.is_driven
         origins = bonds.rests(scene, label) if method.generator else bonds.origins(scene, method.scheme)
         system, positions = _system(scene, origins)
         if method.generator:
@@ -287,7 +325,10 @@ class _Context:
         self._context = _context(system, self._integrator, label)
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction
-        self._force = scene.system.potential_force
+        pull = scene.system.potential_force
+        self._force: Callable[..., Any] = lambda t, q, p: pull(q, p)
+        if self._driven:
+            self._force, _ = timed(scene.derived(terms=tuple(x for x in scene.terms if x.kind != "friction")))
         self._on_a_line = not method.generator
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
         self._m = np.copysign(scene.m, step)
@@ -295,11 +336,14 @@ class _Context:
         self._x, self._v = np.zeros_like(positions), np.zeros_like(positions)
         velocities = np.zeros_like(positions)
         with np.errstate(all="ignore"):
-            started = (scene.p - self._half_kick * self._force(scene.q, scene.p)) / self._m
+            started = (scene.p - self._half_kick * self._force(0.0, scene.q, scene.p)) / self._m
         velocities.reshape(-1)[scene.where] = started
         if not method.generator:
             # whose numbers begin with its first step
             _warm_up(self._context, self._integrator, positions)
+        if self._driven and method.name in CUSTOM:
+            self._integrator.setGlobalVariableByName("done", 0)
+        self._set_time = self._driven and method.name not in CUSTOM
         self._context.setPositions(positions)
         self._context.setVelocities(velocities)
 
@@ -311,9 +355,11 @@ class _Context:
         row = 0
         try:
             for row in range(len(q)):
-                for _ in range(every // ATTENTIVE):
+                if self._set_time:
+                    self._take_each(self._done + row * every, every)
+                for _ in range(0 if self._set_time else every // ATTENTIVE):
                     take(ATTENTIVE)
-                if every % ATTENTIVE:
+                if every % ATTENTIVE and not self._set_time:
                     take(every % ATTENTIVE)
                 state = get(positions=True, velocities=True)
                 state._getVectorAsNumpy(positions, x)
@@ -324,18 +370,29 @@ class _Context:
         except mm.OpenMMException as error:
             raise Stopped(row, str(error)) from error
         finally:
-            self._synchronise(q[:row], p[:row])
+            self._synchronise(every, q[:row], p[:row])
+            self._done += every * row
             self.force_calls += every * row
             if self._on_a_line:
                 self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
 
-    def _synchronise(self, q: Floats, p: Floats) -> None:
+    def _take_each(self, done: int, steps: int) -> None:
+        """So many steps after as many as are done, the time set before each."""
+        for i in range(done, done + steps):
+            self._context.setParameter("time", i * self._step)
+            self._integrator.step(1)
+
+    def _synchronise(self, every: int, q: Floats, p: Floats) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
             if self._origins is not None:
                 q += self._origins
             p *= self._m
-            if self._half_kick:
-                p += self._half_kick * self._force(q, p)
+            if self._half_kick and self._driven:
+                for row in range(len(q)):
+                    t = (self._done + (row + 1) * every) * self._step
+                    p[row] += self._half_kick * self._force(t, q[row], p[row])
+            elif self._half_kick:
+                p += self._half_kick * self._force(0.0, q, p)
 
 
 start = _Context
