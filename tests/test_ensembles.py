@@ -55,7 +55,7 @@ def test_a_cell_has_the_numbers_of_a_run_of_its_own(
     assert store.check(tmp_path / "e.h5") == []
     assert found.tallies
     for tally in found.tallies:
-        columns = measure.columns(tmp_path / "e.h5", tally.method)
+        columns = measure.stored(tmp_path / "e.h5").of(tally.method)
         assert tally.cells == cells.cells == len(columns["steps"])
         for j in range(cells.cells):
             one = varied.whole({axis.field: float(columns[axis.field][j]) for axis in cells.axes})
@@ -78,7 +78,7 @@ def test_own_cells_are_equal_bit_for_bit_to_runs_of_their_own(tmp_path: Path) ->
     measure.record(scene, cells, tmp_path / "e.h5", ["own:*"])
     varied = vary.Varied(scene, cells)
     for method in ("own:euler", "own:semi-implicit-euler", "own:implicit-euler"):
-        columns = measure.columns(tmp_path / "e.h5", method)
+        columns = measure.stored(tmp_path / "e.h5").of(method)
         for k, q in zip(columns["spring.0.stiffness"], columns["q0"], strict=True):
             assert driver.run(varied.whole({"spring.0.stiffness": float(k)}), method).q[-1, 0] == q
 
@@ -88,7 +88,7 @@ def test_a_cell_that_explodes_leaves_the_others_alone(tmp_path: Path) -> None:
     scene = scenefile.parse(text, name="long")
     cells = vary.plan(["spring.0.stiffness=0.01,1e6,1"])
     measure.record(scene, cells, tmp_path / "e.h5", ["own:semi-implicit-euler"])
-    columns = measure.columns(tmp_path / "e.h5", "own:semi-implicit-euler")
+    columns = measure.stored(tmp_path / "e.h5").of("own:semi-implicit-euler")
     assert columns["outcome"].tolist() == [0, 1, 0]
     assert columns["steps"][1] < 2000
     assert np.all(columns["max_error"][[0, 2]] < 1)
@@ -110,7 +110,7 @@ def test_samples_come_from_their_seed_and_are_spread_as_asked(tmp_path: Path) ->
     few = vary.plan(given, 50, 5)
     measure.record(scene, few, tmp_path / "one.h5", ["own:euler"])
     measure.record(scene, few, tmp_path / "two.h5", ["own:euler"], team=Processes(2))
-    first, second = (measure.columns(tmp_path / f"{x}.h5", "own:euler") for x in ("one", "two"))
+    first, second = (measure.stored(tmp_path / f"{x}.h5").of("own:euler") for x in ("one", "two"))
     assert all(np.array_equal(first[name], second[name], equal_nan=True) for name in first)
     assert np.array_equal(first["spring.0.stiffness"], k[:50])
 
@@ -246,7 +246,7 @@ def test_the_report_page_shows_an_ensemble_of_two_fields_as_maps_of_powers_of_te
     )
     error, _ = page.banks(found)
     (chart,) = error.charts
-    columns = measure.columns(tmp_path / "e.h5", "own:euler")
+    columns = measure.stored(tmp_path / "e.h5").of("own:euler")
     values = columns["max_error"].reshape(5, 4).T
     assert chart.tiles
     for row, numbers in zip(chart.tiles.rows, values, strict=True):

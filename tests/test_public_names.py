@@ -18,8 +18,9 @@ from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Comparison
 
 NAMES = [
-    "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",
-    "load_scene", "plot", "read", "run", "simulate", "spring",
+    "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "ensemble", "exact",
+    "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
+    "read", "report", "run", "simulate", "spring", "stability",
 ]  # fmt: skip
 
 
@@ -31,7 +32,7 @@ def test_the_names_are_these_and_each_is_there() -> None:
         springcheck.integrate  # noqa: B018
 
 
-@pytest.mark.parametrize("name", ["simulate", "compare", "identify"])
+@pytest.mark.parametrize("name", ["simulate", "compare", "identify", "run", "precision", "report"])
 def test_help_of_a_function_is_its_own_text_whatever_room_has_its_name(name: str) -> None:
     from springcheck import api
     from springcheck.identify import files
@@ -40,7 +41,7 @@ def test_help_of_a_function_is_its_own_text_whatever_room_has_its_name(name: str
     found = getattr(springcheck, name)
     assert found is getattr(api, name)
     shown = pydoc.plain(pydoc.render_doc(found))
-    assert shown.startswith(f"Python Library Documentation: function {name} in module springcheck.api")
+    assert shown.startswith(f"Python Library Documentation: function {name} in module springcheck.api.")
     assert inspect.cleandoc(found.__doc__).splitlines()[0] in shown
 
 
@@ -48,7 +49,7 @@ def test_run_is_the_whole_job_and_simulate_one_method(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    report = springcheck.run("spring", "own:*")
+    report = springcheck.run("spring", "own:*", path="spring.h5")
     assert report.status == 0
     assert Path("spring.h5").is_file()
     alone = springcheck.simulate("spring", "own:euler")

@@ -26,9 +26,10 @@ def main() -> int:
     folder = arguments(__doc__, folder=Path("data/figures")).folder
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
-        report = run(load_scene("spring"), Path(name, "spring.h5"))
+        path = Path(name, "spring.h5")
+        report = run(load_scene("spring"), path)
         census = measure()
-        drawn = RUN.draw(stored(report.path), Path(name)) + CENSUS.draw(census, Path(name))
+        drawn = RUN.draw(stored(path), Path(name)) + CENSUS.draw(census, Path(name))
         for path in drawn:
             if path.name in NAMES:
                 (folder / path.name).write_bytes(path.read_bytes())

@@ -8,8 +8,8 @@ Trajectory('own:semi-implicit-euler', 201 frames, 1 particle, t = 0 to 20, compl
 >>> all(verdict.passed for verdict in springcheck.judge(scene, run) if verdict.passed is not None)
 True
 
-`run` does the whole job, as the command does; `simulate` runs one method.  Each name is imported when it is
-first used.
+`run` does the whole job, as the command does; `simulate` runs one method, or your own function.  Each study
+is a function too.  Each name is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -20,7 +20,24 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from springcheck import plot
-    from springcheck.api import compare, exact, identify, judge, read, run, simulate
+    from springcheck.api import (
+        census,
+        compare,
+        ensemble,
+        exact,
+        explain,
+        extremes,
+        faults,
+        identify,
+        judge,
+        methods,
+        precision,
+        read,
+        report,
+        run,
+        simulate,
+        stability,
+    )
     from springcheck.physics.builders import chain, spring
     from springcheck.physics.scene import Scene
     from springcheck.physics.scenefile import load_scene
@@ -29,8 +46,9 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact", "identify", "judge",
-    "load_scene", "plot", "read", "run", "simulate", "spring",
+    "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "ensemble", "exact",
+    "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
+    "read", "report", "run", "simulate", "spring", "stability",
 ]  # fmt: skip
 
 _HOMES = {
@@ -38,16 +56,10 @@ _HOMES = {
     "Trajectory": "physics.trajectory",
     "Verdict": "physics.trajectory",
     "chain": "physics.builders",
-    "compare": "api",
-    "exact": "api",
-    "identify": "api",
-    "judge": "api",
     "load_scene": "physics.scenefile",
-    "read": "api",
-    "run": "api",
-    "simulate": "api",
     "spring": "physics.builders",
 }
+"""Where what is no function of `api` stands."""
 
 
 class _Package(ModuleType):
@@ -67,9 +79,9 @@ def __getattr__(name: str) -> Any:
 
     if name == "plot":
         return import_module(f"{__name__}.{name}")
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_HOMES.get(name, 'api')}"), name)
 
 
 def __dir__() -> list[str]:

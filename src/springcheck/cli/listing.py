@@ -9,6 +9,7 @@ from typing import Any
 from springcheck import checks, engines, schemes
 from springcheck.checks.seeds import SEEDED
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
 
 
 def listing() -> dict[str, Any]:
@@ -44,6 +45,17 @@ def _engine(name: str) -> dict[str, Any]:
             for method in (*found.methods.values(), *found.thermostats.values())
         ],
     }
+
+
+def methods(scene: Scene | None) -> list[dict[str, Any]]:
+    """Every method: its scheme, whether it runs by default, and why not here, or not on this scene."""
+    rows = []
+    for engine in map(_engine, engines.names()):
+        for one in engine["methods"]:
+            refused = engines.refusal(scene, engines.parse(one["method"])) if scene is not None else ""
+            row = {name: one[name] for name in ("method", "scheme", "default")}
+            rows.append({**row, "why not": engine["absence"] or refused or ""})
+    return rows
 
 
 def lines(found: dict[str, Any]) -> Iterator[str]:

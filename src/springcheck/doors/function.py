@@ -7,9 +7,11 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -34,11 +36,17 @@ UNKNOWN = Scheme(
 )
 
 
-def load(spec: str) -> Callable[..., Any]:
+Spec = str | Callable[..., Any]
+"""A function, or where one is."""
+
+
+def load(spec: Spec) -> Callable[..., Any]:
     """The function of ``module:function`` or ``file.py:function``; modules of the current folder are found.
 
     MethodError, in one line, where there is none.
     """
+    if callable(spec):
+        return _step(spec, _called(spec), _called(spec))
     where, _, name = spec.rpartition(":")
     if not (where and name):
         raise MethodError(f"stepper {spec!r} is not of the form module:function, or file.py:function")
@@ -50,18 +58,28 @@ def load(spec: str) -> Callable[..., Any]:
         found = getattr(found, part)
     if not callable(found):
         raise MethodError(f"{spec!r} is a {type(found).__name__}, not a function")
+    return _step(found, spec, name)
+
+
+def _called(spec: Spec) -> str:
+    """What a function is called in a message."""
+    return spec if isinstance(spec, str) else str(getattr(spec, "__name__", type(spec).__name__))
+
+
+def _step(found: Callable[..., Any], spec: str, name: str) -> Callable[..., Any]:
+    """The function, where it can be called as a step."""
     try:
         signature = inspect.signature(found)
     except (TypeError, ValueError):
         # of an extension
-        return found  # type: ignore[no-any-return]
+        return found
     try:
         signature.bind(*range(5))
     except TypeError:
         raise MethodError(
             f"{spec}: {name}{signature} cannot be called as a step: step(q, p, h, force, mass) -> (q, p)"
         ) from None
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _module(name: str) -> ModuleType:
@@ -85,28 +103,39 @@ def _imported(name: str) -> ModuleType:
         raise MethodError(f"module {name!r} needs {missing!r}, which is not installed") from error
 
 
+@contextmanager
+def while_here(functions: Sequence[Callable[..., Any]], scheme: str = "") -> Iterator[list[str]]:
+    """Labels of functions, which are methods of an engine within this context and not after it."""
+    made = engine(functions, lambda name: scheme)
+    codes = [getattr(inspect.unwrap(one), "__code__", one) for one in functions]
+    # what stands for the version: runs of another function are not resumed
+    known = [(x.co_code, x.co_consts, x.co_names) if isinstance(x, CodeType) else x for x in codes]
+    with engines.while_here(made, "this call", sha256(repr(known).encode()).hexdigest()[:12]):
+        yield [f"{made.name}:{name}" for name in made.methods]
+
+
 def file_of(spec: str) -> str:
     """The file of a function."""
     return _file(load(spec)) or spec
 
 
-def engine(specs: Sequence[str], stated: Callable[[str], str] = lambda name: "") -> Engine:
+def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: "") -> Engine:
     """An engine of the functions; without a stated scheme each is what it is found to be, if anything."""
-    functions = dict(zip(_names(specs), map(load, specs), strict=True))
+    functions = dict(zip(_names([_called(spec) for spec in specs]), map(load, specs), strict=True))
 
     def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:
         function = functions[method.name]
         return _Steps(function, scene, step, _file(function))
 
     methods = {}
-    for spec, (name, function) in zip(specs, functions.items(), strict=True):
+    for spec, (name, function) in zip(map(_called, specs), functions.items(), strict=True):
         scheme = stated(name)
         known = schemes.scheme(scheme).name if scheme else _identified(function)
         about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
         methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE | DRIVEN)
     return Engine(
         name="stepper",
-        title=f"the function {specs[0]}" if len(specs) == 1 else "functions",
+        title=f"the function {_called(specs[0])}" if len(specs) == 1 else "functions",
         methods=methods,
         schemes=(UNKNOWN,),
         start=start,
@@ -128,7 +157,7 @@ def _names(specs: Sequence[str]) -> list[str]:
     names = [long if plain.count(short) > 1 else short for short, long in zip(plain, whole, strict=True)]
     twice = next((spec for spec, name in zip(specs, names, strict=True) if names.count(name) > 1), None)
     if twice is not None:
-        raise MethodError(f"--stepper {twice}: two functions would have one name; name each once")
+        raise MethodError(f"{twice}: two functions would have one name; name each once")
     return names
 
 

@@ -38,6 +38,7 @@ from springcheck.engines.registry import (
     names,
     origin,
     unusable,
+    while_here,
 )  # fmt: skip
 from springcheck.errors import MethodError, nearest
 from springcheck.physics.arrays import Arithmetic
@@ -47,7 +48,7 @@ __all__ = [
     "ANY_POTENTIAL", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label",
     "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
     "guarded", "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
-    "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable",
+    "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable", "while_here",
 ]  # fmt: skip
 
 T = TypeVar("T")

@@ -215,6 +215,19 @@ def bring(found: Engine, where: str, version: str = "") -> Engine:
     return found
 
 
+@contextmanager
+def while_here(found: Engine, where: str, version: str) -> Iterator[None]:
+    """Make an engine known within this context, and what had its name again after it."""
+    before = _brought.get(found.name)
+    bring(found, where, version)
+    try:
+        yield
+    finally:
+        del _brought[found.name]
+        if before is not None:
+            _brought[found.name] = before
+
+
 def is_brought(name: str) -> bool:
     """Whether a call has brought it, rather than a package."""
     return name in _brought

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
+from springcheck.formats import columns as columns_of
 from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
@@ -73,6 +75,14 @@ def read(
         asked = f" {label!r}; it has {', '.join(names)}" if names else " to identify"
         raise StoreError(f"{path}: holds no trajectory{asked}")
     return found
+
+
+def of_table(frame: Any) -> formats.States:
+    """Columns of a pandas DataFrame as states; an index with a name is a column too."""
+    if frame.index.name is not None:
+        frame = frame.reset_index()
+    columns = {str(name): frame[name] for name in frame.columns if columns_of.kind(str(name)) is not None}
+    return columns_of.split(Path("the table"), {name: x.to_numpy(np.float64) for name, x in columns.items()})
 
 
 def of_arrays(name: str, found: formats.States) -> FileStates:

@@ -6,14 +6,14 @@ import hashlib
 import math
 import operator
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.errors import SceneError
+from springcheck.errors import SceneError, nearest
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.bath import Bath
 from springcheck.physics.system import System
@@ -157,6 +157,17 @@ class Scene:
     def to_toml(self) -> str:
         """The scene as a scene file, written from its numbers: read back it has exactly the same ones."""
         return self._toml
+
+    def replace(self, **changes: Any) -> Scene:
+        """A scene that is like this one but for these fields: ``scene.replace(step=0.05, steps=400)``.
+
+        SceneError where there is no such field, or a value makes no sense.
+        """
+        known = [field.name for field in fields(self)]
+        for name in changes:
+            if name not in known:
+                raise SceneError(f"a Scene has no {name!r}{nearest(name, known)}; it has {', '.join(known)}")
+        return replace(self, **changes)
 
     def derived(self, **changes: Any) -> Scene:
         """Like `replace`, for numbers that follow from a scene's own and are not checked again.

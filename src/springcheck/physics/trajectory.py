@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -59,6 +60,120 @@ class Trajectory:
     """Largest |y| or |z| seen, for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
+    scene: Scene | None = None
+    """What was run, where that is known: `v` and `error` need it."""
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: Any,
+        q: Any,
+        p: Any = None,
+        *,
+        v: Any = None,
+        scene: Scene | None = None,
+        mass: Any = None,
+        scheme: str = "unknown",
+        label: str = "data",
+        every: int = 1,
+    ) -> Trajectory:
+        """A trajectory of anybody's numbers: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,), (f, n).
+
+        `every` is the number of steps from frame to frame, `mass` (n,) or one for all [M] makes p of v; a
+        `scene` gives both masses and step, and what `judge` and `error` hold it against.  SpringcheckError
+        where the numbers do not fit together.
+        """
+        time = np.asarray(t, np.float64)
+        if p is None and v is None:
+            raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
+        m = scene.m if mass is None and scene is not None else mass
+        if p is None and m is None:
+            raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
+        where, speed = (
+            x[:, None] if x.ndim == 1 else x
+            for x in (np.array(y, np.float64) for y in (q, v if p is None else p))
+        )
+        if time.ndim != 1 or where.ndim != 2 or where.shape != speed.shape or len(where) != len(time):
+            raise SpringcheckError(
+                f"{label}: t {time.shape}, q {where.shape} and p or v {speed.shape} do not fit together: "
+                "(f,), (f, n) and (f, n) are needed"
+            )
+        if scene is None and len(time) < 2:
+            raise SpringcheckError(f"{label}: one frame has no step; two at least are needed, or scene=")
+        step = scene.step if scene is not None else float(time[-1] - time[0]) / ((len(time) - 1) * every)
+        return cls(
+            label=label, scheme=scheme, t=time, q=where, step=step,
+            p=speed if p is not None else speed * np.asarray(m, np.float64),
+            every=every if scene is None else scene.every,
+            outcome=Outcome(status="complete", step=(len(time) - 1) * every), scene=scene,
+        )  # fmt: skip
+
+    @property
+    def v(self) -> Floats:
+        """Velocities p/m (f, n) [L/T].  SpringcheckError where no scene tells the masses."""
+        return np.asarray(self.p / self._known.m)
+
+    @property
+    def _known(self) -> Scene:
+        if self.scene is None:
+            raise SpringcheckError(
+                f"{self.label}: its scene is not known: dataclasses.replace(run, scene=...)"
+            )
+        return self.scene
+
+    def error(self) -> Floats:
+        """Distance from the exact solution at each frame (f,), relative to the initial energy norm.
+
+        SpringcheckError where no closed form of the exact solution is known.
+        """
+        from springcheck.physics import exact
+
+        scene = self._known
+        if not exact.has_true_motion(scene):
+            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
+        steps = np.arange(len(self.t), dtype=np.int64) * self.every
+        q, p = exact.true_motion(scene, steps, self.step)
+        return scene.system.norm(self.q - q, self.p - p)
+
+    def save(self, path: str | Path) -> Path:
+        """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back as it is.
+
+        `springcheck.identify` and the command read both.  SpringcheckError where it cannot be written.
+        """
+        place, n = Path(path), self.q.shape[1]
+        columns = {"t": self.t, "q": self.q, "p": self.p}
+        columns |= {} if self.energy is None else {"energy": self.energy}
+        try:
+            if place.suffix == ".npz":
+                columns |= {} if self.scene is None else {"m": self.scene.m}
+                np.savez(place, allow_pickle=False, **columns)
+            elif place.suffix == ".csv":
+                each = [f"{name}{i}" for i in range(n) for name in "qp"]
+                values = np.stack([self.q, self.p], axis=-1).reshape(len(self.t), 2 * n)
+                names, table = ["t", *each], np.column_stack([self.t, values])
+                np.savetxt(place, table, "%.17g", ",", header=",".join(names), comments="")
+            else:
+                raise SpringcheckError(f"{place}: a name that ends in .csv or .npz is needed")
+        except OSError as error:
+            raise SpringcheckError(f"{place}: cannot be written: {error.strerror}") from error
+        return place
+
+    def plot(self, ax: Any = None, *, particle: int = 0) -> Any:
+        """Phase portrait of one particle, the exact solution behind it where it is known -> its axes.
+
+        `ax`: matplotlib axes of your own.  `springcheck.plot` draws several trajectories, and over time.
+        """
+        axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
+        if self.scene is not None and self.scene.system.solution is not None:
+            from springcheck.physics import exact
+
+            steps = np.arange(len(self.t), dtype=np.int64) * self.every
+            q, p = exact.true_motion(self.scene, steps, self.step)
+            axes.plot(q[:, particle], p[:, particle], color="#b3b3b3", linewidth=4, label="exact")
+        axes.plot(self.q[:, particle], self.p[:, particle], label=self.label)
+        axes.set(xlabel="q", ylabel="p", title=f"{self.label}: phase portrait of {len(self.t)} frames")
+        axes.legend()
+        return axes
 
     def __repr__(self) -> str:
         n = self.q.shape[1] if self.q.ndim == 2 else 1
@@ -71,11 +186,11 @@ class Trajectory:
         rows = [("frame", "t", "q", "p")]
         shown = sorted({0, len(self.t) - 1}) if len(self.t) else []
         rows += [(str(i), f"{self.t[i]:g}", _few(self.q[i]), _few(self.p[i])) for i in shown]
-        return _table(repr(self), rows)
+        return html_table(repr(self), rows)
 
     def to_dataframe(self) -> Any:
         """A pandas DataFrame: a row a frame, columns q0, p0, q1 ... and energy where it was kept; index t."""
-        pandas = _library("pandas")
+        pandas = library("pandas")
         columns: dict[str, Floats] = {}
         for i in range(self.q.shape[1]):
             columns |= {f"q{i}": self.q[:, i], f"p{i}": self.p[:, i]}
@@ -85,7 +200,7 @@ class Trajectory:
 
     def to_xarray(self) -> Any:
         """An xarray Dataset: q and p over t and particle, energy over t where it was kept."""
-        xarray = _library("xarray")
+        xarray = library("xarray")
         kept = {name: (("t", "particle"), getattr(self, name)) for name in ("q", "p")}
         if self.energy is not None:
             kept["energy"] = (("t",), self.energy)  # type: ignore[assignment]
@@ -94,7 +209,8 @@ class Trajectory:
         return xarray.Dataset(kept, coords=coordinates, attrs=about)
 
 
-def _table(title: str, rows: Iterable[Sequence[str]]) -> str:
+def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
+    """Rows of cells, the first of them the titles, under a line of text."""
     from html import escape
 
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
@@ -106,7 +222,8 @@ def _few(values: Floats) -> str:
     return text + (" ..." if len(values) > 3 else "")
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
+    """A library that only what is asked for here needs.  SpringcheckError where it is not installed."""
     try:
         return import_module(name)
     except ModuleNotFoundError:
@@ -117,7 +234,7 @@ def _library(name: str) -> Any:
 
 def of_scene(scene: Scene, q: Floats, p: Floats, **more: Any) -> Trajectory:
     """States (f, n) at the frames of a scene from its start on, complete unless `more` says otherwise."""
-    known: dict[str, Any] = {"outcome": Outcome(status="complete", step=scene.steps), **more}
+    known: dict[str, Any] = {"outcome": Outcome(status="complete", step=scene.steps), "scene": scene, **more}
     t = np.arange(len(q), dtype=np.float64) * scene.every * scene.step
     return Trajectory(t=t, q=q, p=p, step=scene.step, every=scene.every, **known)
 
@@ -139,7 +256,7 @@ class Comparison:
         """The differences as a table for notebooks."""
         rows = zip(self.labels, self.max_difference, strict=True)
         cells = [(label, *(f"{x:.1e}" for x in row)) for label, row in rows]
-        return _table(repr(self), [("", *self.labels), *cells])
+        return html_table(repr(self), [("", *self.labels), *cells])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -193,17 +193,21 @@ def how(options: Namespace, progress: Progress | None) -> How:
 
 @contextmanager
 def kept(
-    path: str | Path,
+    path: str | Path | None,
     command: str,
     *,
     force: bool = False,
     progress: Progress | None = None,
     team: Team = ALONE,
 ) -> Iterator[Keeper]:
-    """A study that is kept in a store; an unfinished one of the same command is resumed.
+    """A study that is kept in a store; an unfinished one of the same command is resumed.  Without a path
+    nothing is kept.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
+    if path is None:
+        yield Keeper(None, progress, team)
+        return
     with open_new(path, command, force=force) as journal:
         yield Keeper(journal, progress, team, Path(path))
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from springcheck.studies.arguments import Argument, Progress
 
@@ -35,6 +35,50 @@ class Result(Protocol):
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; what is not a finite number is None."""
         ...
+
+
+class Shown:
+    """How what a study has found shows itself in Python: in a line, as the command's text, as a table.
+
+    Its class stands beside the `STUDY` of its package.
+    """
+
+    __slots__ = ()
+    table_of: ClassVar[str] = ""
+    """The name in its document of what are the rows of its table."""
+
+    def __str__(self) -> str:
+        from springcheck.text.lines import as_text
+
+        return as_text(_study_of(self).lines(self))  # type: ignore[arg-type]
+
+    def _repr_html_(self) -> str:
+        from springcheck.text.lines import as_html
+
+        return as_html(_study_of(self).lines(self))  # type: ignore[arg-type]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of its table as plain data; numbers that are not known are None."""
+        found: list[dict[str, Any]] = self.document()[self.table_of]  # type: ignore[attr-defined]
+        return found
+
+    def to_dataframe(self) -> Any:
+        """The same as a pandas DataFrame; what stands within another thing is named as ``outer.inner``."""
+        from springcheck.physics.trajectory import library
+
+        return library("pandas").json_normalize(self.rows())
+
+    def figures(self) -> dict[str, Any]:
+        """What `springcheck plot` draws, as matplotlib's figures by name."""
+        from springcheck.figures.style import style
+
+        with style():
+            return _study_of(self).pictures(self)  # type: ignore[arg-type]
+
+
+def _study_of(found: object) -> Study:
+    study: Study = import_module(type(found).__module__.rpartition(".")[0]).STUDY
+    return study
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,14 +145,18 @@ class Study:
         from springcheck.figures.style import file_names, save, style
 
         with style():
-            if self._has("figure"):
-                pictures = self._part("figure").pictures(found, **chosen)
-            else:
-                from springcheck.figures import render
-
-                pictures = {bank.name: render.picture(bank) for bank in self.banks(found) if bank.name}
+            pictures = self.pictures(found, **chosen)
             look([file for name in pictures for file in file_names(name)])
             return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
+
+    def pictures(self, found: Result, **chosen: Any) -> dict[str, Any]:
+        """The same as matplotlib's figures, by name."""
+        if self._has("figure"):
+            drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
+            return drawn
+        from springcheck.figures import render
+
+        return {bank.name: render.picture(bank) for bank in self.banks(found) if bank.name}
 
     def banks(self, found: Result) -> list[Bank]:
         """Its charts in the report page; none where it has no such part."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from io import StringIO
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
@@ -111,6 +112,22 @@ def table(
 ) -> TextTable:
     """A table; the columns `left` start at their left edge, numbers end at their right one."""
     return TextTable(tuple(titles), tuple(rows), frozenset(left), prose)
+
+
+def as_text(lines: Sequence[RenderableType], width: int = 100) -> str:
+    """Lines without colours, as `str` of a result."""
+    console = Console(file=StringIO(), width=width, highlight=False, color_system=None, record=True)
+    for line in lines:
+        console.print(line, crop=False)
+    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+
+
+def as_html(lines: Sequence[RenderableType]) -> str:
+    """The same with its colours, for notebooks."""
+    console = Console(file=StringIO(), width=120, highlight=False, record=True)
+    for line in lines:
+        console.print(line, crop=False)
+    return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
 
 
 def hanging(head: str, text: str) -> Lines:

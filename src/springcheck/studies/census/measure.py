@@ -81,7 +81,7 @@ def _absence(label: Label) -> str | None:
     return None
 
 
-def record(path: str | Path, methods: Sequence[str] = (), **how: Unpack[How]) -> Census:
+def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Census:
     """Like `measure`, kept in a store; an unfinished census of the same command is resumed."""
     labels = engines.match(tuple(methods) or (EVERY,))
     with keeper.kept(path, keeper.command("census", labels), **how) as kept:

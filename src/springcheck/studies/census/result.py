@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
 from springcheck.studies.choose import LeftOut
+from springcheck.studies.study import Shown
 from springcheck.studies.tables import RecordForm
+from springcheck.text.wording import count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,9 +73,11 @@ ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal=
 """A table for each method: the orbit, and everything else as attributes."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Census:
-    """The whole study."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Census(Shown):
+    """The whole study; a row of its table is a method of an engine."""
+
+    table_of: ClassVar[str] = "entries"
 
     entries: tuple[Entry, ...]
     left_out: tuple[LeftOut, ...]
@@ -81,6 +85,12 @@ class Census:
     path: Path | None = None
     changes: tuple[str, ...] | None = None
     """What is not as it was in an earlier census; None where none was named."""
+
+    def __repr__(self) -> str:
+        engines = {entry.method.partition(":")[0] for entry in self.entries}
+        unlike = sum(not entry.agrees for entry in self.entries)
+        whose = f"{count(len(self.entries), 'method')} of {count(len(engines), 'engine')}"
+        return f"Census({whose}, {unlike} not as declared)"
 
     @property
     def partners(self) -> Mapping[str, tuple[str, ...]]:

@@ -42,7 +42,7 @@ def pictures(found: Ensemble, *, quantity: str | None = None, over: str | None =
     """
     out = {}
     for choice in choices(found, quantity, over):
-        shown = dict(parts(found, choice)) if found.path else {}
+        shown = dict(parts(found, choice))
         if shown:
             fields = "" if over is None else "-over-" + "-".join(choice.over)
             out[f"ensemble-{choice.quantity}{fields}"] = picture(shown, choice)

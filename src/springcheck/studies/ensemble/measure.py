@@ -8,7 +8,7 @@ kept, so neither the file nor memory holds trajectories, however many cells ther
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
@@ -47,7 +47,7 @@ def perform(options: Namespace, progress: Progress | None) -> Ensemble:
 def record(
     scene: Scene,
     cells: Plan,
-    path: str | Path,
+    path: str | Path | None,
     methods: Sequence[str] = (),
     **how: Unpack[How],
 ) -> Ensemble:
@@ -71,9 +71,12 @@ def record(
             for label in labels
             for chunk in cells.chunks
         ]
+        held: dict[str, Columns] = {}
         for piece, found in kept.stream(pieces):
             name = piece.key.rpartition("/")[0]
             tallies[name] = tallies[name].plus(found)
+            if path is None:
+                held[piece.key] = found
         ensemble = Ensemble(
             scene=scene,
             fields=fields,
@@ -82,9 +85,23 @@ def record(
             left_out=tuple(left),
             resumed=kept.resumed,
             path=kept.path,
+            columns=_joined(held),
         )
         kept.commit("ensemble", ensemble.document(), scene)
     return ensemble
+
+
+def _joined(chunks: Mapping[str, Columns]) -> dict[str, Columns]:
+    """Chunks by label and number as columns by label."""
+    found: dict[str, dict[str, list[np.ndarray]]] = {}
+    for key in sorted(chunks):
+        columns = found.setdefault(key.rpartition("/")[0], {})
+        for name, values in chunks[key].items():
+            columns.setdefault(name, []).append(values)
+    return {
+        label: {name: np.concatenate(parts) for name, parts in columns.items()}
+        for label, columns in found.items()
+    }
 
 
 @keeper.restoring("ensemble")
@@ -99,11 +116,6 @@ def stored(kept: keeper.Kept) -> Ensemble:
         left_out=kept.left_out,
         path=kept.path,
     )
-
-
-def columns(path: Path, method: str) -> Columns:
-    """All cells of a method of a stored ensemble, in their order."""
-    return CELLS.found(keeper.tables(path)[CELLS.beginning + method])
 
 
 def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import Table, document
+from springcheck.studies.keeper import Table, document, tables
+from springcheck.studies.study import Shown
 from springcheck.studies.tables import Form
+from springcheck.text.wording import count
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
 """Numbers of each cell that are summed up and drawn: largest distance from the exact solution relative to
@@ -73,9 +75,9 @@ class Tally:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Ensemble:
-    """One scene over many parameters."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Ensemble(Shown):
+    """One scene over many parameters; a row of its table is a cell of a method."""
 
     scene: Scene
     fields: tuple[str, ...]
@@ -86,6 +88,28 @@ class Ensemble:
     resumed: int = 0
     """Chunks that an interrupted call had finished."""
     path: Path | None = None
+    columns: Mapping[str, Columns] = field(default_factory=dict)
+    """Where nothing was kept on disk: the cells of each method, in their order."""
+
+    def __repr__(self) -> str:
+        cells = f"{count(len(self.tallies), 'method')}, {count(sum(x.cells for x in self.tallies), 'cell')}"
+        return f"Ensemble({self.scene.name!r} over {', '.join(self.fields)}: {cells})"
+
+    def of(self, method: str) -> Columns:
+        """All cells of a method, in their order, from memory or from their store."""
+        if self.path is None:
+            return self.columns[method]
+        return CELLS.found(tables(self.path)[CELLS.beginning + method])
+
+    def rows(self) -> list[dict[str, Any]]:
+        found = []
+        for tally in self.tallies:
+            cells = {name: np.asarray(values).tolist() for name, values in self.of(tally.method).items()}
+            found += [
+                {"method": tally.method, **dict(zip(cells, row, strict=True))}
+                for row in zip(*cells.values(), strict=True)
+            ]
+        return found
 
     @property
     def status(self) -> Literal[0, 2]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from springcheck.errors import SpringcheckError, nearest
 from springcheck.physics.arrays import Floats
-from springcheck.studies.ensemble.measure import columns
 from springcheck.studies.ensemble.result import Columns, Ensemble
 
 TITLES = {
@@ -93,8 +92,7 @@ def choices(found: Ensemble, quantity: str | None = None, over: str | None = Non
 def parts(found: Ensemble, choice: Choice) -> Iterator[tuple[str, Line | Map]]:
     """What is shown of each method, read one by one; methods without a number are left out."""
     for tally in found.tallies:
-        assert found.path is not None
-        cells = columns(found.path, tally.method)
+        cells = found.of(tally.method)
         part = reduced(cells, found, choice)
         if np.isfinite(part.y if isinstance(part, Line) else part.values).any():
             yield tally.method, part

@@ -122,7 +122,7 @@ def _absence(label: Label) -> str | None:
 
 
 def record(
-    path: str | Path,
+    path: str | Path | None,
     methods: Sequence[str] = (),
     *,
     quick: bool = False,

@@ -6,13 +6,14 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.extremes.judging import Cell, Outcome
 from springcheck.studies.keeper import document
+from springcheck.studies.study import Shown
 from springcheck.studies.tables import Rows
 
 
@@ -26,9 +27,11 @@ class Window:
     high: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Atlas:
-    """All cells, the windows, and the methods that are not here."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Atlas(Shown):
+    """All cells, the windows, and the methods that are not here; a row of its table is a cell."""
+
+    table_of: ClassVar[str] = "cells"
 
     cells: tuple[Cell, ...]
     windows: tuple[Window, ...]
@@ -37,6 +40,9 @@ class Atlas:
     """Methods that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""
+
+    def __repr__(self) -> str:
+        return f"Atlas({', '.join(f'{number} {outcome}' for outcome, number in self.counts().items())})"
 
     @property
     def wrong(self) -> tuple[Cell, ...]:

@@ -6,7 +6,8 @@ from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from typing import Any
+from pathlib import Path
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -19,13 +20,12 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
-from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
 from springcheck.studies.faults import baths, clean, steppers
 from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
-from springcheck.studies.keeper import Keeper, Piece
+from springcheck.studies.keeper import How, Keeper, Piece
 from springcheck.studies.tables import Documents
 from springcheck.thermal import THERMOSTATS
 
@@ -232,20 +232,18 @@ def judged_labels() -> list[str]:
 
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
+    return record(options.output, **keeper.how(options, progress))
+
+
+def record(path: str | Path | None, **how: Unpack[How]) -> FaultReport:
+    """The whole study, by the engines that are here too, kept in a store where there is a path."""
     labels = judged_labels()
-    if options.output is None:
-        return study(driver.run, labels, kept=Keeper(progress=progress, team=teams.of(options)))
     command = keeper.command("faults", list(map(engines.parse, labels)))
-    with keeper.kept(options.output, command, **keeper.how(options, progress)) as kept:
+    with keeper.kept(path, command, **how) as kept:
         found = study(driver.run, labels, kept=kept)
-        record(kept, found)
+        kept.keep(SEEN, "limits", seen(found))
+        kept.commit("faults", found.document())
     return found
-
-
-def record(kept: Keeper, found: FaultReport) -> None:
-    """Keep a study in a store."""
-    kept.keep(SEEN, "limits", seen(found))
-    kept.commit("faults", found.document())
 
 
 @keeper.restoring("faults")

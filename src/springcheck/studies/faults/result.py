@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from springcheck.studies.keeper import document
+from springcheck.studies.study import Shown
 from springcheck.studies.tables import Documents, Rows
+from springcheck.text.wording import count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,9 +35,11 @@ class Clean:
     alarms: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultReport:
-    """The whole study."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class FaultReport(Shown):
+    """The whole study; a row of its table is a fault."""
+
+    table_of: ClassVar[str] = "faults"
 
     results: tuple[Result, ...]
     clean: Clean
@@ -43,6 +47,11 @@ class FaultReport:
     """Faults and clean runs that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""
+
+    def __repr__(self) -> str:
+        missed = sum(bool(result.missed_by) for result in self.results)
+        clean = f"{len(self.clean.alarms)} false alarms in {self.clean.verdicts} verdicts"
+        return f"FaultReport({count(len(self.results), 'fault')}, {missed} missed, {clean})"
 
     @property
     def status(self) -> Literal[0, 1]:

@@ -185,7 +185,7 @@ def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
 def record(
     scene: Scene,
     labels: Sequence[Label],
-    path: str | Path,
+    path: str | Path | None,
     *,
     budget: float = BUDGET,
     **how: Unpack[How],

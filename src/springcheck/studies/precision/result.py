@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Table, document
 from springcheck.studies.precision.fits import Condition
 from springcheck.studies.precision.points import Point
+from springcheck.studies.study import Shown
+from springcheck.text.wording import count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,9 +62,11 @@ class Answer:
     point: Point | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PrecisionStudy:
-    """Everything that a study of precision has found on one scene."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PrecisionStudy(Shown):
+    """Everything that a study of precision has found on one scene; a row of its table is a point."""
+
+    table_of: ClassVar[str] = "points"
 
     scene: Scene
     budget: float
@@ -80,6 +84,11 @@ class PrecisionStudy:
     left_out: tuple[LeftOut, ...] = ()
     path: Path | None = None
     """Where it was stored."""
+
+    def __repr__(self) -> str:
+        best = min((p.error for p in self.points if p.error > 0), default=np.nan)
+        done = f"{count(len(self.methods), 'method')}, {count(len(self.points), 'point')}"
+        return f"PrecisionStudy({self.scene.name!r}, {done}, smallest error {best:.1e})"
 
     @property
     def status(self) -> Literal[0, 2]:

@@ -13,11 +13,11 @@ from springcheck.figures.overlay import Runs
 from springcheck.figures.views import paths, views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.run.result import Stored
+from springcheck.studies.run.result import Report, Stored
 
 
-def pictures(found: Stored, *, particle: int | None = None) -> dict[str, Figure]:
-    """The figures of the trajectories of a store, or of the motion of one particle, by name."""
+def pictures(found: Stored | Report, *, particle: int | None = None) -> dict[str, Figure]:
+    """The figures of trajectories, or of the motion of one particle, by name."""
     shown = found.drawable
     failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
     return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed)

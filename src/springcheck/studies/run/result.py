@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from springcheck import checks
 from springcheck.checks.compare import Same
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Verdict
+from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.keeper import document
+from springcheck.studies.keeper import document, read
+from springcheck.studies.study import Shown
+from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable
@@ -59,12 +61,14 @@ class Heated:
     kinetic_law: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Report(Shown):
     """Everything that `springcheck run` says."""
 
+    table_of: ClassVar[str] = "runs"
     scene: Scene
-    path: Path
+    path: Path | None
+    """Where it was stored; None where nothing was asked to be kept."""
     runs: tuple[MethodRun, ...]
     left_out: tuple[LeftOut, ...]
     verdicts: tuple[Verdict, ...]
@@ -82,9 +86,26 @@ class Report:
     faults: Mapping[str, str] = field(default_factory=dict)
     """What is wrong with each run of an engine that is broken on purpose."""
 
+    trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
+    """Where nothing was kept on disk: the runs by label."""
+
     def __repr__(self) -> str:
-        methods = f"{len(self.runs)} method{'s' if len(self.runs) != 1 else ''}"
-        return f"Report({self.scene.name!r}, {methods}: {self.counts}; {str(self.path)!r})"
+        kept = f"; {str(self.path)!r}" if self.path else ""
+        return f"Report({self.scene.name!r}, {count(len(self.runs), 'method')}: {self.counts}{kept})"
+
+    def __getitem__(self, label: str) -> Trajectory:
+        """The trajectory of a method, from memory or from its store.  KeyError where there is none."""
+        return (read(self.path) if self.path else self.trajectories)[label]
+
+    @property
+    def drawable(self) -> Drawable:
+        """Its trajectories, as far as they are drawn."""
+        from springcheck.studies.run.drawable import Drawable, drawable
+
+        if self.path is not None:
+            return drawable(self.path)
+        runs = dict(self.trajectories)
+        return Drawable(scene=self.scene, runs=runs, followed=runs, notes=[])
 
     @property
     def counts(self) -> str:

@@ -336,8 +336,14 @@ def _summary(report: Report) -> Lines:
     return [
         *([] if failed else _not_covered(report.scene)),
         plain(f"{report.counts}{taken}", look),
-        plain(f"Stored in {report.path}", look),
-        plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"),
+        *(
+            []
+            if report.path is None
+            else [
+                plain(f"Stored in {report.path}", look),
+                plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"),
+            ]
+        ),
     ]
 
 

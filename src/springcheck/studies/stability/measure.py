@@ -80,7 +80,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
 
 def record(
     scene: Scene,
-    path: str | Path,
+    path: str | Path | None,
     methods: Sequence[str] = (),
     **how: Unpack[How],
 ) -> Stability:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
+from springcheck.studies.study import Shown
 from springcheck.studies.tables import RecordForm, Rows
 from springcheck.text.wording import count
 
@@ -27,9 +28,11 @@ GROWTH = 1e-6
 the decaying eigenvector in the fitted quarter of a run."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stability:
-    """All that was measured, and what was left out and why."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Stability(Shown):
+    """All that was measured, and what was left out and why; a row of its table is a method's limit."""
+
+    table_of: ClassVar[str] = "methods"
 
     scene: Scene
     limits: tuple[Limit, ...]
@@ -41,6 +44,10 @@ class Stability:
     """Limits, regions, resonances and costs that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""
+
+    def __repr__(self) -> str:
+        said = f"{len(self.failures)} not where theory puts them" if self.failures else "as theory has them"
+        return f"Stability({self.scene.name!r}, {count(len(self.limits), 'limit')}, {said})"
 
     @property
     def passed(self) -> bool:

@@ -1,20 +1,23 @@
-"""What `import springcheck` offers: functions that take a scene or its name, and say what they need."""
+"""Running, judging, comparing and naming: what takes a scene, a trajectory or a file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from springcheck import checks, driver
+from springcheck.api.showing import Verdicts
+from springcheck.api.taking import Step, labels_of, scene_of, spoken, trajectory_of
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
-from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Comparison, Trajectory, Verdict, of_scene
+from springcheck.physics.trajectory import Comparison, Trajectory, of_scene
 
 if TYPE_CHECKING:
     from springcheck.identify.result import Identification
@@ -23,52 +26,64 @@ if TYPE_CHECKING:
 
 def run(
     scene: Scene | str | Path,
-    methods: str | Sequence[str] = (),
+    methods: str | Step | Sequence[str | Step] = (),
     *,
     path: str | Path | None = None,
     force: bool = False,
     thorough: bool = False,
+    faults: Sequence[str] = (),
+    seed: int | None = None,
+    scheme: str = "",
 ) -> Report:
-    """The whole job, as `springcheck run` does it: run, store, compare, judge.
+    """The whole job, as `springcheck run` does it: run, compare, judge.
 
-    `methods` are labels or globs such as ``"own:*"``; left out: those of the scene.  The store is `path`, by
-    default SCENE.h5 in the current folder; what an interrupted call has finished is reused.
+    `methods` are labels, globs such as ``"own:*"``, or your own functions (see `simulate`); left out: those
+    of the scene.  `path` keeps everything in a store, and what an interrupted call has finished is reused;
+    without it nothing is left on disk.  `report["own:euler"]` is a trajectory.  `scheme` is what your
+    functions are to be judged as; left out, each is what its states show.
 
     Raises SpringcheckError for everything that a user can mend.
     """
     from springcheck.studies.run import measure
 
-    found = _scene(scene)
-    named = (methods,) if isinstance(methods, str) else tuple(methods)
-    place = Path(path or f"{found.name}.h5")
-    report = measure.run(found, place, methods=named, force=force, thorough=thorough)
-    for why in report.broke.values():
-        raise MethodError(why)
-    return report
+    found = scene_of(scene)
+    with spoken(), labels_of(methods, scheme) as named, TemporaryDirectory(prefix="springcheck-") as folder:
+        place = Path(folder, "run.h5") if path is None else Path(path)
+        report = measure.run(
+            found, place, methods=named, force=force, thorough=thorough, faults=faults, seed=seed
+        )
+        for why in report.broke.values():
+            raise MethodError(why)
+        return report if path is not None else replace(report, path=None, trajectories=read(place))
 
 
 def simulate(
     scene: Scene | str | Path,
-    method: str,
+    method: str | Step,
     *,
     progress: driver.Progress | None = None,
     seed: int | None = None,
+    scheme: str = "",
 ) -> Trajectory:
     """A scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
 
-    `progress` is called with the number of steps done since its last call; `seed` is that of a random method.
+    A function ``step(q, p, h, force, mass) -> (q, p)`` is a method too: it is given numbers of one particle,
+    or arrays (n,); `scheme` is what it is to be judged as, by default what its states show.  `progress` is
+    called with the number of steps done since its last call; `seed` is that of a random method.
 
     Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
     """
-    return driver.run(_scene(scene), method, progress=progress, seed=seed)
+    found = scene_of(scene)
+    with labels_of(method, scheme) as (label,):
+        return replace(driver.run(found, label, progress=progress, seed=seed), scene=found)
 
 
-def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
+def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     """Every check of a trajectory of this scene; what does not apply is among them, `passed` None.
 
     Raises SpringcheckError for frames of another shape, or without a step.
     """
-    found, run = _scene(scene), _trajectory(trajectory)
+    found, run = scene_of(scene), trajectory_of(trajectory)
     frames = len(run.t)
     for name, shape in {
         "t": (frames,),
@@ -90,7 +105,7 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> list[Verdict]:
             )
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: frames {run.every} steps of {run.step:g} apart are none")
-    return checks.judge(found, run)
+    return Verdicts(checks.judge(found, run))
 
 
 def compare(
@@ -98,10 +113,10 @@ def compare(
 ) -> Comparison:
     """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
     if isinstance(trajectories, Mapping):
-        named = {label: _trajectory(one) for label, one in trajectories.items()}
+        named = {label: trajectory_of(one) for label, one in trajectories.items()}
     else:
-        named = {_trajectory(one).label: one for one in trajectories}
-    return comparing.compare(_scene(scene), named)
+        named = {trajectory_of(one).label: one for one in trajectories}
+    return comparing.compare(scene_of(scene), named)
 
 
 def identify(
@@ -116,7 +131,8 @@ def identify(
     step: float | None = None,
 ) -> Identification | dict[str, Identification]:
     """Which scheme made a trajectory, and what is wrong: of arrays t, q and p (or v), of a `Trajectory`, of a
-    file, or of an integrator ``step(q, p, h, force, mass) -> (q, p)``.
+    DataFrame with columns t, q and p or v (t may be its index), of a file, or of an integrator
+    ``step(q, p, h, force, mass) -> (q, p)``.
 
     t (f,), q, p and v (f, n) or (f,); a file gives one identification for each of its trajectories, by label.
     `mass`, `stiffness`, `friction` (c of F = -c v) and `step` are what is stated.  Raises IdentificationError
@@ -134,8 +150,14 @@ def identify(
     t = found
     if isinstance(found, Trajectory):
         t, q, p = found.t, found.q, found.p
+    elif hasattr(found, "to_numpy") and hasattr(found, "columns"):
+        states = files.of_table(found)
+        t, q, p, v = states.t, states.q, states.p, states.v
+        mass = states.mass if mass is None else mass
     if q is None or (p is None and v is None):
-        raise SpringcheckError("identify needs t, q and p (or v=), a Trajectory, or the path of a file")
+        raise SpringcheckError(
+            "identify needs t, q and p (or v=), a Trajectory, a DataFrame, or the path of a file"
+        )
     arrays = [None if x is None else np.asarray(x, np.float64) for x in (q, p, v)]
     of_q, of_p, of_v = (x[:, None] if x is not None and x.ndim == 1 else x for x in arrays)
     assert of_q is not None
@@ -149,7 +171,7 @@ def exact(scene: Scene | str | Path) -> Trajectory:
 
     Raises SpringcheckError where no closed form is known.
     """
-    found = _scene(scene)
+    found = scene_of(scene)
     if not solutions.has_true_motion(found):
         raise SpringcheckError(f"scene {found.name}: no closed form of its exact solution is known")
     steps = np.arange(found.frames, dtype=np.int64) * found.every
@@ -161,20 +183,5 @@ def read(path: str | Path) -> dict[str, Trajectory]:
     """The trajectories of a store by label.  StoreError where it cannot be read."""
     from springcheck.studies import keeper
 
-    return keeper.read(path)
-
-
-def _scene(scene: Scene | str | Path) -> Scene:
-    if isinstance(scene, Scene):
-        return scene
-    if isinstance(scene, str | Path):
-        return scenefile.load_scene(scene)
-    raise SpringcheckError(f"a Scene, or the name or path of one, is needed, not {type(scene).__name__}")
-
-
-def _trajectory(found: Any) -> Trajectory:
-    if isinstance(found, Trajectory):
-        return found
-    raise SpringcheckError(
-        f"a Trajectory is needed, not {type(found).__name__}: simulate gives one, read many"
-    )
+    scene = keeper.stored_scene(Path(path))
+    return {label: replace(one, scene=scene) for label, one in keeper.read(path).items()}

@@ -1,0 +1,20 @@
+"""What `import springcheck` offers: functions that take a scene or its name, and say what they need."""
+
+from springcheck.api.main import compare, exact, identify, judge, read, run, simulate
+from springcheck.api.showing import Said, Shelf, Verdicts
+from springcheck.api.studies import (
+    census,
+    ensemble,
+    explain,
+    extremes,
+    faults,
+    methods,
+    precision,
+    report,
+    stability,
+)
+
+__all__ = [
+    "Said", "Shelf", "Verdicts", "census", "compare", "ensemble", "exact", "explain", "extremes", "faults",
+    "identify", "judge", "methods", "precision", "read", "report", "run", "simulate", "stability",
+]  # fmt: skip

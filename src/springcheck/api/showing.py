@@ -1,0 +1,68 @@
+"""How lists show themselves in Python: verdicts, tables of methods, and text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from springcheck import checks
+from springcheck.physics.trajectory import Verdict, html_table, library
+
+
+class Verdicts(list[Verdict]):
+    """Verdicts, and what they come to; `print` shows the summary and what failed."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed, and something that could tell the scheme was judged."""
+        return checks.status(self) == 0
+
+    @property
+    def failed(self) -> Verdicts:
+        """Those that failed."""
+        return Verdicts(verdict for verdict in self if verdict.passed is False)
+
+    @property
+    def summary(self) -> str:
+        """How many passed, or which failed, in one line."""
+        return checks.summary(self)
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Verdicts({self.summary})", *(f"  {verdict!r}" for verdict in self.failed)])
+
+    def _repr_html_(self) -> str:
+        words = {True: "passed", False: "FAILED", None: "does not apply"}
+        rows = [(x.check, words[x.passed], f"{x.value:.3g}", f"{x.bound:.3g}", x.reason) for x in self]
+        return html_table(self.summary, [("check", "verdict", "value", "bound", "why"), *rows])
+
+    def to_dataframe(self) -> Any:
+        """A pandas DataFrame: a row a verdict."""
+        names = ("method", "check", "passed", "value", "bound", "unit", "why")
+        return library("pandas").DataFrame([{name: getattr(x, name) for name in names} for x in self])
+
+
+class Shelf(list[dict[str, Any]]):
+    """Rows with the same names: a table on a terminal, in a notebook, or of pandas."""
+
+    def __repr__(self) -> str:
+        from springcheck.text.lines import as_text, table
+
+        names = list(self[0]) if self else []
+        rows = [[str("" if row[name] is None else row[name]) for name in names] for row in self]
+        return as_text([table(names, rows, left=names, prose=names[-1])]) if self else "nothing"
+
+    def _repr_html_(self) -> str:
+        rows = [[str("" if x is None else x) for x in row.values()] for row in self]
+        return html_table("", [list(self[0]), *rows]) if self else ""
+
+    def to_dataframe(self) -> Any:
+        """The same as a pandas DataFrame."""
+        return library("pandas").DataFrame(list(self))
+
+
+class Said(str):
+    """Text that shows itself as it is."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)

@@ -1,0 +1,148 @@
+"""Every study as a function; without a `path` nothing is left on disk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from springcheck.api.showing import Said, Shelf
+from springcheck.api.taking import Step, how, labels_of, scene_of, spoken
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+
+if TYPE_CHECKING:
+    from springcheck.studies.census.result import Census
+    from springcheck.studies.ensemble.result import Ensemble
+    from springcheck.studies.extremes.result import Atlas
+    from springcheck.studies.faults.result import FaultReport
+    from springcheck.studies.precision.result import PrecisionStudy
+    from springcheck.studies.stability.result import Stability
+
+
+def precision(
+    scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *, budget: float = 75.0,
+    path: str | Path | None = None, force: bool = False, workers: int = 1,
+) -> PrecisionStudy:  # fmt: skip
+    """Error against run time, down to rounding, in about `budget` seconds, imports not counted.
+
+    Methods as in `run`.  `path` keeps it in a store, `workers` processes measure errors at the same time.
+    """
+    from springcheck.studies.precision import measure
+
+    found = scene_of(scene)
+    with spoken(), labels_of(methods) as named:
+        if not 0 < budget < math.inf:
+            raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
+        from springcheck.studies.choose import choose
+
+        labels, left = choose(found, named)
+        done = measure.record(found, labels, path, budget=budget, **how(methods, force, workers))
+    return replace(done, left_out=tuple(left))
+
+
+def stability(
+    scene: Scene | str | Path, methods: str | Sequence[str] = (), *, path: str | Path | None = None,
+    force: bool = False, workers: int = 1,
+) -> Stability:  # fmt: skip
+    """Limits of stability of these labels or globs (left out: all), measured against theory; your h omega and
+    the largest step [T] on this scene."""
+    from springcheck.studies.stability import measure
+
+    with spoken(), labels_of(methods) as named:
+        return measure.record(scene_of(scene), path, named, **how(methods, force, workers))
+
+
+def extremes(
+    methods: str | Sequence[str] = (), *, quick: bool = False, cells: int = 0,
+    path: str | Path | None = None, force: bool = False, workers: int = 1,
+) -> Atlas:  # fmt: skip
+    """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right where.
+
+    `quick` takes fewer cells (20 s), `cells` about so many in a finer atlas.
+    """
+    from springcheck.studies.extremes import measure
+
+    with spoken(), labels_of(methods) as named:
+        return measure.record(path, named, quick=quick, cells=cells, **how(methods, force, workers))
+
+
+def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
+    """Engines broken on purpose: which checks see each, down to which size, and no alarm on right ones.
+
+    It takes minutes.
+    """
+    from springcheck.studies.faults import measure
+
+    with spoken():
+        return measure.record(path, **how((), force, workers))
+
+
+def census(
+    methods: str | Sequence[str] = (), *, path: str | Path | None = None, force: bool = False,
+    workers: int = 1,
+) -> Census:  # fmt: skip
+    """Which integrator every installed engine really runs, by its states; by these labels or globs alone."""
+    from springcheck.studies.census import measure
+
+    with spoken(), labels_of(methods) as named:
+        return measure.record(path, named, **how(methods, force, workers))
+
+
+def ensemble(
+    scene: Scene | str | Path, vary: Mapping[str, str | Sequence[float]],
+    methods: str | Step | Sequence[str | Step] = (), *, samples: int | None = None, seed: int = 0,
+    path: str | Path | None = None, force: bool = False, workers: int = 1,
+) -> Ensemble:  # fmt: skip
+    """One scene over many parameters: error, energy and end of each cell.
+
+    `vary` names fields of the scene file, each with its values or with ``"LOW:HIGH:COUNT"`` (``":log"`` after
+    it spaces them by ratios): ``{"spring.0.stiffness": [1, 2, 4], "time.step": "0.01:0.1:8:log"}``.  With
+    `samples` each is ``"LOW:HIGH"``, drawn evenly from `seed`.
+    """
+    from springcheck.studies.ensemble import measure
+    from springcheck.studies.ensemble.vary import plan
+
+    found = scene_of(scene)
+    given = [
+        f"{field}={values if isinstance(values, str) else ','.join(repr(float(x)) for x in values)}"
+        for field, values in vary.items()
+    ]
+    with spoken(), labels_of(methods) as named:
+        text = found.to_toml() if isinstance(scene, Scene) else scenefile.text_of(scene)
+        cells = plan(given, samples, seed, text=text)
+        return measure.record(found, cells, path, named, **how(methods, force, workers))
+
+
+def methods(scene: Scene | str | Path | None = None) -> Shelf:
+    """Every method that is known: its label, its scheme, whether it runs by default, and why it cannot be
+    used (its engine is not installed, or it cannot serve the `scene`); "" where it can."""
+    from springcheck.cli import listing
+
+    return Shelf(listing.methods(None if scene is None else scene_of(scene)))
+
+
+def explain(word: str) -> Said:
+    """A check, scheme, method, fault, finding or one of the ten words, in words, from what the code knows.
+
+    SpringcheckError where the word names nothing.
+    """
+    from springcheck.cli import explain as explaining
+
+    return Said("\n".join(explaining.lines(word)))
+
+
+def report(path: str | Path, output: str | Path | None = None) -> Path:
+    """A store as one HTML page that checks itself in a browser; `output` is its name with .html by default.
+
+    StoreError where `path` cannot be read, or another file stands where the page would.
+    """
+    from springcheck.cli import page
+
+    into = Path(output or f"{Path(path).stem}.html")
+    with spoken():
+        page.write(page.gather(Path(path)), into)
+    return into

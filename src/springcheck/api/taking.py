@@ -1,0 +1,79 @@
+"""What the functions of Python are given: scenes, methods, functions of one's own, a way to measure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from springcheck.errors import SpringcheckError
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from springcheck.studies.keeper import How
+
+Step = Callable[..., Any]
+"""A function ``step(q, p, h, force, mass) -> (q, p)``: numbers of one particle, or arrays (n,); `force(q)`
+gives the force at q."""
+
+
+@contextmanager
+def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> Iterator[list[str]]:
+    """Labels of these methods; functions among them are an engine within this context, and not after it."""
+    several = [methods] if isinstance(methods, str) or callable(methods) else list(methods)
+    steps = [one for one in several if not isinstance(one, str)]
+    if not steps and scheme:
+        raise SpringcheckError(f"scheme={scheme!r} goes with a function of yours; methods have their own")
+    if not steps:
+        yield [one for one in several if isinstance(one, str)]
+        return
+    from springcheck.doors import function
+
+    with function.while_here(steps, scheme) as made:
+        named = iter(made)
+        yield [one if isinstance(one, str) else next(named) for one in several]
+
+
+def how(methods: Any, force: bool, workers: int) -> How:
+    """How a study is measured.  A function of this process is not known to others."""
+    several = [methods] if isinstance(methods, str) or callable(methods) else methods
+    if workers > 1 and any(callable(one) for one in several):
+        raise SpringcheckError("workers: a function of yours is known to this process alone; leave it out")
+    from springcheck.studies.team import Processes
+
+    return {"force": force, "progress": None, "team": Processes(workers)}
+
+
+@contextmanager
+def spoken() -> Iterator[None]:
+    """Messages that name options of the command name the arguments of the call instead."""
+    try:
+        yield
+    except SpringcheckError as error:
+        said = str(error).replace("--force", "force=True").replace("that command", "that call")
+        said = re.sub(r"(?<![\w-])-o\b", "path=", re.sub(r"--([a-z]+)\b", r"\1=", said))
+        if said != str(error):
+            raise type(error)(said) from error
+        raise
+
+
+def scene_of(scene: Scene | str | Path) -> Scene:
+    """A scene, shipped or read, by what it is named by."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return scenefile.load_scene(scene)
+    raise SpringcheckError(f"a Scene, or the name or path of one, is needed, not {type(scene).__name__}")
+
+
+def trajectory_of(found: Any) -> Trajectory:
+    """What is given, if it is one."""
+    if isinstance(found, Trajectory):
+        return found
+    raise SpringcheckError(
+        f"a Trajectory is needed, not {type(found).__name__}: simulate gives one, read many"
+    )

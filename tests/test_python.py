@@ -1,0 +1,254 @@
+"""Python has what the command has: every study a function, a function of one's own a method, nothing kept on
+disk unless it is asked for, and results that show themselves."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import api, engines
+from springcheck.errors import MethodError, SceneError, SpringcheckError, StoreError
+
+
+def leapfrog(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def heavy(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
+    """Velocity Verlet that leaves the mass out."""
+    return leapfrog(q, p, h, force, 1.0)
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def need(library: str) -> Any:
+    if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
+        return pytest.importorskip(library)
+    return __import__(library)
+
+
+def test_a_function_of_ones_own_is_a_method_for_its_call_alone() -> None:
+    scene = springcheck.load_scene("spring-uneven")
+    run = springcheck.simulate(scene, leapfrog)
+    assert run.label == "stepper:leapfrog"
+    assert run.scheme == "velocity-verlet"
+    assert springcheck.judge(scene, run).passed
+    assert "stepper" not in engines.names()
+    with pytest.raises(MethodError, match="stepper"):
+        springcheck.simulate(scene, "stepper:leapfrog")
+    report = springcheck.run(scene, [heavy, "own:velocity-verlet"], scheme="velocity-verlet")
+    assert [one.method for one in report.runs] == ["stepper:heavy", "own:velocity-verlet"]
+    assert report.status == 1
+    failed = api.Verdicts(report.verdicts).failed
+    assert {verdict.method for verdict in failed} == {"stepper:heavy"}
+    assert "mass" in failed[0].why
+    with pytest.raises(SpringcheckError, match="goes with a function of yours"):
+        springcheck.simulate(scene, "own:euler", scheme="velocity-verlet")
+    unknown = springcheck.judge(scene, springcheck.simulate(scene, heavy))
+    assert not unknown.failed
+    assert not unknown.passed, "of no scheme nothing is judged"
+    with pytest.raises(MethodError, match="cannot be called as a step"):
+        springcheck.simulate(scene, lambda q, p: (q, p))
+
+
+def test_run_leaves_nothing_on_disk_unless_it_is_asked_to() -> None:
+    report = springcheck.run("spring", ["own:euler", "own:velocity-verlet"])
+    assert list(Path().iterdir()) == []
+    assert repr(report) == "Report('spring', 2 methods: " + report.counts + ")"
+    alone = springcheck.simulate("spring", "own:euler")
+    assert np.array_equal(report["own:euler"].q, alone.q)
+    assert "Stored" not in str(report)
+    assert {"phase-portrait", "energy", "error"} <= set(report.figures())
+    kept = springcheck.run("spring", "own:euler", path="kept.h5")
+    assert np.array_equal(kept["own:euler"].p, alone.p)
+    assert [path.name for path in Path().iterdir()] == ["kept.h5"]
+
+
+def test_messages_speak_of_arguments_and_not_of_options() -> None:
+    springcheck.run("spring", "own:euler", path="x.h5")
+    with pytest.raises(StoreError, match=r"x\.h5 exists: force=True writes it anew, path= writes another"):
+        springcheck.run("spring", "own:euler", path="x.h5")
+    springcheck.run("spring", "own:euler", path="x.h5", force=True)
+    with pytest.raises(SpringcheckError, match="needs vary= FIELD=LOW:HIGH"):
+        springcheck.ensemble("spring", {})
+
+
+def test_a_method_that_is_not_one_is_answered_with_the_nearest() -> None:
+    with pytest.raises(MethodError, match=r"did you mean [a-z]+:verlet"):
+        springcheck.simulate("spring", "verlet")
+
+
+def shown(result: Any, name: str) -> Any:
+    """The table of a result, after a look at its line and its HTML."""
+    pandas = need("pandas")
+    assert repr(result).startswith(f"{name}(")
+    assert len(repr(result)) < 160
+    assert "\n" not in repr(result)
+    html = result._repr_html_()
+    assert html.startswith("<pre>")
+    assert str(result).count("\n") > 3
+    frame = result.to_dataframe()
+    assert isinstance(frame, pandas.DataFrame)
+    assert len(frame) > 0
+    return frame
+
+
+def test_every_study_has_a_function_whose_result_shows_itself() -> None:
+    two = ["own:euler", "own:velocity-verlet"]
+    frame = shown(springcheck.precision("spring", two, budget=0.2), "PrecisionStudy")
+    assert set(frame["method"]) <= set(two)
+    assert {"max_error", "run_seconds"} <= set(frame.columns)
+    limits = springcheck.stability("spring", two)
+    found = shown(limits, "Stability").set_index("method")["limit"]
+    assert found["own:velocity-verlet"] == pytest.approx(2, rel=1e-6)
+    assert limits.figures()
+    census = shown(springcheck.census(two), "Census")
+    assert list(census["found"]) == ["explicit-euler", "velocity-verlet"]
+    cells = springcheck.ensemble("spring", {"spring.0.stiffness": [1, 4], "time.step": "0.05:0.1:3"}, two)
+    table = shown(cells, "Ensemble")
+    assert len(table) == 12
+    wide = table[(table["method"] == two[1]) & (table["spring.0.stiffness"] == 4)]
+    # the same number of steps: error h**2 over a time that grows with h
+    small, large = (float(wide[wide["time.step"] == h]["max_error"].iloc[0]) for h in (0.05, 0.1))
+    assert 7 < large / small < 9
+    assert cells.figures()
+    assert list(Path().iterdir()) == []
+
+
+def test_an_atlas_and_the_faults_show_themselves() -> None:
+    from springcheck.studies.extremes.judging import Cell
+    from springcheck.studies.extremes.result import Atlas
+    from springcheck.studies.faults.result import Clean, FaultReport, Result
+
+    cell = Cell(
+        method="own:euler", block="a", parameters={"h_w": 0.1}, outcome="right", reason="", value=0, bound=1
+    )
+    atlas = Atlas(cells=(cell, cell), windows=(), left_out=())
+    assert repr(atlas) == "Atlas(2 right)"
+    assert len(atlas.to_dataframe() if need("pandas") else ()) == 2
+    one = Result(name="a", about="b", size=None, rejected_by=("x",), missed_by=("y",), limits={})
+    faults = FaultReport(results=(one,), clean=Clean(runs=3, verdicts=9, alarms=()))
+    assert repr(faults) == "FaultReport(1 fault, 1 missed, 0 false alarms in 9 verdicts)"
+    assert list(faults.to_dataframe()["missed_by"]) == [["y"]]
+
+
+def test_methods_and_words_and_pages_are_functions_too() -> None:
+    rows = springcheck.methods("lc-circuit")
+    by = {row["method"]: row for row in rows}
+    assert by["own:velocity-verlet"]["why not"] == ""
+    assert "not circuits" in by["openmm:verlet"]["why not"] or "installed" in by["openmm:verlet"]["why not"]
+    assert repr(rows).splitlines()[0].split()[:2] == ["method", "scheme"]
+    assert rows._repr_html_().count("<tr>") == len(rows) + 1
+    said = springcheck.explain("velocity-verlet")
+    assert repr(said) == said
+    assert said.startswith("velocity-verlet: ")
+    with pytest.raises(SpringcheckError, match="did you mean velocity-verlet"):
+        springcheck.explain("velocity-verlt")
+    springcheck.run("spring", "own:euler", path="x.h5")
+    assert springcheck.report("x.h5") == Path("x.html")
+    assert Path("x.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_verdicts_have_a_summary_and_name_what_failed() -> None:
+    run = springcheck.simulate("spring-uneven", "own:velocity-verlet")
+    good = springcheck.judge("spring-uneven", run)
+    assert good.passed
+    assert repr(good) == f"Verdicts({good.summary})"
+    bad = springcheck.judge(
+        "spring-uneven", springcheck.simulate("spring-uneven", heavy, scheme="velocity-verlet")
+    )
+    assert not bad.passed
+    assert bad.summary.split()[1:4:2] == ["of", "failed:"]
+    assert len(repr(bad).splitlines()) == len(bad.failed) + 1
+    assert bad._repr_html_().count("FAILED") == len(bad.failed)
+    assert not api.Verdicts().passed
+    if need("pandas"):
+        assert list(bad.to_dataframe()["passed"]) == [verdict.passed for verdict in bad]
+
+
+def test_a_trajectory_is_made_of_plain_arrays_and_knows_its_error() -> None:
+    scene = springcheck.load_scene("spring-uneven")
+    t = np.arange(scene.frames) * scene.step * scene.every
+    exact = springcheck.exact(scene)
+    mine = springcheck.Trajectory.from_arrays(t, exact.q[:, 0], v=exact.v[:, 0], scene=scene, scheme="exact")
+    np.testing.assert_array_equal(mine.q, exact.q)
+    np.testing.assert_allclose(mine.p, exact.p, rtol=4e-16)
+    np.testing.assert_allclose(mine.v * scene.m, mine.p, rtol=4e-16)
+    # what is left is the rounding of the exact solution to double precision
+    assert mine.error().max() < 1e-14
+    off = springcheck.simulate(scene, "own:euler")
+    assert off.error().shape == off.t.shape
+    assert off.error()[0] == 0
+    report = springcheck.run(scene, "own:euler")
+    assert off.error().max() == pytest.approx(report.runs[0].max_error, rel=1e-12)
+    with pytest.raises(SpringcheckError, match="its scene is not known"):
+        springcheck.Trajectory.from_arrays(t, exact.q, exact.p).error()
+    for wrong, words in (
+        ({"q": exact.q[:-1], "p": exact.p}, "do not fit together"),
+        ({"q": exact.q}, "momenta p or velocities v= are needed"),
+        ({"q": exact.q, "v": exact.v}, "mass= or scene="),
+    ):
+        with pytest.raises(SpringcheckError, match=words):
+            springcheck.Trajectory.from_arrays(t, **wrong)
+
+
+@pytest.mark.parametrize("name", ["states.csv", "states.npz"])
+def test_what_a_trajectory_saves_reads_back_to_the_last_bit_and_is_identified(name: str) -> None:
+    run = springcheck.simulate("spring-uneven", "own:velocity-verlet")
+    path = run.save(name)
+    if path.suffix == ".csv":
+        values = np.loadtxt(path, delimiter=",", skiprows=1)
+        assert np.array_equal(values, np.column_stack([run.t, run.q, run.p]))
+    found = springcheck.identify(path, mass=float(run.scene.m[0]))
+    assert next(iter(found.values())).scheme == "velocity-verlet"
+    with pytest.raises(SpringcheckError, match=r"\.csv or \.npz"):
+        run.save("states.txt")
+    with pytest.raises(SpringcheckError, match="cannot be written"):
+        run.save(f"nowhere/{name}")
+
+
+def test_a_trajectory_draws_itself_beside_the_exact_solution() -> None:
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    from matplotlib.figure import Figure
+
+    run = springcheck.simulate("spring", "own:euler")
+    axes = Figure().add_subplot()
+    assert run.plot(axes) is axes
+    assert [line.get_label() for line in axes.lines] == ["exact", "own:euler"]
+    np.testing.assert_array_equal(axes.lines[1].get_xydata(), np.column_stack([run.q, run.p]))
+    assert run.plot().lines
+
+
+def test_identify_reads_a_data_frame_whose_index_may_be_the_time() -> None:
+    pandas = need("pandas")
+    run = springcheck.simulate("spring-uneven", "own:velocity-verlet")
+    mass = float(run.scene.m[0])
+    assert springcheck.identify(run.to_dataframe(), mass=mass).scheme == "velocity-verlet"
+    named = pandas.DataFrame({"time": run.t, "x": run.q[:, 0], "v": run.v[:, 0], "note": "?"})
+    found = springcheck.identify(named, mass=mass)
+    assert found.scheme == "velocity-verlet"
+    with pytest.raises(StoreError, match="no column of times"):
+        springcheck.identify(named.drop(columns="time"))
+
+
+def test_a_scene_is_replaced_by_the_names_of_its_fields() -> None:
+    scene = springcheck.load_scene("spring")
+    assert scene.replace(step=0.05, steps=400).step == 0.05
+    assert scene.step == 0.1
+    with pytest.raises(SceneError, match="has no 'stepp', did you mean step"):
+        scene.replace(stepp=0.05)
+    with pytest.raises(SceneError, match="steps"):
+        scene.replace(steps=-1)
