@@ -32,7 +32,10 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
         return None
     if v is None:
         u = u / m
-    found = [identify_thermal(times, x, y) for x, y in zip(positions.T, u.T, strict=True)]
+    found = [
+        identify_thermal(times, x, y, np.delete(positions, j, axis=1))
+        for j, (x, y) in enumerate(zip(positions.T, u.T, strict=True))
+    ]
     if any(one is None for one in found):
         return None
     known = [one for one in found if one is not None]
@@ -65,6 +68,8 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
             "one scheme is named where it beats every other by a factor of 1e6; a stated stiffness, or more "
             "frames, may tell them apart"
         )
+    if sparse := next((one.sparser for one in found if one.sparser), None):
+        notes.append(f"every step {sparse[1]} of {sparse[0]} would leave such frames nearly as well")
     if first.free:
         combination = ", ".join(f"{x:.9g}" for x in first.free)
         notes.append(f"free of noise at every step: ({combination}) on (x', v', x, v), to {first.misfit:.0e}")
@@ -76,7 +81,9 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
     elif best:
         statement = f"{head}, {' or '.join(kept)}"
     else:
-        statement = f"{head}, by no scheme that is known here, or frames lie several steps apart"
+        statement = (
+            f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
+        )
     only = candidates[0] if named else None
     return Identification(
         verdict=verdict, statement=statement, scheme=best if named else None, aliases=(),

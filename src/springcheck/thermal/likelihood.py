@@ -68,17 +68,25 @@ class Thermal:
     """How far it is from 0, over the size of the noise."""
     uniform: bool
     """Whether the draws are uniform rather than normal."""
+    sparser: tuple[str, int] | None = None
+    """A scheme of which every so many steps would do nearly as well as the best candidate."""
 
     @property
     def named(self) -> bool:
-        """Whether one scheme beats every other."""
-        return bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
+        """Whether one scheme beats every other, and every other of smaller steps."""
+        best = bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
+        return best and self.sparser is None
 
 
-def identify_thermal(t: Floats, q: Floats, v: Floats) -> Thermal | None:
+JOINED = 6.0
+"""Standard deviations of a correlation, from which on particles are joined: 2e-9 of those that are not."""
+
+
+def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = None) -> Thermal | None:
     """What thermostat made positions q and velocities v (f,) at times t (f,); None where none seems to have.
 
-    Deterministic motion, coupled or not, leaves no noise of which one frame says nothing to the next.
+    Of a particle that follows those `beside` it (f, others) no scheme is told.  Deterministic motion, coupled
+    or not, leaves no noise of which one frame says nothing to the next.
     """
     if len(t) < FEWEST or not np.isfinite([q, v]).all():
         return None
@@ -95,17 +103,35 @@ def identify_thermal(t: Floats, q: Floats, v: Floats) -> Thermal | None:
         return None
     z = np.stack([x, u])
     left = _left(z)
+    if beside is not None and _follows(left[1], beside[:-1], z):
+        return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
+        misfit = weights[4] / weights[3]
+        # what digits leave of it is white but for neighbours, which share a frame
+        digits = misfit < 1e-9 or _is_white((frames @ turned[4])[::2] / np.std(frames @ turned[4]))
         # of one draw the position and the momentum leave the same
-        return _of_one(q, v, h, free / free[0], weights[4] / weights[3], left[1]) if free[0] else None
+        return _of_one(q, v, h, free / free[0], misfit, left[1]) if free[0] and digits else None
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
         return _of_two_halves(q, h, float(np.std(jump) / sizes[0]))
     if not all(map(_is_white, left)):
         return None
-    found = _likely(TWO, q, v, h)
-    return Thermal(candidates=tuple(found), free=(), misfit=nan, uniform=_is_uniform(left[1]))
+    found = Thermal(
+        candidates=tuple(_likely(TWO, q, v, h)), free=(), misfit=nan, uniform=_is_uniform(left[1])
+    )
+    return replace(found, sparser=_sparser(found.candidates[0], q, v, h)) if found.named else found
+
+
+def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
+    """Whether what a map of its own leaves of a particle depends on where others are."""
+    known = np.concatenate([z[:, :-1], np.ones((1, len(left)))]).T
+    for x in beside.T:
+        rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
+        size = float(np.linalg.norm(rest))
+        if size > 0 and abs(float(rest @ left)) > JOINED * size:
+            return True
+    return False
 
 
 def _left(z: Floats) -> Floats:
@@ -136,7 +162,7 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
         if -b > h / 2:
             found = _likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
         # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-        found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h))]
+        found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h, len(q)))]
     elif near(b, d) and near(b, -h / 2) and near(c, -1):
         found = _likely(("aboba", "aoboa"), q, v, h)
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
@@ -150,10 +176,8 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
         found = [Candidate(scheme=name, **known) for name in ("andersen", "andersen-after-kick")]
         left = np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
-        if near(b, -h) and abs(np.corrcoef(v[1:], v[:-1])[0, 1]) > 0.5:
-            found = []
-        elif near(b, -h):
-            found = [Candidate(scheme="brownian")]
+        if near(b, -h):
+            found = [Candidate(scheme=name) for name in _of_no_memory(q, v, close)]
         elif -b < h and _is_correlated(left):
             roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
             rates = {n: _rate(root, -b / h) for n, root in roots.items()}
@@ -195,17 +219,42 @@ def _decay(q: Floats, v: Floats) -> float:
     return float(np.linalg.det(np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0]))
 
 
-def _as_gj(number: str, decay: float, t: float, h: float) -> Candidate | None:
-    """What a GJ scheme of this decay would mean by the null vector (1, -t, -1, -t)."""
-    x = _rate(GJ[number], decay)
-    if not x:
-        return None
-    stretch = float(np.sqrt(2 * (1 - decay) / ((1 + decay) * x)))
-    a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
-    # GJ-I does not stretch, and knows its spring whatever its friction
-    error = 0.0 if number == "i" else nan
-    known = {"omega": float(np.sqrt(a) / h), "omega_error": error, "friction": x / h} if a > 0 else None
-    return Candidate(scheme=f"gj-{number}", **known) if known else None
+def _as_gj(number: str, decay: float, t: float, h: float, n: int) -> Candidate | None:
+    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay known from n frames."""
+    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n))
+    for of_decay in (decay, decay - error, decay + error):
+        x = _rate(GJ[number], of_decay)
+        if not x:
+            continue
+        stretch = float(np.sqrt(2 * (1 - of_decay) / ((1 + of_decay) * x)))
+        a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
+        if a > 0:
+            # GJ-I does not stretch, and knows its spring whatever its friction
+            known = 0.0 if number == "i" else nan
+            return Candidate(
+                scheme=f"gj-{number}", omega=float(np.sqrt(a) / h), omega_error=known, friction=x / h
+            )
+    return None
+
+
+def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
+    """Of positions that follow their velocities, v = (x' - x)/h: those that a bath draws anew at every step,
+    or at some, between which leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
+    with np.errstate(all="ignore"):
+        slopes = np.sort((v[2:] - 2 * v[1:-1] + v[:-2]) / (q[1:-1] - q[:-2]))
+        together = slopes[4:] - slopes[:-4]
+        if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
+            return ("andersen-leapfrog",)
+    known = np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1)
+    left, inverse = (
+        v[1:] - known @ np.linalg.lstsq(known, v[1:], rcond=None)[0],
+        np.linalg.inv(known.T @ known),
+    )
+    memory = np.linalg.lstsq(known, v[1:], rcond=None)[0][0] / np.sqrt(np.var(left) * inverse[0, 0])
+    if abs(memory) > 5:
+        # digits may hide that five steps of leapfrog have one slope
+        return () if close < 1e-6 else ("andersen-leapfrog",)
+    return ("brownian",) if close < 1e-6 else ("brownian", "andersen-leapfrog")
 
 
 def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
@@ -255,9 +304,7 @@ def _likely(
     """
     from scipy.optimize import minimize
 
-    z = np.stack([q - np.mean(q), v - np.mean(v)])
-    n, both = z.shape[1] - 1, np.concatenate([z[:, 1:], z[:, :-1]])
-    moments = both @ both.T / n
+    moments, n = _moments(q, v)
     single = names[0] not in TWO
 
     def minus(name: str, at: Floats) -> float:
@@ -272,13 +319,12 @@ def _likely(
             thermal=float(np.exp(at[1])),
         )
         A, G = law.A[0].astype(float), law.G[0].astype(float)
+        Q = G @ G.T
+        if not single:
+            return _nats(A, Q, moments, n)
+        # the position says what the momentum says
         over = np.concatenate([np.eye(2), -A], axis=1)
-        seen, Q = over @ moments @ over.T, G @ G.T
-        if single:
-            # the position says what the momentum says
-            value = np.log(Q[1, 1]) + seen[1, 1] / Q[1, 1]
-        else:
-            value = np.log(np.linalg.det(Q)) + np.trace(np.linalg.solve(Q, seen))
+        value = np.log(Q[1, 1]) + (over @ moments @ over.T)[1, 1] / Q[1, 1]
         return n / 2 * float(value) if np.isfinite(value) else 1e300
 
     A = moments[:2, 2:] @ np.linalg.inv(moments[2:, 2:])
@@ -314,6 +360,54 @@ def _likely(
         if not best - floor < 25:
             return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
+
+
+def _sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
+    """The first scheme of which every few steps fall short of the best candidate by less than `ODDS`.
+
+    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them.
+    """
+    from scipy.optimize import minimize
+
+    moments, n = _moments(q, v)
+    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2])
+
+    def minus(name: str, every: int, at: Floats) -> float:
+        x, thermal, a = np.exp(at)
+        law = Law(
+            scheme=THERMOSTATS[name], h=h / every, m=np.ones(1), k=a / h**2 * np.ones(1), rate=float(x) / h,
+            thermal=float(thermal),
+        )  # fmt: skip
+        S = law.covariance[0]
+        if not np.isfinite(S).all():
+            return 1e300
+        A = law.autocovariance(every)[0] @ np.linalg.inv(S)
+        return _nats(A, S - A @ S @ A.T, moments, n)
+
+    least = minus(best.scheme, 1, start)
+    how = {"xatol": 1e-3, "fatol": 1e-2, "maxiter": 300}
+    for every in (2, 3, 4, 8):
+        for name in THERMOSTATS:
+            with np.errstate(all="ignore"):
+                fit: Any = minimize(partial(minus, name, every), start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
+            if fit.fun - least < ODDS:
+                return name, every
+    return None
+
+
+def _moments(q: Floats, v: Floats) -> tuple[Floats, int]:
+    """Second moments of (x', v', x, v), (4, 4), and of how many frames."""
+    z = np.stack([q - np.mean(q), v - np.mean(v)])
+    n, both = z.shape[1] - 1, np.concatenate([z[:, 1:], z[:, :-1]])
+    return np.asarray(both @ both.T / n), n
+
+
+def _nats(A: Floats, Q: Floats, moments: Floats, n: int) -> float:
+    """Minus the logarithm of the likelihood of n frames of these moments, of map A and covariance Q."""
+    over = np.concatenate([np.eye(2), -A], axis=1)
+    seen = over @ moments @ over.T
+    value = np.log(np.linalg.det(Q)) + np.trace(np.linalg.solve(Q, seen))
+    return n / 2 * float(value) if np.isfinite(value) else 1e300
 
 
 def _errors(minus: Callable[[Floats], float], at: Floats) -> Floats:

@@ -1,0 +1,50 @@
+"""The campaign at temperature, in short: `validation/thermal_campaign.py` counts thousands of cases."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "validation"))
+_spec = importlib.util.spec_from_file_location(
+    "thermal_campaign", ROOT / "validation" / "thermal_campaign.py"
+)
+assert _spec is not None
+assert _spec.loader is not None
+campaign = importlib.util.module_from_spec(_spec)
+sys.modules["thermal_campaign"] = campaign
+_spec.loader.exec_module(campaign)
+
+WRONG_BEFORE = (37, 104, 123, 134, 135, 148, 154, 185, 292)
+"""Cases that had a wrong name, or a list without the right one."""
+
+
+@pytest.mark.parametrize("case", WRONG_BEFORE)
+def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
+    scheme, kind, (t, q, p, scene) = campaign.file_of(case)
+    found = campaign.of_bath(t, q, p, None, scene.m)
+    assert found is None or found.scheme in (None, scheme), kind
+    if kind in ("whole", "single", "text"):
+        assert found is not None
+        assert scheme in [one.scheme for one in found.candidates]
+
+
+@pytest.mark.parametrize("case", [1000, 1031, 1062, 1093, 1124])
+def test_a_file_of_each_kind_has_no_wrong_name(case: int) -> None:
+    scheme, _, (t, q, p, scene) = campaign.file_of(case)
+    found = campaign.of_bath(t, q, p, None, scene.m)
+    assert found is None or found.scheme in (None, scheme)
+
+
+def test_a_campaign_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "HERE", tmp_path)
+    campaign.add("alarms", 3)
+    known = campaign.add("alarms", 2)
+    assert known["cases"] == 5
+    assert known["found"]["runs"] == 5
+    assert json.loads((tmp_path / "alarms.json").read_text()) == known
