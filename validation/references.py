@@ -56,7 +56,9 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
         for axis in row.get("axis", "xyz"[: len(rows[particle]["position"])]):
             ends = [end if end == "wall" else number[end, axis] for end in row["ends"]]
             springs.append({**row, "ends": ends})
-    return {**table, "particle": apart, "spring": springs}
+    rods = [[[number[i, axis] for i in row["ends"]] for axis in "xyz"[: len(rows[0]["position"])]]
+            for row in table.get("rod", ())]  # fmt: skip
+    return {**table, "particle": apart, "spring": springs, "rod": rods}
 
 
 class System:
@@ -72,6 +74,18 @@ class System:
         }[next(name for name in ("particle", "rotor", "inductor") if name in table)]
         self.m, self.q, self.p = ([mp.mpf(row.get(name, 0)) for row in rows] for name in names)
         self.table = table
+        for axes in table.get("rod", ()):
+            self.take_off(axes)
+
+    def take_off(self, axes: list[list[int]]) -> None:
+        """Take off the momenta what moves the ends of a rod apart, which doubles leave of them."""
+        r = [self.q[b] - self.q[a] for a, b in axes]
+        v = [self.p[b] / self.m[b] - self.p[a] / self.m[a] for a, b in axes]
+        along = mp.fsum(x * y for x, y in zip(r, v, strict=True)) / mp.fsum(x * x for x in r)
+        for (a, b), x in zip(axes, r, strict=True):
+            push = along * x / (1 / self.m[a] + 1 / self.m[b])
+            self.p[a] += push
+            self.p[b] -= push
 
     def springs(self) -> list[tuple[list[tuple[int, int]], Any, Any]]:
         """((particle, sign) of each end, stiffness, rest) with elongation sum of sign * q - rest."""
@@ -104,6 +118,7 @@ class System:
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
         laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
+        laws += [_Rod(axes, self.m) for axes in self.table.get("rod", ())]
         springs, friction = self.springs(), self.friction()
         for order in range(ORDER):
             force = [mp.mpf(0)] * n
@@ -191,6 +206,26 @@ class _Driven:
         self.x.append(u[self.i][order] - (self.row.get("at", 0) if order == 0 else 0))
         self.k.append(self.row["stiffness"] * ((order == 0) + self.row["depth"] * cosine))
         force[self.i] -= _product(self.k, self.x, order)
+
+
+class _Rod:
+    """Between two particles that nothing else pulls; the multiplier from r r = l**2, differentiated twice."""
+
+    def __init__(self, axes: list[list[int]], m: list[Any]) -> None:
+        self.axes = axes
+        self.mass = 1 / (1 / m[axes[0][0]] + 1 / m[axes[0][1]])
+
+    def add(self, u: Series, order: int, force: list[Any]) -> None:
+        r = [[u[b][j] - u[a][j] for j in range(order + 2)] for a, b in self.axes]
+        v = [[(j + 1) * x[j + 1] for j in range(order + 1)] for x in r]
+        square = mp.fsum(x[0] ** 2 for x in r)
+        if order == 0:
+            self.k: list[Any] = []
+        self.k.append(-mp.fsum(_product(x, x, order) for x in v) / square)
+        for (a, b), x in zip(self.axes, r, strict=True):
+            push = self.mass * _product(self.k, x, order)
+            force[b] += push
+            force[a] -= push
 
 
 def moved(system: System, start: Any, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:

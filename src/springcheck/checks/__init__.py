@@ -29,6 +29,7 @@ from springcheck.checks.check import shared
 from springcheck.checks.motion import angular_momentum, closed_form, frequency, momentum, shadow_energy
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED
+from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step_defect
 from springcheck.errors import MethodError
@@ -58,6 +59,9 @@ CHECKS: tuple[Check, ...] = (
     frequency,
     momentum,
     angular_momentum,
+    rod_length,
+    rod_velocity,
+    turn,
     energies,
     tolerance,
 )
@@ -87,7 +91,8 @@ RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
 _TELLING = [
     one.name
     for one in ALL
-    if one.family in ("motion", "map", "law") and one not in (momentum, angular_momentum)
+    if one.family in ("motion", "map", "law")
+    and one not in (momentum, angular_momentum, rod_length, rod_velocity)
 ]
 TELLING = frozenset(["identified", *_TELLING, *(one.name for one in thermal.DRAWN)])
 """Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""

@@ -116,17 +116,18 @@ class Case(Claim):
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 
     def allowance_at(
-        self, q: Reals, p: Reals, *, smallest: np.longdouble = rounding.SMALLEST
+        self, q: Reals, p: Reals, *, smallest: np.longdouble = rounding.SMALLEST, paired: bool = False
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
-        `smallest` is what an operation may lose to underflow.
+        `smallest` is what an operation may lose to underflow.  `paired` leaves out the tolerance of rods,
+        whose pushes cancel, and turn nothing, however large they are.
         """
         places: list[Reals] | None = [] if self.placed else None
         if self.placed:
             self.step(q.astype(np.longdouble), p.astype(np.longdouble), met=places)
         with np.errstate(all="ignore"):
-            return rounding.of_step(self, q, p, places, smallest=smallest)
+            return rounding.of_step(self, q, p, places, smallest=smallest, paired=paired)
 
     @cached_property
     def allowance_of_stretches(self) -> Extended:

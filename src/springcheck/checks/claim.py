@@ -61,14 +61,16 @@ class Claim:
         forces: Callable[[Iterable[Term]], Force] | None = None,
         met: list[Reals] | None = None,
         slope: Slope | None = None,
+        varied: bool = False,
     ) -> tuple[Extended, Extended]:
         """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
 
         `slope` stands for the scene's own where the states are not positions.  `near` is where an engine
-        came to: of several solutions of an implicit step, the one there is the scheme's.
+        came to: of several solutions of an implicit step, the one there is the scheme's.  `varied` says that
+        all states but the first are changes of it.
         """
         with np.errstate(all="ignore"):
-            a, b = self.law.step(q, p, near=near, forces=forces, met=met, slope=slope)
+            a, b = self.law.step(q, p, near=near, forces=forces, met=met, slope=slope, varied=varied)
         return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
 
     @property

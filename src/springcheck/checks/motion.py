@@ -206,7 +206,7 @@ def momentum(case: Case) -> Finding | str:
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
     with np.errstate(over="ignore", invalid="ignore"):
-        _, of_p = case.allowance_at(run.q, run.p)
+        _, of_p = case.allowance_at(run.q, run.p, paired=True)
     unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
     if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
@@ -244,7 +244,7 @@ def angular_momentum(case: Case) -> Finding | str:
     run, steps = case.trajectory, case.steps
     start = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
     with np.errstate(over="ignore", invalid="ignore"):
-        noise = case.allowance_at(run.q, run.p)
+        noise = case.allowance_at(run.q, run.p, paired=True)
         if steps[0] != 0:
             # nothing bounds the motion before this piece: it is judged from its own first frame on
             steps, start = steps - steps[0], (run.q[0].astype(np.longdouble), run.p[0].astype(np.longdouble))

@@ -23,13 +23,14 @@ def of_step(
     *,
     smallest: np.longdouble = SMALLEST,
     recorded: bool = False,
+    paired: bool = False,
 ) -> tuple[Extended, Extended]:
     """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
     `places` are the positions at which the scheme evaluates the force on its way: a law that bends is
     weighed there, and so is the solution of an implicit stage.  `smallest` is what an operation may lose to
     underflow.  `recorded` says that the step starts and ends at recorded positions, which are not rounded
-    once more.
+    once more.  For `paired` see `Case.allowance_at`.
     """
     run, scene = case.trajectory, case.judged
     how = run.arithmetic
@@ -43,6 +44,8 @@ def of_step(
         m=m,
         rate=case.law.rate,
         met=_evaluations(case, places, recorded),
+        hold=case.system.rods,
+        loose=0.0 if paired else how.lengths / (how.state * case.roundings),
     )
     # the scheme's own step, which it is compared with, rounds as well
     state = how.state + ROUNDOFF

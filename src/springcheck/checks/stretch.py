@@ -150,7 +150,7 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     with np.errstate(all="ignore"):
         for _ in range(steps):
             both = np.concatenate([on[:, None], off], axis=1)
-            off = np.stack(case.step(*both, forces=forces, slope=slope))[:, 1:]
+            off = np.stack(case.step(*both, forces=forces, slope=slope, varied=True))[:, 1:]
             on, last = _one(case, *on)
             off = off + last[:, None] * rng.choice(np.array([-1.0, 1.0]), size=off.shape)
             reach = np.maximum(reach, np.abs(on))
@@ -204,7 +204,7 @@ def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
         # the changes solve the linear equations that belong to the motion
         return case.system.slope(q[0])[0][None], not separate
 
-    q, p = case.step(dq, dp, forces=variational(case.system), slope=slope)
+    q, p = case.step(dq, dp, forces=variational(case.system), slope=slope, varied=True)
     return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in (q, p)], axis=-2)
 
 

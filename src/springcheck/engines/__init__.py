@@ -13,6 +13,7 @@ from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
 
+from springcheck import schemes
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
@@ -228,6 +229,10 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
+    if scene.system.rods:
+        longest = schemes.scheme(what.scheme).longest_drift
+        if held := scene.system.rods.too_fast(scene.q, scene.p, scene.step * longest):
+            return held
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:

@@ -16,6 +16,9 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.schemes import scheme
 
+ANCHOR_MASS = 2.0**100
+"""Mass of a particle that stands for the fixed end of a rod: a massless one cannot have any [u]."""
+
 
 def origins(scene: Scene, scheme_name: str) -> Floats:
     """Where each particle's coordinate in such a program is counted from, (n,) [L].

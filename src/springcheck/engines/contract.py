@@ -18,11 +18,14 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
+    RODS = "rods"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
         if self is Need.DAMPING:
             return any(term.key == "damping" for term in scene.terms)
+        if self is Need.RODS:
+            return any(term.kind == "constraint" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
 
@@ -34,6 +37,8 @@ EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", 
 
 EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 """The same where the force may also depend on the velocity."""
+
+RODS = frozenset({"wall-rod", "rod"})
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 

@@ -64,6 +64,8 @@ class Arithmetic:
     """Every force is too large by this fraction."""
     stale: float = 0.0
     """Forces are kept while no position has moved by more than this since they were computed [L]."""
+    lengths: float = 0.0
+    """Relative tolerance to which rods keep their lengths, where that is coarser than rounding."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
 
@@ -76,6 +78,7 @@ class Arithmetic:
             "parameters": f"parameters in {self.parameters} precision",
             "excess": f"every force {self.excess:.2g} too large",
             "stale": f"forces kept within {self.stale:.2g}",
+            "lengths": f"lengths of rods kept to {self.lengths:.2g}",
         }
         plain = Arithmetic()
         return ", ".join(said for name, said in named.items() if getattr(self, name) != getattr(plain, name))

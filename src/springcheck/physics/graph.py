@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:
     held = np.zeros(n, dtype=bool)
     for term in terms:
         if term.bodies == 1:
-            held[term.particles[0][term.rigidity > 0]] = True
+            held[term.particles[0][_holds(term)]] = True
     if np.all(held):
         return ()
     lowest = lowest_joined(n, terms)
@@ -41,11 +42,16 @@ def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:
     return tuple(np.flatnonzero(lowest == r) for r in loose)
 
 
+def _holds(term: Term) -> Any:
+    """Which rows of a term hold their ends: by a stiffness, or as a rod."""
+    return (term.rigidity > 0) | (term.kind == "constraint")
+
+
 def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
     """The lowest particle to which each is joined, through however many others (n,)."""
     lowest = np.arange(n)
     # a bond without stiffness joins nothing
-    bonds = [[end[term.rigidity > 0] for end in term.particles] for term in terms if term.bodies == 2]
+    bonds = [[end[_holds(term)] for end in term.particles] for term in terms if term.bodies == 2]
     while True:
         before = lowest.copy()
         for a, b in bonds:
@@ -106,10 +112,12 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
 def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integers, Integers], ...]:
     """Of each two axes that nothing tells apart the coordinates along the one and the other, by particle.
 
-    Linear terms that act on both alike and rest in 0 keep the angular momentum about 0 in their plane.
-    `places` (n,) are those of `Scene`.
+    Linear terms and rods that act on both alike and rest in 0 keep the angular momentum about 0 in their
+    plane.  `places` (n,) are those of `Scene`.
     """
     parts = tuple(terms)
+    if not all(term.is_linear or term.kind == "constraint" for term in parts):
+        return ()
     if places is None or any(np.any(getattr(term, term.origin, 0)) for term in parts):
         return ()
     found = []

@@ -20,6 +20,7 @@ from springcheck.physics.driven import with_clock
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
+from springcheck.physics.rods import Rods, rods_of
 from springcheck.physics.term import Term, in_pieces
 from springcheck.physics.terms import Damping
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 MOST_JOINED = 256
 """Joined particles up to which normal modes are computed: their cost in extended precision grows with the
 cube, 5 s here.  The modes of a uniform chain are known at any length."""
-
 
 MOST_DENSE = 1024
 """Joined particles up to which second derivatives are kept as n x n numbers."""
@@ -68,7 +68,7 @@ class System:
     @cached_property
     def is_separate(self) -> bool:
         """Whether no term joins two particles: n independent systems side by side."""
-        return all(term.bodies == 1 for term in self.terms)
+        return not self.rods and all(term.bodies == 1 for term in self.terms)
 
     @cached_property
     def is_damped(self) -> bool:
@@ -117,7 +117,12 @@ class System:
     @cached_property
     def alike(self) -> tuple[tuple[Integers, Integers], ...]:
         """Of each two axes that nothing tells apart the coordinates along each: `graph.alike`."""
-        return graph.alike(self.scene.places, self.terms) if self.is_linear else ()
+        return graph.alike(self.scene.places, self.terms)
+
+    @cached_property
+    def rods(self) -> Rods | None:
+        """The rods of the scene, None where it has none."""
+        return rods_of(self.m, self.scene.places, self.terms)
 
     @cached_property
     def free_groups(self) -> tuple[Integers, ...]:
@@ -214,8 +219,6 @@ class System:
                 term.scatter(term.c / self.m[term.i].astype(np.longdouble), out)
         return out
 
-    # curvature of the potential
-
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         """Rows, columns and values (..., s) of what each pair of ends adds to the `hessian` at q (..., n)."""
         for term in self.terms:
@@ -256,11 +259,9 @@ class System:
     def jacobian(self, q: Floats) -> Floats:
         """Derivatives of (p/m, force) by (q, p) at q (n,) -> (2n, 2n), double precision."""
         n = self.n
-        out = np.zeros((2 * n, 2 * n))
-        out[:n, n:] = np.diag(1 / self.m)
-        out[n:, :n] = -self.hessian(q)
-        out[n:, n:] = -np.diag(self.friction_rates)
-        return out
+        upper = np.hstack([np.zeros((n, n)), np.diag(1 / self.m)])
+        lower = np.hstack([-self.hessian(q), -np.diag(self.friction_rates)])
+        return np.vstack([upper, lower]).astype(np.float64)
 
     def curvatures(self, q: Reals) -> Any:
         """Second derivatives in the cheapest form that holds them: (n,) of single particles, else (n, n).
@@ -349,8 +350,6 @@ class System:
             p = np.sqrt(2.0) * np.sqrt(self.m) * unit
             q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / self.m * self.duration)
         return q, p
-
-    # the exact motion
 
     @cached_property
     def modes(self) -> Modes:

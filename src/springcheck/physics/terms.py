@@ -15,11 +15,12 @@ import numpy as np
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
+from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "ModulatedSpring", "Morse", "OnPairs", "OnParticles", "Quartic",
-    "Spring", "Term", "WallSpring", "known", "register",
+    "Rod", "Spring", "Term", "WallRod", "WallSpring", "known", "register",
 ]  # fmt: skip
 
 
@@ -232,7 +233,19 @@ class Damping(Term):
 
 
 _KNOWN: dict[str, type[Term]] = {
-    term.key: term for term in (WallSpring, Spring, Quartic, Cosine, Morse, Damping, Drive, ModulatedSpring)
+    term.key: term
+    for term in (
+        WallSpring,
+        Spring,
+        Quartic,
+        Cosine,
+        Morse,
+        Damping,
+        Drive,
+        ModulatedSpring,
+        WallRod,
+        Rod,
+    )
 }
 
 T = TypeVar("T", bound=type[Term])

@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Force, Reals
+from springcheck.physics.rods import Variation
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme
@@ -54,7 +55,7 @@ class Law:
     @property
     def roundings(self) -> int:
         """Roundings along one step."""
-        return roundings(self.scheme)
+        return roundings(self.scheme, rigid=bool(self.scene.system.rods))
 
     @cached_property
     def rate(self) -> Extended | None:
@@ -80,11 +81,12 @@ class Law:
         slope: Slope | None = None,
         draws: Sequence[Reals] | None = None,
         kT: float = 0.0,
+        varied: bool = False,
     ) -> tuple[Reals, Reals]:
         """One step from states (..., n), in the width of q; `forces` makes the forces of terms.
 
-        `slope` stands for the scene's own where the states are not positions.  For all else see
-        `schemes.step`.
+        `slope` stands for the scene's own where the states are not positions, `varied` says that all but the
+        first are changes of it.  For all else see `schemes.step`.
         """
         system, forces = self.scene.system, forces or self.scene.system.force_of
         return step(
@@ -101,6 +103,7 @@ class Law:
             near=near,
             draws=draws,
             kT=kT,
+            hold=Variation(system.rods) if system.rods and varied else system.rods,
         )
 
     @cached_property

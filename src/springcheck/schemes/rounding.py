@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
+from springcheck.physics.rods import Rods
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Setting
 from springcheck.schemes.stepping import sparse_solver, weighted_sum
@@ -42,12 +43,16 @@ def magnitude_step(
     rate: Reals | None = None,
     draws: Sequence[Reals] | None = None,
     kT: Any = 0,
+    hold: Rods | None = None,
+    loose: float = 0.0,
 ) -> tuple[Reals, Reals]:
     """What bounds the rounding of `step` from (q, p): the same step with every difference taken as a sum.
 
-    `met` has one entry for each evaluation of the force, in their order.
+    `met` has one entry for each evaluation of the force, in their order.  Rods `hold` after every stage, at
+    the way itself, to the tolerance `loose` of their lengths, in roundings.
     """
-    start = q, p
+    start = way = q, p
+    pull: Reals | None = None
     # in extended precision: the square of a step may leave the range of a double
     q, p, wide = np.abs(q), np.abs(p), np.longdouble(h)
     each = iter(met)
@@ -55,10 +60,20 @@ def magnitude_step(
         last, drawn = np.zeros_like(p), iter(() if draws is None else draws)
         for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
             if kind.evaluates:
-                last = next(each).magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
+                here = next(each)
+                last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
+                pull = here.pull
             mine = next(drawn) if kind.random and draws is not None else None
             setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
-            q, p = kind.sizes(q, p, number(c, np.float64) * wide, setting)
+            part = number(c, np.float64) * wide
+            q, p = kind.sizes(q, p, part, setting)
+            if hold is not None:
+                # friction turns no rod by more than a part of what the step does
+                before, act = way[0], replace(setting, rate=None, force=0 * p if pull is None else pull)
+                way = kind.act(*way, part, act)
+                way = hold.drifted(before, *way, part) if kind.drifts else way
+                q, p = hold.sizes(before if kind.drifts else None, *way, part, (q, p), loose)
+                way = way[0], hold.projected(*way)
         return q, p
     return _tableau(scheme, start, each, h=wide, m=m, rate=rate)
 
@@ -223,8 +238,13 @@ def _product(matrix: Reals, x: Reals) -> Reals:
     return np.asarray(np.sum(np.where(np.isnan(terms), 0, terms), axis=-1))
 
 
-def roundings(scheme: Scheme) -> int:
-    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4."""
+def roundings(scheme: Scheme, *, rigid: bool = False) -> int:
+    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4.
+
+    With rods also those of the multiplier, its product and sum after a drift 12, and of what is taken off the
+    momenta after every stage 8.
+    """
     if scheme.stages:
-        return 4 + sum(kind.roundings for kind in scheme.kinds)
+        held = sum(8 + 12 * kind.drifts for kind in scheme.kinds) if rigid else 0
+        return 4 + held + sum(kind.roundings for kind in scheme.kinds)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

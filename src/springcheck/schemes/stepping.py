@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Force, Reals
+from springcheck.physics.rods import Rods, Variation
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Acting, Setting
 
@@ -39,6 +40,7 @@ def step(
     near: Reals | None = None,
     draws: Sequence[Reals] | None = None,
     kT: Any = 0,
+    hold: Rods | Variation | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
@@ -51,7 +53,7 @@ def step(
     solutions of an implicit stage the one there is found; a force after the last drift is taken there, at the
     position that an engine has rounded.  `draws` are the standard normal numbers of each random stage in
     turn, `Scheme.draws` of (..., n), and kT [M L2/T2] is what they are drawn at; without them nothing random
-    happens.
+    happens.  `hold` are the rods of a scene, which hold after every stage of a splitting.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
@@ -68,7 +70,11 @@ def step(
                 last = acting(kind.evaluates, force, parts)(at, p)
             mine = next(each) if kind.random and draws is not None else None
             setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
-            q, p = kind.act(q, p, number(c, width) * h, setting)
+            before, part = q, number(c, width) * h
+            q, p = kind.act(q, p, part, setting)
+            if hold is not None:
+                q, p = hold.drifted(before, q, p, part) if kind.drifts else (q, p)
+                p = hold.projected(q, p)
         return q, p
     if not scheme.b:
         raise ValueError(f"{scheme.name} has no step that a force alone defines")

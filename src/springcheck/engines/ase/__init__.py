@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, by_default, deferred, named, thermostat
+from springcheck.engines.contract import (
+    EVERY_POTENTIAL,
+    RODS,
+    Engine,
+    Need,
+    by_default,
+    deferred,
+    named,
+    thermostat,
+)
 
 _DRAWS = "NumPy, PCG64"
 
@@ -11,7 +20,11 @@ ENGINE = Engine(
     title="ASE",
     distribution="ase",
     methods=named(
-        by_default("velocity-verlet", "velocity-verlet", "ase.md.verlet.VelocityVerlet", EVERY_POTENTIAL)
+        by_default("velocity-verlet", "velocity-verlet", "ase.md.verlet.VelocityVerlet", EVERY_POTENTIAL),
+        by_default(
+            "rattle", "velocity-verlet", "ase.md.verlet.VelocityVerlet with FixBondLengths, tolerance 1e-13",
+            EVERY_POTENTIAL | RODS, Need.RODS, rebuilds_velocity=True,
+        ),
     ),
     thermostats=named(
         thermostat(

@@ -8,6 +8,7 @@ so the motion cannot depend on the rounding of the mole.
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from typing import Any, ClassVar
 
@@ -15,9 +16,10 @@ import ase.units
 import numpy as np
 from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
+from ase.constraints import FixBondLengths
 from ase.md.verlet import VelocityVerlet
 
-from springcheck.engines.bonds import off_axis
+from springcheck.engines.bonds import ANCHOR_MASS, off_axis
 from springcheck.engines.contract import Label, Method
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
@@ -34,7 +36,7 @@ def version() -> dict[str, str]:
 
 def arithmetic(label: Label) -> Arithmetic:
     """NumPy's double precision; `compare_atoms` takes positions within 1e-15 of each other for the same."""
-    return Arithmetic(stale=1e-15)
+    return Arithmetic(stale=1e-15, lengths=1e-13 if label.method == "rattle" else 0.0)
 
 
 class Springs(Calculator):  # type: ignore[misc]
@@ -97,16 +99,25 @@ class _Dynamics:
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float, seed: Any = None) -> None:
         length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
-        positions, momenta, masses = np.zeros((3, scene.particles, 3))
+        rods = list(scene.system.rods.joints()) if scene.system.rods else []
+        # a fixed end is an atom so heavy that nothing moves it
+        fixed = [point for _, _, point in rods if point is not None]
+        positions, momenta, masses = np.zeros((3, scene.particles + len(fixed), 3))
         positions.reshape(-1)[scene.where] = scene.q * length
         momenta.reshape(-1)[scene.where] = scene.p * (length / time)
         masses.reshape(-1)[scene.where] = scene.m
+        if fixed:
+            positions[scene.particles :], masses[scene.particles :] = np.array(fixed) * length, ANCHOR_MASS
         self._atoms = Atoms(
-            numbers=np.zeros(scene.particles, dtype=int),
+            numbers=np.zeros(len(positions), dtype=int),
             positions=positions,
             masses=np.max(masses, axis=1),
             momenta=momenta,
         )
+        if rods:
+            anchor = itertools.count(scene.particles)
+            pairs = [ends if len(ends) == 2 else (next(anchor), *ends) for ends, _, _ in rods]
+            self._atoms.set_constraint(FixBondLengths(pairs, bondlengths=[x * length for _, x, _ in rods]))
         self._atoms.calc = Springs(scene.system, length, time)
         if method.generator:
             energy = scene.thermal * (length / time) ** 2

@@ -6,6 +6,7 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
+    RODS,
     Engine,
     Need,
     by_default,
@@ -57,6 +58,21 @@ ENGINE = Engine(
         by_name(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
+        ),
+        by_default(
+            "verlet-rods", "velocity-verlet",
+            "VerletIntegrator, constraint tolerance 1e-13, started and read synchronised", _TERMS | RODS,
+            Need.RODS, rebuilds_velocity=True,
+        ),
+        by_name(
+            "verlet-rods-8", "velocity-verlet",
+            "VerletIntegrator, constraint tolerance 1e-8, started and read synchronised", _TERMS | RODS,
+            Need.RODS, rebuilds_velocity=True,
+        ),
+        by_default(
+            "verlet-rods-as-it-is", "velocity-verlet",
+            "VerletIntegrator, its own constraint tolerance 1e-5, started and read synchronised",
+            _TERMS | RODS, Need.RODS, rebuilds_velocity=True,
         ),
         by_name(
             "nose-hoover", "semi-implicit-euler",

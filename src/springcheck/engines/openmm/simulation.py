@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,38 +33,12 @@ import openmm as mm
 
 from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
+from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
-
-FIXED_POINT = 2.0**-32
-"""GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
-mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow from 2**31 on.  Each term's force is
-converted by itself, by `(long)(x * 0x100000000)`, which C leaves open out of range: pocl on x86 gives
--2**63 for every such force, of either sign, and the sum is modulo 2**64, so that two of them make 0."""
-
-_PRECISIONS = {
-    name: Arithmetic(
-        name=name,
-        state=state,
-        force=force,
-        quantum=FIXED_POINT,
-        overflow=2.0**31,
-        parameters="single",
-        keeps_displacement=True,
-    )
-    for name, state, force in (
-        ("single", 2.0**-24, 2.0**-24),
-        ("mixed", 2.0**-48, 2.0**-24),
-        ("double", 2.0**-53, 2.0**-53),
-    )
-}
-"""Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
-"mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
-displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
-
 
 CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
     "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
@@ -82,17 +55,8 @@ DRIVEN_ENERGY = {
 }
 """The same of what depends on the time, with the numbers in it that every platform keeps as double."""
 
-SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"})
+SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised", *LENGTHS})
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
-
-
-CUSTOM = ("euler", "semi-implicit-euler", "mts")
-"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
-
-CUSTOM_EXCESS = 2.0**-32
-"""On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
-1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
-its forces are too large by 2.3e-10."""
 
 
 ATTENTIVE = 500
@@ -102,14 +66,6 @@ ATTENTIVE = 500
 def version() -> dict[str, str]:
     """Version of OpenMM."""
     return {"openmm": str(mm.Platform.getOpenMMVersion())}
-
-
-def arithmetic(label: Label) -> Arithmetic:
-    """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
-    if label.platform in ("", "Reference", "CPU"):
-        return Arithmetic()
-    found = _PRECISIONS[label.precision or "single"]
-    return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found
 
 
 def convention(method: Method) -> str:
@@ -155,6 +111,14 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for group in (slow, fast):
         if group.getNumBonds():
             system.addForce(group)
+    for ends, length, point in scene.system.rods.joints() if scene.system.rods else ():
+        if np.any(origins):
+            raise MethodError(f"scene {scene.name!r}: a bond may turn over, beside which OpenMM has no rods")
+        if point is not None:
+            fixed.append(point)
+        system.addConstraint(
+            *ends, *([] if point is None else [system.addParticle(bonds.ANCHOR_MASS)]), length
+        )
     for term in scene.terms:
         if isinstance(term, Morse):
             _stays_right_way_round(scene, term)
@@ -249,8 +213,10 @@ def _thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syst
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     signed, step = step, abs(step)
-    if name in ("verlet", "leapfrog"):
-        return mm.VerletIntegrator(step)
+    if name in ("verlet", "leapfrog", *LENGTHS):
+        made = mm.VerletIntegrator(step)
+        made.setConstraintTolerance(LENGTHS.get(name, made.getConstraintTolerance()))
+        return made
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
     if name == "nose-hoover":
@@ -329,6 +295,7 @@ class _Context:
         self._force: Callable[..., Any] = lambda t, q, p: pull(q, p)
         if self._driven:
             self._force, _ = timed(scene.derived(terms=tuple(x for x in scene.terms if x.kind != "friction")))
+        self._rods = scene.system.rods
         self._on_a_line = not method.generator
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
         self._m = np.copysign(scene.m, step)
@@ -393,6 +360,8 @@ class _Context:
                     p[row] += self._half_kick * self._force(t, q[row], p[row])
             elif self._half_kick:
                 p += self._half_kick * self._force(0.0, q, p)
+            if self._rods and len(p):
+                p[:] = self._rods.projected(q, p)
 
 
 start = _Context

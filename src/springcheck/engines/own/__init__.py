@@ -10,6 +10,7 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
+    RODS,
     SPRINGS,
     Engine,
     Method,
@@ -41,12 +42,19 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
     return frozenset({Need.DAMPING} if any(kind.friction for kind in scheme.kinds) else ())
 
 
+def _terms(scheme: Scheme) -> frozenset[str]:
+    if scheme.has("implicit"):
+        return SPRINGS | {"damping"}
+    # rods hold after every stage of a splitting
+    return EVERY_FORCE | RODS if scheme.has("symplectic", "splitting") else EVERY_FORCE
+
+
 def _method(scheme: Scheme) -> Method:
     return Method(
         name=NAMES.get(scheme.name, scheme.name),
         scheme=scheme.name,
         about=ABOUT.get(scheme.name, scheme.title),
-        terms=DRIVEN | (SPRINGS | {"damping"} if scheme.has("implicit") else EVERY_FORCE),
+        terms=DRIVEN | _terms(scheme),
         kinds=frozenset({"particles", "circuit", "rotor"}),
         requires=_requires(scheme),
         default=scheme.name in ABOUT,

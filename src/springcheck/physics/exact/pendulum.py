@@ -1,4 +1,4 @@
-"""Pendulums, swinging and rotating, by Jacobi's elliptic functions."""
+"""Pendulums, swinging and rotating, by Jacobi's elliptic functions, and rods that turn freely."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide
+from springcheck.physics.rods import Rods
 from springcheck.physics.terms import Cosine
 
 if TYPE_CHECKING:
@@ -115,4 +116,58 @@ def _swung(found: _Swing, t: Extended) -> States:
 
 COSINE = Well(
     key="cosine", terms=frozenset({"cosine"}), prepare=_swings, motion=_pendulum, doubt=_pendulum_doubt
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Turning:
+    """Ways between the ends of rods and their rates (s,), angular velocities (c,), and what drifts (n,)."""
+
+    rods: Rods
+    r: Extended
+    v: Extended
+    w: Extended
+    drift: Extended
+    """Velocity of the centre of mass, of each coordinate."""
+
+
+def _turning(scene: Scene) -> _Turning | None:
+    """Rods of which no two share a particle."""
+    rods = scene.system.rods
+    if rods is None or rods.share:
+        return None
+    q = wide(scene.q)
+    p = rods.projected(q, wide(scene.p))
+    r, v = rods.ways(q), rods.apart(p / scene.m)
+    drift = (p - rods.spread(v / rods.each(rods.inverse_mass))) / scene.m
+    return _Turning(rods=rods, r=wide(r), v=wide(v), w=wide(rods.rates(q, p)), drift=wide(drift))
+
+
+def _turned(scene: Scene, found: _Turning, t: Extended) -> States:
+    """r(t) = r cos(w t) + v sin(w t)/w about a centre of mass that goes straight on."""
+    rods, w = found.rods, found.w
+    mass = rods.each(1 / wide(rods.inverse_mass))
+    turn = w * t
+    sine, cosine = rods.each(np.sin(turn)), rods.each(np.cos(turn))
+    rate = rods.each(w)
+    r = found.r * (cosine - 1) + found.v * np.where(rate > 0, sine / np.where(rate > 0, rate, 1), 0)
+    v = found.v * cosine - found.r * rate * sine
+    m = wide(scene.m)
+    q = scene.q + found.drift * t + rods.spread(mass * r) / m
+    return wide(q), wide(m * found.drift + rods.spread(mass * v))
+
+
+def _turning_doubt(scene: Scene, found: _Turning, t: np.longdouble) -> States:
+    rods, m, time = found.rods, wide(scene.m), np.abs(t)
+    mass = rods.each(1 / wide(rods.inverse_mass))
+    reach, rate = rods.each(wide(rods.length)), rods.each(found.w)
+    turned = rods.spread(mass * reach * (2 + rate * time), size=True)
+    rated = rods.spread(mass * reach * rate * (2 + rate * time), size=True)
+    speed = np.abs(found.drift)
+    return wide(LAST * (np.abs(scene.q) + speed * time + turned / m)), wide(LAST * (m * speed + rated))
+
+
+ROD, WALL_ROD = (
+    Well(key=key, terms=frozenset({key}), prepare=_turning, motion=_turned, doubt=_turning_doubt)
+    for key in ("rod", "wall-rod")
 )

@@ -77,14 +77,14 @@ def solution(system: System) -> Solution | None:
                 return Solution(n=system.n, groups=(here,))
         return None
     from springcheck.physics.exact.bond import MORSE
-    from springcheck.physics.exact.pendulum import COSINE
+    from springcheck.physics.exact.pendulum import COSINE, ROD, WALL_ROD
     from springcheck.physics.exact.quartic import QUARTIC
 
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
     left = ~nothing
     with np.errstate(all="ignore"):
-        for law in (QUARTIC, COSINE, MORSE, linear.LINEAR):
+        for law in (QUARTIC, COSINE, MORSE, ROD, WALL_ROD, linear.LINEAR):
             others = (here for key, here in system.acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
             mine = left if law is linear.LINEAR else system.acting.get(law.key, nothing) & ~other

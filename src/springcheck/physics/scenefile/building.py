@@ -14,7 +14,7 @@ from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene, Units
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import Column, Damping, Spring, Term, WallSpring
+from springcheck.physics.terms import Column, Damping, Rod, Spring, Term, WallRod, WallSpring
 
 
 class MistakeError(ValueError):
@@ -194,6 +194,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     for key, (term, _) in tables.of_terms().items():
         yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
     yield from _by_columns(Damping, table.damping, bodies)
+    yield from _rods(table.rod, bodies)
     loops = [bodies.number(row.loop, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
     if loops:
         yield Damping(i=np.array(loops), c=np.array([row.resistance for row in table.resistor]))
@@ -220,6 +221,34 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
         _one_axis(f"spring[{j}]", {"rest": spring.rest, "wall": spring.wall}, ends)
         kind = rows.setdefault((WallSpring if len(numbers) == 1 else Spring, spring.fast), [])
         kind += [(*one, spring.stiffness, rest) for one in ends]
+    yield from _of_rows(rows)
+
+
+def _rods(rods: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+    """A row for each axis of what a rod joins, and its length at the start where none is given."""
+    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
+    for j, rod in enumerate(rods):
+        field = f"rod[{j}].ends"
+        if bodies.name not in ("particle", "chain"):
+            raise MistakeError(f"rod[{j}]: a rod joins particles")
+        numbers = [bodies.number(end, field) for end in rod.ends if end != "wall"]
+        if not numbers:
+            raise MistakeError(f"{field}: a rod between two walls holds nothing")
+        if len(numbers) == 2:
+            _two_ends(numbers[0], numbers[1], field)
+            if rod.wall:
+                raise MistakeError(f"rod[{j}].wall is given, but no end of it is a wall")
+        ends = bodies.along(field, None, *numbers)
+        wall = rod.wall if isinstance(rod.wall, tuple) else (rod.wall,) * (1 if rod.wall else len(ends))
+        if len(wall) != len(ends):
+            raise MistakeError(f"rod[{j}].wall: {len(wall)} numbers for {len(ends)} axes")
+        one, other = np.transpose(ends)[[0, -1]]
+        way = bodies.q[other] - (wall if len(numbers) == 1 else bodies.q[one])
+        length = rod.length or float(np.hypot.reduce(way))
+        if length == 0:
+            raise MistakeError(f"rod[{j}]: its ends are at one place, and a rod has a length")
+        kind = rows.setdefault((WallRod if len(numbers) == 1 else Rod, False), [])
+        kind += [(*at, length, *([x] if len(numbers) == 1 else [])) for at, x in zip(ends, wall, strict=True)]
     yield from _of_rows(rows)
 
 

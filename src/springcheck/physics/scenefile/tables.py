@@ -79,6 +79,14 @@ class SpringTable(SceneTable, frozen=True):
     axis: Axis | None = None
 
 
+class RodTable(SceneTable, frozen=True):
+    """A rigid rod of a length [L], left out that at the start; a wall end stands at `wall` [L]."""
+
+    ends: tuple[End, End]
+    length: Positive | None = None
+    wall: float | PerAxis = 0.0
+
+
 class DampingTable(SceneTable, frozen=True):
     """Friction of one particle, along `axis` or all of its axes: force -coefficient p/mass, in M/T."""
 
@@ -171,6 +179,7 @@ class SceneBase(SceneTable, frozen=True):
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
     damping: tuple[DampingTable, ...] = ()
+    rod: tuple[RodTable, ...] = ()
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -204,7 +213,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "damping")
+OTHERWISE = ("wall-spring", "spring", "damping", "wall-rod", "rod")
 """Terms that have tables of their own."""
 
 
@@ -247,7 +256,7 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, BathTable, TimeTable, MethodsTable, RecordTable,
+        DampingTable, RodTable, BathTable, TimeTable, MethodsTable, RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
     found |= {key: table for key, (_, table) in of_terms().items()}

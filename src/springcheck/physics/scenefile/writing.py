@@ -14,7 +14,7 @@ from springcheck.physics.builders import standing
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Spring, WallSpring
+from springcheck.physics.terms import Damping, Rod, Spring, WallRod, WallSpring
 
 MOST_WAVES = 64
 """Standing waves up to which the start of a chain is written as such."""
@@ -115,6 +115,14 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
     elif isinstance(term, Spring):
         for a, b, k, rest in term.rows():
             yield _spring(scene, [], [a, b], k, rest, 0.0, fast=term.fast)
+    elif isinstance(term, Rod | WallRod):
+        rods = scene.derived(terms=(term,)).system.rods
+        assert rods is not None
+        for ends, length, point in rods.joints():
+            places = scene.places
+            along = [0] if places is None else places[places // 3 == ends[0]] % 3
+            wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
+            yield _table("[[rod]]", ({"ends": ["wall", *ends][-2:], "length": length} | wall).items())
     else:
         yield from _by_columns(scene, term)
 

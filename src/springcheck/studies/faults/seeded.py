@@ -20,7 +20,9 @@ from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
 Make: TypeAlias = Callable[..., Trajectory]
-Where: TypeAlias = Literal["spring", "chain", "long spring", "orbit", "driven", "bath", "wide bath"]
+Where: TypeAlias = Literal[
+    "spring", "chain", "long spring", "orbit", "driven", "dumbbell", "bath", "wide bath"
+]
 
 
 @dataclass(frozen=True, slots=True)

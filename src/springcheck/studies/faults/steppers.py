@@ -44,7 +44,10 @@ def textbook(
         if len(m) > n:
             time, pace = clock(i) if clock else (i * h, 1.0)
             q, p = np.append(q, time), np.append(p, pace * scene.p[n])
-        a, b = schemes.step(scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate)
+        a, b = schemes.step(
+            scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate,
+            hold=scene.system.rods,
+        )  # fmt: skip
         return np.asarray(a[:n], np.float64), np.asarray(b[:n], np.float64)
 
     return one

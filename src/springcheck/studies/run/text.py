@@ -353,7 +353,7 @@ def _not_covered(scene: Scene) -> Lines:
         return []
     missing = [axis for axis in "xyz" if axis not in scene.axes]
     left = [f"motion along {' and '.join(missing)}"] if missing else []
-    left += ["periodic boxes", "constraints"]
+    left += ["periodic boxes", *([] if scene.system.rods else ["constraints"])]
     left += [] if scene.system.is_damped or scene.bath else ["friction"]
     left += [] if scene.system.is_driven else ["drives"]
     return [plain(f"Not exercised here: {', '.join(left)}", "dim")]

@@ -1,0 +1,94 @@
+"""Rods: their lengths, what moves along them, and how far they turn in a step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.checks.case import Case
+from springcheck.checks.check import Finding, check
+from springcheck.checks.requires import MAP
+from springcheck.physics.exact.well import PI
+from springcheck.physics.rods import Rods
+from springcheck.physics.trajectory import Limits
+from springcheck.text.wording import count
+
+
+def _rods(case: Case) -> Rods:
+    found = case.system.rods
+    assert found is not None
+    return found
+
+
+@check("length", family="motion", requires=MAP | {"rods"})
+def rod_length(case: Case) -> Finding:
+    """Every rod has its length at every frame, to rounding or to the tolerance that its engine declares."""
+    rods, how = _rods(case), case.trajectory.arithmetic
+    q = case.trajectory.q[1:].astype(np.longdouble)
+    with np.errstate(all="ignore"):
+        off = np.abs(rods.strain(q))
+        bound = case.roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
+        worst = np.unravel_index(np.argmax(np.where(np.isfinite(off), off / bound, np.inf)), off.shape)
+    why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
+    if how.lengths:
+        why += f", and the tolerance {how.lengths:g} of the engine's solver, which is not its error"
+    return Finding(off[worst], bound[worst], "of the length", why)
+
+
+@check("along", family="motion", requires=MAP | {"rods"})
+def rod_velocity(case: Case) -> Finding:
+    """The ends of a rod have one velocity along it, to rounding."""
+    rods = _rods(case)
+    q, p = (x[1:].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
+    with np.errstate(all="ignore"):
+        r, m = rods.ways(q), case.judged.m
+        off = np.abs(rods.dot(r, rods.apart(p / m)))
+        unit = rods.sum_of_sizes(r, case.allowance[1] / m)
+        seen = np.where(off == 0, 0, off / unit)
+    worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
+    why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
+    return Finding(seen[worst], case.roundings, "roundings", why)
+
+
+@check("turn", family="motion", requires=MAP | {"rods", "turning"})
+def turn(case: Case) -> Finding | str:
+    """A rod that turns freely turns by asin(h w) in a drift of h, w that of the start, at every step."""
+    # along the push lies the way before the drift, of length l, and across it h v: the angle between the ways
+    # before and after has the sine h |v| / l = h w.  What is taken off the momenta leaves them w again
+    rods, run, steps = _rods(case), case.trajectory, case.steps
+    m = case.judged.m
+    q0, p0 = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
+    if steps[0] != 0:
+        # a later piece of a long run: from its own first frame on
+        steps, (q0, p0) = steps - steps[0], (x[0].astype(np.longdouble) for x in (run.q, run.p))
+    w = rods.rates(q0, p0)
+    if not np.any(w > 0):
+        return "no rod turns"
+    parts = [c for kind, (_, c) in zip(case.scheme.kinds, case.scheme.stages, strict=True) if kind.drifts]
+    x = np.array([schemes.number(c, np.longdouble) for c in parts]) * np.longdouble(run.step)
+    each = np.sum(np.arcsin(x[:, None] * w), axis=0)
+    steeper = np.sum(np.abs(x)[:, None] / np.sqrt(1 - (x[:, None] * w) ** 2), axis=0)
+    r, n = rods.ways(run.q.astype(np.longdouble)), steps[:, None].astype(np.longdouble)
+    first, across = rods.ways(q0), rods.apart(p0 / m)
+    angle = np.arctan2(rods.dot(r, across) / w, rods.dot(r, first))
+    off = angle - n * each
+    off = np.abs(off - 2 * PI * np.round(off / (2 * PI)))[1:]
+    with np.errstate(all="ignore"):
+        square = rods.length**2
+        of_q, of_p = (np.maximum.accumulate(one) for one in case.allowance)
+        of_angle = rods.sum_of_sizes(r[1:], of_q) / square
+        of_rate = rods.spans(of_p / m) / rods.length
+        bound = case.roundings * (n[1:] * of_angle + n[1:] * (n[1:] + 1) / 2 * of_rate * steeper)
+        ratio = np.where(w > 0, off / bound, 0)
+    worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
+    whole = n[1:] * np.abs(each)
+    if ratio[worst] <= 1 and not np.any(whole > bound):
+        return "rounding may be as large as all of the turn"
+    return Finding(
+        off[worst],
+        bound[worst],
+        "rad",
+        f"roundings of {count(int(steps[1:][worst[0]]), 'step')}, of angle and rate, all of one sign; "
+        f"a step turns by {float(each[worst[1]]):.6g} where h w = {float(abs(run.step) * w[worst[1]]):.6g}",
+        Limits(step=float(np.min(np.where(w > 0, bound / whole, np.inf)))),
+    )

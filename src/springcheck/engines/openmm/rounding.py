@@ -1,0 +1,53 @@
+"""How OpenMM rounds on each platform, and to which tolerance it keeps lengths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from springcheck.engines.contract import Label
+from springcheck.physics.arrays import Arithmetic
+
+FIXED_POINT = 2.0**-32
+"""GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
+mode (OpenMM's `realToFixedPoint`): a fixed quantum below, overflow from 2**31 on.  Each term's force is
+converted by itself, by `(long)(x * 0x100000000)`, which C leaves open out of range: pocl on x86 gives
+-2**63 for every such force, of either sign, and the sum is modulo 2**64, so that two of them make 0."""
+
+_PRECISIONS = {
+    name: Arithmetic(
+        name=name,
+        state=state,
+        force=force,
+        quantum=FIXED_POINT,
+        overflow=2.0**31,
+        parameters="single",
+        keeps_displacement=True,
+    )
+    for name, state, force in (
+        ("single", 2.0**-24, 2.0**-24),
+        ("mixed", 2.0**-48, 2.0**-24),
+        ("double", 2.0**-53, 2.0**-53),
+    )
+}
+"""Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
+"mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
+displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
+
+CUSTOM = ("euler", "semi-implicit-euler", "mts")
+"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
+
+CUSTOM_EXCESS = 2.0**-32
+"""On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
+1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
+its forces are too large by 2.3e-10."""
+
+LENGTHS = {"verlet-rods": 1e-13, "verlet-rods-8": 1e-8, "verlet-rods-as-it-is": 1e-5}
+"""Relative tolerance of constraints by method; the last is the library's own."""
+
+
+def arithmetic(label: Label) -> Arithmetic:
+    """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
+    if label.platform in ("", "Reference", "CPU"):
+        return Arithmetic(lengths=LENGTHS.get(label.method, 0.0))
+    found = _PRECISIONS[label.precision or "single"]
+    return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found

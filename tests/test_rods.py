@@ -1,0 +1,249 @@
+"""Rods: SHAKE and RATTLE to rounding, what checks say of them, and what a scene file may ask of them.
+
+The law: a rod that turns freely turns by asin(h w) in a drift of h, and keeps its speed; the multiplier of
+one rod solves a quadratic.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, driver, engines, schemes, store
+from springcheck.checks import Case, stretch
+from springcheck.cli import main
+from springcheck.errors import MethodError, SceneError
+from springcheck.physics import exact, scenefile
+from springcheck.physics.rods import Rods
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Rod, WallRod
+from springcheck.studies.faults import measure
+from springcheck.studies.faults.rigid import Rattle
+from springcheck.studies.faults.steppers import record
+
+Need = Callable[[str], None]
+OWN = ("own:velocity-verlet", "own:semi-implicit-euler", "own:position-verlet", "own:forest-ruth")
+RIGHT = (*OWN, "ase:rattle", "openmm:verlet-rods", "openmm:verlet-rods-8", "openmm:verlet-rods-as-it-is")
+
+
+def dumbbell() -> Scene:
+    return scenefile.load_scene("dumbbell")
+
+
+def rods(scene: Scene) -> Rods:
+    assert scene.system.rods is not None
+    return scene.system.rods
+
+
+def triangle(**changes: object) -> Scene:
+    """Three unlike masses on three rods in space, turning about no axis of the frame, and drifting."""
+    q = np.array([0.0, 0.0, 0.0, 0.7, 0.1, 0.2, 0.3, 0.8, -0.1])
+    m = np.repeat([1.3, 2.9, 0.7], 3)
+    x = q.reshape(3, 3) - np.average(q.reshape(3, 3), axis=0, weights=[1.3, 2.9, 0.7])
+    p = m * (np.cross([0.4, -0.7, 1.1], x) + np.array([0.1, 0.2, -0.3])).ravel()
+    a, b = np.array([0, 1, 2, 0, 1, 2, 3, 4, 5]), np.array([3, 4, 5, 6, 7, 8, 6, 7, 8])
+    length = np.repeat(np.linalg.norm((q[b] - q[a]).reshape(3, 3), axis=1), 3)
+    joined = Rod(a=a, b=b, length=length)
+    fields = {"m": m, "q": q, "p": p, "terms": (joined,), "places": np.arange(9), "step": 0.1, "steps": 100}
+    return Scene(**{**fields, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("label", RIGHT)
+def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) -> None:
+    need(label)
+    scene = dumbbell()
+    run = driver.run(scene, label)
+    verdicts = checks.judge(scene, run)
+    assert [v for v in verdicts if v.passed is False] == []
+    judged = {v.check for v in verdicts if v.passed}
+    assert {"step-defect", "momentum", "angular-momentum", "rod-length", "rod-velocity", "turn"} <= judged
+    names = {"reversibility", "mirror", "orientation", "repeatability"}
+    experiments = [one for one in checks.THOROUGH if one.name in names]
+    thorough = checks.judge_thoroughly(scene, label, driver.run, experiments)
+    assert [v for v in thorough if v.passed is False] == []
+    assert {v.check for v in thorough if v.passed} >= {"mirror", "repeatability"}
+
+
+@pytest.mark.parametrize("label", OWN)
+def test_a_free_rod_turns_by_the_arc_sine_of_h_w_in_every_drift_and_keeps_its_speed(label: str) -> None:
+    scene = dumbbell()
+    run = driver.run(scene, label)
+    r = run.q[:, 2:] - run.q[:, :2]
+    angle = np.unwrap(np.arctan2(r[:, 1], r[:, 0]))
+    stages = schemes.scheme(run.scheme)
+    parts = [c for kind, (_, c) in zip(stages.kinds, stages.stages, strict=True) if kind.drifts]
+    turn = sum(np.arcsin(float(schemes.number(c, np.float64)) * 0.15) for c in parts)
+    # 400 steps: each rounds way and momentum by a few roundings of a position up to 8 rods from the origin
+    assert np.max(np.abs(angle - angle[0] - np.arange(401) * turn)) < 400 * 1e-14
+    speed = scene.system.kinetic_energy(run.p)
+    assert np.max(np.abs(speed / speed[0] - 1)) < 400 * 1e-14
+
+
+def test_a_tolerance_is_not_the_error_of_lengths(need: Need) -> None:
+    need("openmm:verlet-rods")
+    off = {}
+    for tolerance, name in ((1e-13, "verlet-rods"), (1e-8, "verlet-rods-8"), (1e-5, "verlet-rods-as-it-is")):
+        run = driver.run(dumbbell(), f"openmm:{name}")
+        assert run.arithmetic.lengths == tolerance
+        off[tolerance] = float(np.max(np.abs(rods(dumbbell()).strain(run.q))))
+        momenta = [v for v in checks.judge(dumbbell(), run) if v.check in ("momentum", "angular-momentum")]
+        # pushes along the rod cancel and turn nothing, however large they are: to rounding at every tolerance
+        assert all(v.passed and v.value < v.bound < 1e4 for v in momenta)
+    assert off[1e-13] < 1e-14 < off[1e-8] < 1e-8 < off[1e-5] < 1e-6
+
+
+def test_the_tolerance_of_lengths_is_stored_and_read(tmp_path: Path, need: Need) -> None:
+    need("openmm:verlet-rods-as-it-is")
+    scene = replace(dumbbell(), steps=5, include=("openmm:verlet-rods-as-it-is",))
+    path = tmp_path / "a.h5"
+    springcheck.run(scene, path=path)
+    (run,) = store.read(path).values()
+    assert run.arithmetic.lengths == 1e-5
+
+
+def test_a_rattle_written_out_by_itself_is_judged_right() -> None:
+    scene = measure.scene("dumbbell")
+    scheme = schemes.SCHEMES["velocity-verlet"]
+    run = record(scene, scheme, Rattle().step(scene, scheme, 0.0))
+    verdicts = checks.judge(scene, run)
+    assert [v.check for v in verdicts if v.passed is False] == []
+    assert sum(v.passed is True for v in verdicts) >= 10
+
+
+def test_from_h_w_1_on_there_is_no_step_and_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "dumbbell", "--step", "0.7", "--steps", "9", "-o", "/dev/null/a.h5"]) == 2
+    assert "turns by h w = 1.05 in a drift, and from h w = 1 on" in capsys.readouterr().err
+    # a drift of half a step reaches further
+    assert "turns" in (
+        engines.refusal(replace(dumbbell(), step=0.7), engines.parse("own:velocity-verlet")) or ""
+    )
+    assert engines.refusal(replace(dumbbell(), step=0.7), engines.parse("own:position-verlet")) is None
+    near = replace(dumbbell(), step=0.66, steps=20)
+    run = driver.run(near, "own:velocity-verlet")
+    assert run.outcome.status == "complete"
+    assert [v for v in checks.judge(near, run) if v.passed is False] == []
+
+
+def test_methods_without_rods_say_so() -> None:
+    for label in ("own:euler", "ase:velocity-verlet", "openmm:verlet", "sundials:adams"):
+        assert engines.refusal(dumbbell(), engines.parse(label)) == "it has no rod term"
+    spring = scenefile.load_scene("spring")
+    assert engines.refusal(spring, engines.parse("ase:rattle")) == "it is for scenes with rods"
+
+
+def test_the_exact_motion_of_a_dumbbell_is_that_of_ever_shorter_steps() -> None:
+    scene = dumbbell()
+    end = []
+    for parts in (1, 2, 4):
+        fine = replace(scene, step=0.1 / 32 / parts, steps=320 * parts, every=320 * parts)
+        run = driver.run(fine, "own:velocity-verlet")
+        end.append(np.concatenate([run.q[-1], run.p[-1]]))
+    once = [(4 * b - a) / 3 for a, b in itertools.pairwise(end)]
+    q, p = exact.true_motion(scene, np.array([10]), 0.1)
+    assert np.max(np.abs((16 * once[1] - once[0]) / 15 - np.concatenate([q[0], p[0]]))) < 1e-12
+    # 64 roundings for each of 66 radians and of 25 lengths on the way
+    assert 0 < exact.uncertainty(scene, 40.0) < 1e-15 or np.finfo(np.longdouble).eps > 1e-16
+
+
+@pytest.mark.parametrize("make", [dumbbell, triangle])
+def test_the_tangent_map_of_a_step_is_its_derivative(make: Callable[[], Scene]) -> None:
+    scene = make()
+    run = driver.run(scene, "own:velocity-verlet")
+    case = Case(trajectory=run, scene=scene)
+    q, p = (x[7:8].astype(np.longdouble) for x in (run.q, run.p))
+    found = stretch.tangent(case, q, p)[0]
+    n, e = scene.n, 1e-5
+    for j in range(2 * n):
+        push = np.zeros(2 * n)
+        push[j] = e
+        ends = [np.concatenate(case.step(q + s * push[:n], p + s * push[n:]), axis=-1)[0] for s in (1, -1)]
+        assert np.max(np.abs((ends[0] - ends[1]) / (2 * e) - found[:, j])) < 1e-8
+
+
+def test_rods_that_share_particles_are_solved_to_rounding() -> None:
+    scene = triangle()
+    assert rods(scene).share
+    run = driver.run(scene, "own:velocity-verlet")
+    assert run.outcome.status == "complete"
+    assert np.max(np.abs(rods(scene).strain(run.q))) < 1e-13
+    verdicts = checks.judge(scene, run)
+    assert [v.check for v in verdicts if v.passed is False] == []
+    judged = {v.check for v in verdicts if v.passed}
+    assert {"step-defect", "momentum", "angular-momentum", "rod-length", "rod-velocity"} <= judged
+    wide = [x[:-1].astype(np.longdouble) for x in (run.q, run.p)]
+    q, _ = Case(trajectory=run, scene=scene).step(*wide)
+    assert np.max(np.abs(rods(scene).strain(q))) < 1e-17 or np.finfo(np.longdouble).eps > 1e-16
+
+
+@pytest.mark.parametrize("label", ["own:velocity-verlet", "ase:rattle", "openmm:verlet-rods"])
+def test_a_rod_to_a_fixed_point_turns_about_it(label: str, need: Need) -> None:
+    need(label)
+    rod = WallRod(i=[0, 1], at=[0.2, -0.3], length=[0.5, 0.5])  # type: ignore[arg-type]
+    scene = Scene(
+        m=[3.7, 3.7], q=[0.5, 0.1], p=[-0.8, 0.6], places=[0, 1], terms=(rod,), step=0.1, steps=200,
+        title="t",
+    )  # type: ignore[arg-type]  # fmt: skip
+    run = driver.run(scene, label)
+    verdicts = checks.judge(scene, run)
+    assert [v.check for v in verdicts if v.passed is False] == []
+    assert {"step-defect", "rod-length", "rod-velocity", "turn"} <= {v.check for v in verdicts if v.passed}
+    assert scenefile.parse(scene.to_toml(), name="a").digest == scene.digest
+
+
+@pytest.mark.parametrize("make", [dumbbell, triangle])
+def test_a_scene_with_rods_is_written_and_read_with_the_same_numbers(make: Callable[[], Scene]) -> None:
+    assert scenefile.parse(make().to_toml(), name="a").digest == make().digest
+
+
+FILE = """title = "t"
+particle = [{mass = 1.3, position = [0, 0], momentum = [0, 0]},
+  {mass = 2.1, position = [0.3, 0.4], momentum = %s}]
+time = {step = 0.1, steps = 10}
+rod = [%s]
+"""
+
+
+def test_a_length_that_is_left_out_is_that_of_the_start() -> None:
+    scene = scenefile.parse(FILE % ("[0.8, -0.6]", "{ends = [0, 1]}"), name="a")
+    assert rods(scene).length.tolist() == [0.5]
+
+
+@pytest.mark.parametrize(
+    ("momentum", "rod", "said"),
+    [
+        ("[0.8, -0.6]", "{ends = [0, 1], length = 0.6}", "its length is 0.6, and its ends are 0.5 apart"),
+        ("[0.8, 0.6]", "{ends = [0, 1]}", "its ends come apart by 0.457 a unit of time at the start"),
+        ("[0.8, -0.6]", "{ends = [0, 0]}", "the two ends are the same particle"),
+        ("[0.8, -0.6]", "{ends = [0, 2]}", "rod[0].ends = 2: there are 2 particles"),
+        ("[0.8, -0.6]", "{ends = ['wall', 'wall']}", "a rod between two walls holds nothing"),
+        ("[0.8, -0.6]", "{ends = [0, 1], wall = 0.1}", "no end of it is a wall"),
+        ("[0.8, -0.6]", "{ends = ['wall', 1], wall = [0.1]}", "1 numbers for 2 axes"),
+        ("[0.8, -0.6]", "{ends = ['wall', 0]}", "its ends are at one place"),
+        ("[0.8, -0.6]", "{ends = [0, 1], length = -1}", "rod[0].length = -1"),
+        ("[0.8, -0.6]", "{ends = [0, 1], lenght = 1}", "lenght"),
+    ],
+)
+def test_mistakes_in_rods_are_said_in_a_line(momentum: str, rod: str, said: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        scenefile.parse(FILE % (momentum, rod), name="a")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_run_says_that_it_exercises_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = ["--method", "own:velocity-verlet", "--steps", "9"]
+    assert main(["run", "dumbbell", *given, "-o", str(tmp_path / "a.h5")]) == 0
+    assert "Not exercised here: motion along z, periodic boxes, friction" in capsys.readouterr().out
+    assert main(["run", "orbit", *given, "-o", str(tmp_path / "b.h5")]) == 0
+    assert "constraints" in capsys.readouterr().out
+
+
+def test_a_damped_rod_is_refused_by_what_has_none(need: Need) -> None:
+    with pytest.raises(MethodError, match="no rod term"):
+        driver.run(dumbbell(), "own:rk4")
