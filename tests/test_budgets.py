@@ -10,18 +10,18 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 5558,
+    ("physics",): 5605,
     ("schemes",): 1449,
     ("thermal",): 1341,
-    ("engines/own",): 1677,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1107,
-    ("engines",): 2346,
-    ("driver", "conformance", "doors"): 1178,
-    ("checks",): 3943,
+    ("engines/own",): 1678,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1115,
+    ("engines",): 2398,
+    ("driver", "conformance", "doors"): 1179,
+    ("checks",): 3954,
     ("identify",): 7356,
-    ("formats", "store"): 4932,
+    ("formats", "store"): 4937,
     ("studies",): 1583,
-    ("studies/*",): 9923,
+    ("studies/*",): 10002,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5432,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

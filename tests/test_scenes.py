@@ -56,7 +56,11 @@ CASES = [
 ]
 
 
-LEFT_OUT_AT_START = {("detest-b1", "openmm:langevin-middle")}
+LEFT_OUT_AT_START = {
+    ("detest-b1", "openmm:langevin-middle"): "one friction rate",
+    # it spirals out, in the end of any box
+    ("periodic-box", "openmm:euler"): "half of the box",
+}
 """What an engine cannot serve, and only finds out as it starts."""
 
 
@@ -65,7 +69,7 @@ def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: s
     need(label)
     scene = shortened(name)
     if (name, label) in LEFT_OUT_AT_START:
-        with pytest.raises(MethodError, match="one friction rate"):
+        with pytest.raises(MethodError, match=LEFT_OUT_AT_START[name, label]):
             driver.run(scene, label)
         return
     run = driver.run(scene, label)

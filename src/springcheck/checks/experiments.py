@@ -260,7 +260,14 @@ def orientation(bench: Bench) -> Finding | str:
     places = 3 * np.arange(scene.n) if scene.places is None else scene.places
     base = replace(scene, steps=steps, every=1)
     turned = [
-        bench.run(replace(base, places=places - places % 3 + (places + turn) % 3), bench.label)
+        bench.run(
+            replace(
+                base,
+                places=places - places % 3 + (places + turn) % 3,
+                box=None if base.box is None else tuple(np.roll(base.box, turn).tolist()),
+            ),
+            bench.label,
+        )
         for turn in (1, 2)
     ]
     if any(len(run.t) != len(alone.t) for run in turned):

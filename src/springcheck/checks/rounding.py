@@ -52,7 +52,8 @@ def of_step(
     # an engine may count positions from where the springs rest, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        of_p = of_p + how.state * m * (np.abs(q) + size_q) / h
+        # in a box, positions that lie in it
+        of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * scene.periods) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
     if case.scheme.has("implicit"):
@@ -99,7 +100,8 @@ def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: floa
         more = more + whole * how.force / np.longdouble(how.state)
 
     def force(q: Reals, p: Reals) -> Reals:
-        sizes = plain(q, p)
+        # the nearest image is the difference of positions that lie in the box
+        sizes = plain(q + case.scene.periods, p)
         bound = sizes * more
         if how.quantum:
             # each term's force on a particle is cut off once in a kick, not once for every rounding, and a

@@ -46,6 +46,8 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         own = group[term.a]
         safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[own]))
         turning[own[~safe]] = True
+    if scene.box is not None:
+        _within_half(scene, springs, energy[group])
     if not np.any(turning):
         return np.zeros(scene.n)
     rest = scene.system.rest_positions
@@ -55,6 +57,24 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
             "its length alone"
         )
     return np.where(turning[group], rest, 0.0)
+
+
+def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
+    """MethodError where a spring may become half as long as the box, by the energy at each particle (n,)."""
+    for term in springs:
+        first = term.particles[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            most = np.sqrt(2.02 * energy[first] / term.k)
+        most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
+        if not np.all(most < scene.periods[first] / 2):
+            raise MethodError(f"{scene.name}: a spring may become as long as half of the box, and turn over")
+
+
+def cells(scene: Scene, origins: Floats) -> Floats:
+    """How many lengths of the box each position, counted from its origin, stands off the box (n,)."""
+    if scene.box is None:
+        return np.zeros(scene.n)
+    return np.asarray(np.floor((scene.q - origins) / scene.periods))
 
 
 def rests(scene: Scene, label: Label) -> Floats:

@@ -160,6 +160,8 @@ class Engine:
     exponents is left."""
     any_axis: bool = False
     """Whether it moves particles along y and z as well: it then reads `Scene.where`."""
+    periodic: bool = False
+    """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
     internal_steps: Callable[..., Any] | None = None
     """internal_steps(scene, method, most=): what an adaptive solver does on its way, counted."""
 

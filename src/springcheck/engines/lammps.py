@@ -52,13 +52,16 @@ SETTINGS = """
 units lj
 atom_style bond
 atom_modify map array sort 0 0.0
-boundary s s s
+boundary {border}
 neighbor 0.3 nsq
-neigh_modify delay 0 every 2000000000 check no
-comm_modify cutoff 1.0
-region all block -1 1 -1 1 -1 1 units box
+neigh_modify delay 0 every {every} check no
+comm_modify cutoff {cutoff!r}
+region all block {edges} units box
 """
-"""No periodic image, no order but that of creation, no list that is built again."""
+"""No order but that of creation."""
+
+IMAGES = np.array([0, 10, 20])
+"""First bits of the three counters in LAMMPS' image flags, of 10 bits each, in which 512 stands for 0."""
 
 
 def _library() -> Any:
@@ -116,14 +119,25 @@ class _Run:
             self._go_on = "run {} post no"
             self._lammps.command(f"run_style respa 2 {INNER} bond 1")
         self._where, self._elsewhere = scene.where, scene.elsewhere
-        x.reshape(-1)[self._where] = scene.q - self._origins
+        self._boxed, self._periods = scene.box is not None, scene.periods
+        cells = bonds.cells(scene, self._origins)
+        x.reshape(-1)[self._where] = scene.q - self._origins - cells * self._periods
+        flags = np.full((len(x), 3), 512)
+        flags.reshape(-1)[self._where] += cells.astype(np.int64)
+        self._array("image")[:] = np.sum(flags << IMAGES, axis=1)
         self._array("v").reshape(-1)[self._where] = scene.p / scene.m
         self._lammps.command("run 0 post no")
         self._on_a_line = not method.generator
-        self._x, self._v = self._array("x"), self._array("v")
 
     def _array(self, name: str) -> Any:
         return self._lammps.numpy.extract_atom(name)
+
+    def _crossed(self) -> Floats | float:
+        """What LAMMPS has taken off each position at the borders of the box [L]."""
+        if not self._boxed:
+            return 0.0
+        flags = (self._array("image")[:, None] >> IMAGES & 1023) - 512
+        return np.asarray(flags.reshape(-1)[self._where] * self._periods)
 
     def _build(self, scene: Scene, method: str) -> Floats:
         """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their positions."""
@@ -133,7 +147,7 @@ class _Run:
         layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
-        for line in SETTINGS.strip().splitlines():
+        for line in SETTINGS.format(**_borders(scene.box)).strip().splitlines():
             command(line)
         command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most}")
         command("mass 1 1.0")
@@ -145,6 +159,8 @@ class _Run:
         mass[n:] = 1.0
         mass[np.arange(n) if scene.places is None else scene.places // 3] = scene.m
         x[n:] = np.reshape(anchors, (-1, 3))
+        if scene.box is not None:
+            x[n:] %= scene.box
         if springs:
             command("bond_style harmonic")
         for number, (a, b, k, rest, _) in enumerate(springs, 1):
@@ -171,14 +187,13 @@ class _Run:
 
         def pull(_: Any, step: int, atoms: int, tags: Any, x: Floats, f: Floats) -> None:
             self.force_calls += 1
-            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where], still)
+            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where] + self._crossed(), still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
         self._lammps.set_fix_external_callback("pull", pull, None)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         command, where = self._lammps.command, self._where
-        x, v = self._x.reshape(-1), self._v.reshape(-1)
         whole, rest = divmod(every, ATTENTIVE)
         calls = [self._go_on.format(steps) for steps in (*[ATTENTIVE] * whole, rest) if steps]
         with np.errstate(over="ignore", invalid="ignore"):
@@ -188,9 +203,12 @@ class _Run:
                         command(call)
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
-                q[row] = x[where] + self._origins
+                # lists that are built again may move the arrays
+                x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
+                q[row] = x[where] + self._origins + self._crossed()
                 p[row] = v[where] * self._m
         if self._on_a_line:
+            x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
         self.force_calls += every * len(q) * self._each
 
@@ -206,6 +224,15 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
             yield f"group drive{row} id {particle + 1}"
             yield f'variable drive{row} equal "({amplitude!r})*cos(({w!r})*(step*({h!r}))+({phase!r}))"'
             yield f"fix drive{row} drive{row} addforce {' '.join(force)}"
+
+
+def _borders(box: tuple[float, ...] | None) -> dict[str, Any]:
+    """Without a box no periodic image, and no list that is built again; in one what leaves it is put back at
+    every step, and a bond finds its nearest image up to half of it away."""
+    if box is None:
+        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": "-1 1 -1 1 -1 1"}
+    edges = " ".join(f"0 {length!r}" for length in box)
+    return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 
 
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
@@ -297,5 +324,6 @@ ENGINE = Engine(
     version=version,
     step_seconds=1e-5,
     any_axis=True,
+    periodic=True,
     squares_lengths=True,
 )  # fmt: skip

@@ -52,6 +52,9 @@ class Scene:
     steps: int
     every: int = 1
     """Every how many steps a frame is recorded; it divides `steps`."""
+    box: tuple[float, float, float] | None = None
+    """Lengths of a periodic box along x, y and z [L], where every spring is that of the nearest images of its
+    ends; None without one.  Positions are counted on across its borders, so that no motion changes."""
     bath: Bath | None = None
     """The heat bath, which only random methods have; None where the motion is deterministic."""
     tolerance: float = 1e-12
@@ -112,6 +115,13 @@ class Scene:
         return left
 
     @property
+    def periods(self) -> Floats:
+        """The length of the box along the axis of each coordinate, 0 without a box (n,) [L]."""
+        if self.box is None:
+            return np.zeros(self.n)
+        return np.broadcast_to(np.array(self.box)[0 if self.places is None else self.places % 3], self.n)
+
+    @property
     def frames(self) -> int:
         """Number of recorded states, the start among them."""
         return self.steps // self.every + 1
@@ -138,6 +148,8 @@ class Scene:
         total.update(repr(known).encode())
         if self.places is not None:
             total.update(self.places.astype("<i8").tobytes())
+        if self.box:
+            total.update(repr(("box", *self.box)).encode())
         if self.bath:
             total.update(repr(self.bath).encode())
         for values in (self.m, self.q, self.p):
@@ -200,7 +212,9 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
     assert n is not None
     places = _places(scene)
     yield "places", places
-    yield "terms", _terms(scene.terms, n, places)
+    terms = _terms(scene.terms, n, places)
+    yield "terms", terms
+    yield "box", _box(scene, terms)
     steps, every = _whole(scene.steps, "steps"), _whole(scene.every, "every")
     if steps > MOST_STEPS:
         raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h")
@@ -256,6 +270,28 @@ def _places(scene: Scene) -> Integers | None:
     if np.any(mass[of] != scene.m):
         raise SceneError("m: the coordinates of one particle need one mass")
     return None if np.array_equal(places, 3 * np.arange(n)) else places
+
+
+def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
+    """The three lengths of the box, in which springs alone may act."""
+    if scene.box is None:
+        return None
+    try:
+        lengths = tuple(np.atleast_1d(np.asarray(scene.box, np.float64)).tolist())
+    except (TypeError, ValueError):
+        lengths = ()
+    if len(lengths) not in (1, 3) or not all(isinstance(x, float) and 0 < x < math.inf for x in lengths):
+        raise SceneError(f"box = {scene.box!r}: a length > 0, or three of them, is needed")
+    if scene.kind != "particles" or scene.bath is not None:
+        raise SceneError("box: it is for particles, without a bath")
+    for term in terms:
+        if term.key not in BOXED:
+            raise SceneError(f"box: a {term.key} has no nearest image; {', '.join(BOXED)} have")
+    return lengths * (3 // len(lengths))
+
+
+BOXED = ("wall-spring", "spring", "damping")
+"""Terms that a box may hold."""
 
 
 def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:

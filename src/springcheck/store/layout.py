@@ -230,7 +230,7 @@ def _particles(
 ) -> None:
     unit = units(scene)
     group = file.create_group(f"particles/{label}")
-    write_box(group)
+    write_box(group, scene.box)
     places = 3 * np.arange(scene.n) if scene.places is None else scene.places
     for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
         if source not in found:
@@ -254,11 +254,16 @@ def write_unit(dataset: Any, unit: str, name: str = "") -> None:
     write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
 
 
-def write_box(group: Any) -> None:
-    """The box of a particle group: three dimensions without borders."""
+def write_box(group: Any, lengths: tuple[float, ...] | None = None) -> None:
+    """The box of a particle group: three dimensions without borders, or periodic ones of these lengths [L].
+
+    Positions are counted on across its borders, so that H5MD's images are all 0 and left out.
+    """
     box = group.create_group("box")
     box.attrs["dimension"] = 3
-    write_attributes(box, {"boundary": ["none"] * 3})
+    write_attributes(box, {"boundary": ["periodic" if lengths else "none"] * 3})
+    if lengths:
+        box["edges"] = np.array(lengths, "<f8")
 
 
 @cache

@@ -106,6 +106,7 @@ ENGINE = Engine(
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     step_seconds=8e-7,
     any_axis=True,
+    periodic=True,
     squares_lengths=True,
     **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

@@ -81,13 +81,17 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     """Particles, then one fixed anchor for each rest point of a term; positions (N, 3)."""
     system = mm.System()
     start, masses = np.zeros((2, scene.particles, 3))
-    start.reshape(-1)[scene.where] = scene.q - origins
+    start.reshape(-1)[scene.where] = scene.q - origins - bonds.cells(scene, origins) * scene.periods
     masses.reshape(-1)[scene.where] = scene.m
     for m in np.max(masses, axis=1).tolist():
         system.addParticle(m)
     fixed: list[Any] = []
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
+    if scene.box is not None:
+        system.setDefaultPeriodicBoxVectors(*np.diag(scene.box).tolist())
+        for group in (fast, slow):
+            group.setUsesPeriodicBoundaryConditions(True)
     for term in scene.terms:
         group = fast if term.fast else slow
         if isinstance(term, WallSpring):
@@ -95,6 +99,8 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
             try:
                 joints = bonds.joints(scene, term, origins)
             except MethodError:
+                if scene.box is not None:
+                    raise
                 # unlike along its axes: no bond, but a potential of each coordinate
                 for force in _custom(scene, term, origins):
                     force.setForceGroup(int(term.fast))
@@ -289,6 +295,7 @@ class _Context:
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
+        origins = origins + bonds.cells(scene, origins) * scene.periods
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction
         pull = scene.system.potential_force

@@ -73,6 +73,7 @@ PLACES = {
     "tolerance": "time.tolerance",
     "quantities": "record.quantities",
     "include": "methods.include",
+    "box": "box.lengths",
 }
 """Where a field of a scene stands in its file, for messages."""
 
@@ -104,6 +105,7 @@ def scene(table: Any, *, name: str) -> Scene:
             p=bodies.p,
             places=bodies.places,
             terms=terms,
+            box=table.box and table.box.lengths,
             bath=bath,
             step=time.step,
             steps=time.steps,

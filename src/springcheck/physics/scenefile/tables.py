@@ -126,6 +126,12 @@ class TimeTable(SceneTable, frozen=True):
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
+class BoxTable(SceneTable, frozen=True):
+    """A periodic box: its length [L], or one for each of x, y and z."""
+
+    lengths: Positive | Annotated[tuple[Positive, ...], msgspec.Meta(min_length=3, max_length=3)]
+
+
 class BathTable(SceneTable, frozen=True):
     """A heat bath: temperature [K, or kT where units are reduced], and its friction rate [1/T]."""
 
@@ -180,6 +186,7 @@ class SceneBase(SceneTable, frozen=True):
     spring: tuple[SpringTable, ...] = ()
     damping: tuple[DampingTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
+    box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -256,7 +263,7 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, RodTable, BathTable, TimeTable, MethodsTable, RecordTable,
+        DampingTable, RodTable, BoxTable, BathTable, TimeTable, MethodsTable, RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
     found |= {key: table for key, (_, table) in of_terms().items()}

@@ -21,7 +21,7 @@ from springcheck.physics.terms import Drive, Rod, Spring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.faults import baths, clean, steppers
+from springcheck.studies.faults import baths, clean, space, steppers
 from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
@@ -55,6 +55,8 @@ def scene(where: Where) -> Scene:
         )
         alone = spring(m=3.7, k=2.9, q=0.3, p=0.7, c=0.11, step=0.1, steps=200, name=where, title="")
         return replace(alone, terms=(*alone.terms, drive))
+    if where == "box":
+        return space.pair_in_a_box(name=where)
     if where in ("bath", "wide bath"):
         return baths.springs({"bath": 40, "wide bath": 250}[where], name=where)
     if where == "dumbbell":

@@ -1,4 +1,4 @@
-"""What is wrong with engines along y and z, where a scene along x sees nothing."""
+"""What is wrong with engines along y and z and in a periodic box, where a scene along x sees nothing."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck import schemes
-from springcheck.physics.arrays import Integers, Reals
+from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import half_step
 from springcheck.studies.faults.steppers import State, Step, textbook
@@ -122,3 +123,60 @@ def planar_friction(scene: Scene, size: float, i: int, state: State) -> State:
     """Friction along x and y alone."""
     q, p = state
     return q, np.where(_on(scene, "z"), p, p * (1 - size))
+
+
+def pair_in_a_box(name: str) -> Scene:
+    """Two particles in the plane, their bond across two borders of a box at the start, which drift."""
+    return Scene(
+        m=np.array([3.7, 3.7, 1.3, 1.3]),
+        q=np.array([4.0, 0.2, 4.3, -0.1]),
+        p=np.array([2.9, -0.7, 0.4, -1.1]),
+        places=np.array([0, 1, 3, 4]),
+        terms=(Spring(a=np.array([0, 1]), b=np.array([2, 3]), k=np.array([2.9, 2.9]), rest=np.zeros(2)),),
+        box=(4.1, 3.3, 5.7),
+        step=0.1,
+        steps=200,
+        name=name,
+    )
+
+
+def _crossed(scene: Scene, q: Reals) -> Reals:
+    """Borders of the box that positions (..., n) have crossed, counted from the box; none without one."""
+    return np.zeros_like(q) if scene.box is None else np.floor(q / scene.periods)
+
+
+def imaged(nearest: Callable[[Reals, Floats], Reals]) -> Callable[[Scene, schemes.Scheme, float], Step]:
+    """Bonds between positions that are put back into the box: nearest(difference, box) instead of the one
+    that is."""
+
+    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        right, box = scene.system.force, scene.periods
+        bonds = [term for term in scene.terms if isinstance(term, Spring) and scene.box]
+
+        def force(q: Reals, p: Reals) -> Reals:
+            x, y = q - box * _crossed(scene, q), q.copy()
+            for term in bonds:
+                y[..., term.b] = q[..., term.a] + nearest(x[..., term.b] - x[..., term.a], box[term.a])
+            return right(y, p)
+
+        return textbook(scene, scheme, force=force)
+
+    return broken
+
+
+def swapped_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """Positions of particles in a plane, each axis counted on by the borders that the other crosses."""
+    if scene.box is None:
+        return run
+    crossed = _crossed(scene, run.q)
+    crossed -= crossed[:1]
+    other = crossed.reshape(len(crossed), -1, 2)[..., ::-1].reshape(crossed.shape)
+    return replace(run, q=run.q + (other - crossed) * scene.periods)
+
+
+def late_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+    """Positions counted on by the borders that were crossed until the frame before."""
+    crossed = _crossed(scene, run.q)
+    crossed[1:] -= crossed[:-1].copy()
+    crossed[0] = 0
+    return replace(run, q=run.q - crossed * scene.periods)

@@ -171,6 +171,8 @@ REPORTS = (
 
 SPACE = ("step-defect", "closed-form", "angular-momentum")
 
+_MOTION_CHECKS = ("step-defect", "closed-form")
+
 AXES = (
     Fault("stiff-y", "forces along y are too large",
           SPACE, seeded.moving(space.stiffer("y")), size=1e-11,
@@ -282,6 +284,21 @@ RIGID = (
           seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), size=1e-10, scene="dumbbell"),
 )  # fmt: skip
 
+BOX = (
+    Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
+          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d)), scene="box"),
+    Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
+          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d - box * np.floor(d / box))),
+          scene="box"),
+    Fault("cubic-box", "images along y are as far apart as those along x",
+          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d - box[0] * np.round(d / box[0]))),
+          scene="box"),
+    Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
+          _MOTION_CHECKS, seeded.reporting(space.swapped_images), scene="box"),
+    Fault("late-image", "a border that is crossed is counted a frame later",
+          _MOTION_CHECKS, seeded.reporting(space.late_images), scene="box"),
+)  # fmt: skip
+
 ADAPTIVE = (
     Fault("deaf-to-tolerance", "an adaptive solver whose error does not follow its tolerance",
           ("convergence", "tolerance"),
@@ -390,6 +407,7 @@ FAULTS: tuple[Fault, ...] = (
     + ARITHMETIC
     + REPORTS
     + AXES
+    + BOX
     + DRIVES
     + RIGID
     + ADAPTIVE
