@@ -13,9 +13,9 @@ import pytest
 
 from springcheck import engines, store
 from springcheck.errors import SpringcheckError
+from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
-from springcheck.studies.extremes import STUDY, grid, judging, refusals, running, solving
-from springcheck.studies.extremes import figure as figures
+from springcheck.studies.extremes import STUDY, grid, judging, page, refusals, running, solving
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
 from springcheck.studies.extremes.planes import planes
@@ -143,7 +143,7 @@ def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
     untold = next(cell for row in plane.cells for cell in row if cell)
     cells = tuple(replace(cell, outcome="not measured") if cell is untold else cell for cell in atlas.cells)
     for shown, count in ((atlas, 0), (replace(atlas, cells=cells), 1)):
-        drawn = figures.picture(shown)
+        drawn = render.picture(page.banks(shown)[0])
         (image,) = drawn.axes[0].images
         wanted = keeping.OUTCOMES.index("not measured")
         assert np.any(np.ma.filled(image.get_array(), -1) == wanted) == bool(count)

@@ -272,12 +272,10 @@ def test_a_cell_of_an_ensemble_that_explodes_does_not_set_its_scale(fields: tupl
 
 
 def test_a_coarse_atlas_has_no_gaps_between_its_cells() -> None:
-    from springcheck.studies.extremes import figure
+    from springcheck.studies.extremes import page
 
-    gap = np.nan
-    row = np.array([0, gap, gap, 1, gap, gap, 2, gap, gap, gap, gap, gap, gap])
-    np.testing.assert_array_equal(figure._filled(row)[:9], [0, 0, 1, 1, 1, 2, 2, 2, 2])
-    assert np.isnan(figure._filled(row)[9:]).all()
+    row = [0, -1, -1, 1, -1, -1, 2, -1, -1, -1, -1, -1, -1]
+    assert page._filled(row) == [0, 0, 1, 1, 1, 2, 2, 2, 2, -1, -1, -1, -1]
 
 
 def test_the_exact_solution_is_a_smooth_line_where_a_stiff_motion_decays_at_once() -> None:

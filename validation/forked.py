@@ -251,8 +251,6 @@ def _import() -> None:
     from springcheck.cli import commands, file, inspect, page  # noqa: F401
     from springcheck.figures import render  # noqa: F401
     from springcheck.identify import files, stepper  # noqa: F401
-    from springcheck.studies.extremes import figure  # noqa: F401
-    from springcheck.studies.precision import figure as f1  # noqa: F401
     from springcheck.studies.precision import measure  # noqa: F401
     from springcheck.studies.run import figure as f2  # noqa: F401
     from springcheck.studies.stability import measure as m1  # noqa: F401

@@ -16,6 +16,9 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
+GUIDE = "guide"
+"""The group of lines that show a slope."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
@@ -33,7 +36,10 @@ class Scale:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """Points of one name; curves of one name are switched on and off together."""
+    """Points of one name; curves of one name are switched on and off together.
+
+    One of the group `GUIDE` is no method's: a thin line that a figure names at its end.
+    """
 
     name: str
     group: str
@@ -66,7 +72,9 @@ class Rule:
     axis: Literal["x", "y"]
     at: float
     name: str = ""
-    look: Literal["limit", "one", "here"] = "limit"
+    look: Literal["limit", "one", "here", "floor"] = "limit"
+    group: str = ""
+    """The scheme whose floor it is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

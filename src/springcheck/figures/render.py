@@ -12,15 +12,20 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale
 
 SHADES = {"good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000"}
 """Of the kinds of tiles, as on the page's paper."""
 
-RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#333333", (0, (1, 2)))}
+RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#333333", (0, (1, 2))),
+         "floor": ("#666666", (0, (1, 3)))}  # fmt: skip
 """Colour and line of each look of a rule."""
+
+NOT_TRIED = ("not tried", "#ffffff")
+"""Of a tile without a kind."""
 
 EXACT = "exact"
 """The group of the exact solution: broad and grey, behind all others."""
@@ -31,8 +36,11 @@ MOST_MARKS, MANY = 14, 200
 ENTRY = 0.36
 """Height of an entry of the legend [in]."""
 
-MOST_TICKS, EVEN = 8, 40
-"""Values of tiles that are written; more than so many in even ratios are marked at powers of ten."""
+MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
+"""Values of tiles that are written, and upwards; more than so many in even ratios: powers of ten."""
+
+SMALL_MAPS = 6
+"""Maps from which on they are small, three beside each other, and write what they have in common once."""
 
 
 def picture(bank: Bank) -> Figure:
@@ -41,7 +49,10 @@ def picture(bank: Bank) -> Figure:
     named = max((len(chart.y.names) for chart in charts), default=0)
     wide = 4.6 if len(charts) > 1 else 6.0
     high = 0.19 * named + 2.2 if named else 3.3 if tiled else 4.3
-    columns = min(3 if len(charts) == 3 and not tiled else 2, len(charts))
+    small = tiled and not named and len(charts) >= SMALL_MAPS
+    if small:
+        wide, high = 3.7, 2.2
+    columns = min(3 if small or (len(charts) == 3 and not tiled) else 2, len(charts))
     handles: list[Any] = _entries([curve for chart in charts for curve in chart.curves])
     handles += _kinds(charts)
     # room for the whole legend
@@ -49,6 +60,9 @@ def picture(bank: Bank) -> Figure:
     figure, grid, _ = overlay.panels(len(charts), columns, (wide, 2.4), (high, 0.6))
     for axes, chart in zip(grid, charts, strict=True):
         _chart(axes, chart)
+    for j, axes in enumerate(grid if small else ()):
+        axes.set_ylabel(axes.get_ylabel() if j % columns == 0 else "")
+        axes.set_xlabel(axes.get_xlabel() if j >= len(grid) - columns else "")
     overlay.heading(figure, bank.heading or charts[0].title, 62 * columns)
     figure.legend(
         handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
@@ -65,6 +79,8 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
             names.append(curve.name)
     found = []
     for group, names in groups.items():
+        if group == GUIDE:
+            continue
         if group == EXACT:
             found.append(Line2D([], [], color="#b3b3b3", linewidth=4, label=names[0]))
             continue
@@ -78,11 +94,13 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
 
 def _kinds(charts: Sequence[Chart]) -> list[Patch]:
     found = {kind for chart in charts if chart.tiles for kind in chart.tiles.kinds}
-    seen = {
-        chart.tiles.kinds[i]: None for chart in charts if chart.tiles for row in chart.tiles.rows
-        for i in row if i >= 0
-    }  # fmt: skip
-    return [Patch(facecolor=SHADES.get(shade, shade), label=name) for name, shade in seen if found]
+    kinds = [chart.tiles.kinds[i] if i >= 0 else NOT_TRIED for chart in charts if chart.tiles
+             for row in chart.tiles.rows for i in row]  # fmt: skip
+    seen = dict.fromkeys(kinds) if found else {}
+    return [
+        Patch(facecolor=SHADES.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
+        for name, shade in seen
+    ]
 
 
 def _chart(axes: Axes, chart: Chart) -> None:
@@ -106,6 +124,11 @@ def _curve(axes: Axes, curve: Curve, number: int) -> None:
     if curve.group == EXACT:
         axes.plot(x, y, color="#b3b3b3", linewidth=4, alpha=0.7, zorder=1)
         return
+    if curve.group == GUIDE:
+        axes.plot(x, y, color="#333333", linewidth=0.9)
+        how: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "#333333"}
+        axes.annotate(curve.name, (x[-1], y[-1]), xytext=(3, -4), **how)
+        return
     if curve.line:
         axes.plot(x, y, color=look.color, linestyle=look.linestyle, linewidth=1.1, zorder=2)
     mark = looks.mark(looks.engine(curve.name))[0]
@@ -128,6 +151,7 @@ def _curve(axes: Axes, curve: Curve, number: int) -> None:
 def _rule(axes: Axes, rule: Rule, height: float) -> None:
     """A line, and its name: of an upright one at this height of the picture."""
     color, line = RULES[rule.look]
+    color = looks.look(rule.group).color if rule.group else color
     draw = axes.axvline if rule.axis == "x" else axes.axhline
     draw(rule.at, color=color, linestyle=line, linewidth=0.9, zorder=1.5)
     how: dict[str, Any] = {"fontsize": 7.5, "color": color, "textcoords": "offset points"}
@@ -160,11 +184,12 @@ def _scale(axes: Axes, scale: Scale, which: str, *, tiled: bool) -> None:
         at = np.interp(decades, np.log10(values), np.arange(len(values)))
         put(at, [f"$10^{{{int(e)}}}$" for e in decades])
     elif tiled:
-        shown = range(0, len(values), -(-len(values) // MOST_TICKS))
+        shown = range(0, len(values), -(-len(values) // (MOST_TICKS if which == "x" else MOST_TICKS_UP)))
         put(list(shown), [f"{values[i]:.3g}" for i in shown])
     else:
         if scale.log:
             (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(NullFormatter())
         if scale.shown:
             (axes.set_xlim if which == "x" else axes.set_ylim)(*scale.shown)
     (axes.set_xlabel if which == "x" else axes.set_ylabel)(scale.name)

@@ -1,10 +1,13 @@
-"""The atlas in the report page: every cell with its outcome and its reason."""
+"""The atlas in figures and in the report page: every cell with its outcome and its reason."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.studies.extremes.planes import Plane, planes
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
+from springcheck.text.wording import count
 
 SHADES = {
     "right": "good",
@@ -12,24 +15,46 @@ SHADES = {
     "engine's limit": "limit",
     "refused": "refused",
     "silently wrong": "wrong",
-    "not measured": "refused",
+    "not measured": "#8c6bb1",
 }
+
+
+def _filled(row: list[int]) -> list[int]:
+    """A row of outcomes, each cell as wide as the distance to the next one that was tried: a coarse grid has
+    other forces in every row."""
+    tried = np.flatnonzero(np.asarray(row) >= 0)
+    if len(tried) < 2:
+        return row
+    apart = np.abs(np.arange(len(row))[:, None] - tried)
+    near = np.min(apart, axis=1) <= (np.median(np.diff(tried)) + 1) // 2
+    nearest = tried[np.argmin(apart, axis=1)]
+    return [row[int(i)] if close else -1 for i, close in zip(nearest, near, strict=True)]
 
 
 def banks(atlas: Atlas) -> list[Bank]:
     """A map for each method of fixed step."""
     charts = [_chart(plane) for plane in planes(atlas.cells)]
-    return [Bank(title="Methods drawn", charts=charts)] if charts else []
+    if not charts:
+        return []
+    wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
+    others = ", ".join(
+        f"{n} {name}" for name, n in atlas.counts().most_common(3) if n and name != OUTCOMES[4]
+    )
+    heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
+    return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
 
 
 def _chart(plane: Plane) -> Chart:
     return Chart(
         title=plane.method,
+        short=plane.method,
         x=Scale(name="log10 of the force", values=plane.decades),
         y=Scale(name="h \N{GREEK SMALL LETTER OMEGA}", values=plane.turns),
         tiles=Tiles(
             kinds=[(outcome, SHADES[outcome]) for outcome in OUTCOMES],
-            rows=[[-1 if x is None else OUTCOMES.index(x.outcome) for x in row] for row in plane.cells],
+            rows=[
+                _filled([-1 if x is None else OUTCOMES.index(x.outcome) for x in row]) for row in plane.cells
+            ],
             notes=[["" if x is None else x.reason for x in row] for row in plane.cells],
         ),
     )

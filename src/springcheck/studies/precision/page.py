@@ -1,14 +1,17 @@
-"""Error against run time and force calls in the report page."""
+"""Error against run time and force calls, in figures and in the report page."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
-from springcheck.figures.charts import Bank, Chart, Curve, Scale
+from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.text.wording import seconds
+
+FORCE_CALLS = "force calls"
 
 MOST_SHOWN = 30.0
 """Errors above this are out of the picture at first: nothing is read off them."""
@@ -23,25 +26,68 @@ def banks(study: PrecisionStudy) -> list[Bank]:
     error = Scale(
         name="largest error / initial energy norm",
         log=True,
-        shown=(least / 2, min(MOST_SHOWN, 2 * max(x.error for x in points))),
+        shown=(10.0 ** math.floor(math.log10(least)), min(MOST_SHOWN, 2 * max(x.error for x in points))),
     )
     time = "the run time of the engine alone, its smallest of several"
     calls = "force calls, which any machine counts alike"
     ways: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
         (time, "run time [s]", lambda x: x.seconds),
-        (calls, "force calls", lambda x: float(x.force_calls or 0)),
+        (calls, FORCE_CALLS, lambda x: float(x.force_calls or 0)),
     )
     charts = [
         Chart(
             title=f"Error against {title}.",
+            short=f"against {name}",
             x=Scale(name=name, log=True),
             y=error,
-            curves=_curves(study, known, cost),
+            curves=[
+                *_curves(study, known, cost),
+                *(_slopes(study, known, cost) if name == FORCE_CALLS else ()),
+            ],
+            rules=_floors(study),
         )
         for title, name, cost in ways
         if (known := [x for x in points if cost(x) > 0])
     ]
-    return [Bank(title="Methods drawn", charts=charts)] if charts else []
+    return (
+        [Bank(name="precision", heading=_heading(study), title="Methods drawn", charts=charts)]
+        if charts
+        else []
+    )
+
+
+def _heading(study: PrecisionStudy) -> str:
+    """The cheapest way to the smallest error that somebody reached."""
+    reached = [(x.target, x.point) for x in study.cheapest if x.point is not None]
+    if not reached:
+        return f"{study.scene.name}: error against cost, to the same final time"
+    target, point = min(reached, key=lambda x: x[0])
+    cheapest = f"is cheapest by {point.method}, in {seconds(point.seconds)}"
+    return f"{study.scene.name}: an error of {target:.0e} {cheapest}"
+
+
+def _floors(study: PrecisionStudy) -> list[Rule]:
+    """The lowest rounding floor that was found of each scheme."""
+    found: dict[str, float] = {}
+    for one in study.methods:
+        if one.floor is not None:
+            scheme = scheme_of(one.method)
+            found[scheme] = min(one.floor, found.get(scheme, math.inf))
+    return [
+        Rule(axis="y", at=y, name=f"rounding floor {y:.0e}", look="floor", group=scheme)
+        for scheme, y in found.items()
+    ]
+
+
+def _slopes(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
+    """Short lines of the orders that were found, from one point at the left, where no curve runs."""
+    orders = sorted({round(x.order) for x in study.methods if x.order is not None})
+    left, errors = min(map(cost, points)), [math.log10(x.error) for x in points]
+    start = 10 ** (min(errors) + 0.35 * (min(1.5, max(errors)) - min(errors)))
+    return [
+        Curve(name=f"order {n}", group=GUIDE, x=[left, left * 10**0.5], y=[start, start * 10 ** (-0.5 * n)])
+        for n in orders
+    ]
 
 
 def _curves(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
