@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springcheck.identify import driven
 from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched
@@ -21,7 +20,7 @@ from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import memory, misfit
 from springcheck.identify.wrong import wrong_map
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats
 from springcheck.schemes import rotation
 
 FEWEST_MISSES = 24.0
@@ -121,53 +120,10 @@ def _left(columns: Floats, missing: Floats) -> float:
     return float(np.sqrt(np.mean((missing - fitted) ** 2) * share)) / total if total else 1.0
 
 
-LONG = 50_000
-"""Frames of which waves of 41 frequencies take 32 MiB."""
-
-Complexes: TypeAlias = NDArray[np.complex128]
-
-
 def _hats(x: Floats, count: int) -> Floats:
     """Piecewise linear functions of x that add up to 1, (f, count)."""
     at = np.linspace(float(np.min(x)), float(np.max(x)), count)
     return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
-
-
-def _oscillation(q: Floats, v: Floats, missing: Floats, weight: Floats, carrier: Floats) -> list[Floats]:
-    """q, v and a carrier times the sine and cosine in time that explain most of what is missing (f, 2)."""
-    n, frames, pull = np.arange(len(q)), len(q), weight * carrier
-    across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
-    wanted = missing * weight[:, None]
-    wanted = wanted - across @ (across.T @ wanted)
-    summed, square = np.concatenate([wanted, across], axis=1).T * pull, pull**2
-    total = float(np.sum(square))
-
-    def best(w: Reals, waves: Complexes, double: Complexes) -> float:
-        """Which of frequencies (c,) explains most, from the sums (4, c) and (c,) with exp(i w n) and its
-        square."""
-        c, s = waves.real, waves.imag
-        cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
-        ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
-        cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
-        det = np.maximum(cc * ss - cs * cs, 1e-9 * total * total + 1e-300)
-        x, y = c[:2], s[:2]
-        return float(w[np.argmax(np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0))])
-
-    size = 1 << (8 * frames - 1).bit_length()
-    at = np.arange(size // (4 * frames), size // 2 + 1)
-    apart = 2 * np.pi / size
-    waves, double = np.fft.fft(summed, size).conj(), np.fft.fft(square, size // 2).conj()
-    frequency = best(apart * at, waves[:, at], double[at % (size // 2)])
-    for room in (apart, apart / 20):
-        w = frequency + room * np.linspace(-1, 1, 41)
-        # two rows of squares: of one and a matrix BLAS makes a product in threads, which cost more than it
-        parts = [
-            (summed @ x, (np.stack([square, square]) @ x**2)[0])
-            for x in (np.exp(1j * np.outer(n, y)) for y in np.array_split(w, 1 + frames // LONG))
-        ]
-        waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
-        frequency = best(w, waves, double)
-    return [q, v, carrier * np.cos(frequency * n), carrier * np.sin(frequency * n)]
 
 
 def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
@@ -200,13 +156,15 @@ def _shape(e: Evidence) -> list[Explanation]:
     t = np.linspace(-1, 1, e.pairs)
     count = min(14, max(4, e.pairs // 8))
     linear = [q, v]
+    carriers = {"oscillation": q, "drive": np.ones_like(q)}
+    tuned = {name: driven.frequency(q, v, missing, weight[:, 0], x) for name, x in carriers.items()}
     groups: dict[str, list[Floats]] = {
         "constant": [*linear, np.ones_like(q)],
         "drag": [*linear, np.abs(v) * v],
         "parity": [*_alternating(e).T],
         "quadratic": [*linear, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
-        "oscillation": _oscillation(q, v, missing, weight[:, 0], q),
+        "oscillation": driven.waves(q, v, q, tuned["oscillation"]),
         "anharmonic": [
             *linear,
             np.ones_like(q),
@@ -217,7 +175,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "stiffness in time": [v, *(q[:, None] * _hats(t, count)).T],
         "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
         "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
-        "drive": _oscillation(q, v, missing, weight[:, 0], np.ones_like(q)),
+        "drive": driven.waves(q, v, np.ones_like(q), tuned["drive"]),
     }
     # what a few pairs miss follows any law of as many numbers: a frequency that was looked for is more,
     # the map's own constant is none
@@ -243,6 +201,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
+    cause += driven.said(e, good[0] == "drive", tuned[good[0]]) if good[0] in tuned else ""
     few = _turns(e) < FEW_TURNS
     if few and good[0] in (*STATE, *TIME):
         # where states hardly come back, any function of time is one of many powers of the state

@@ -1,0 +1,219 @@
+"""A force, or a stiffness, that goes up and down in time: its frequency, its amplitude and its phase.
+
+With a drive a scheme takes z to A z + Re(b exp(i w n)).  The steady state s = (exp(i w) - A)**-1 b taken off,
+the rest is the scheme's own motion without a drive, and is named as such; the scheme says what b a drive of
+amplitude 1 has, and so how large the drive is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.errors import IdentificationError
+from springcheck.identify.compare import compare
+from springcheck.identify.evidence import Evidence
+from springcheck.identify.fit import fit
+from springcheck.identify.hypothesis import FEW, Match, distinct
+from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.driven import CLOCK
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Drive, WallSpring
+from springcheck.schemes import Law, scheme, title
+
+LONG = 50_000
+"""Frames of which waves of 41 frequencies take 32 MiB."""
+
+Complexes: TypeAlias = NDArray[np.complex128]
+
+
+def frequency(q: Floats, v: Floats, missing: Floats, weight: Floats, carrier: Floats) -> float:
+    """Of the sine and cosine in frames by which a carrier explains most of what is missing (f, 2)."""
+    n, frames, pull = np.arange(len(q)), len(q), weight * carrier
+    across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
+    wanted = missing * weight[:, None]
+    wanted = wanted - across @ (across.T @ wanted)
+    summed, square = np.concatenate([wanted, across], axis=1).T * pull, pull**2
+    total = float(np.sum(square))
+
+    def best(w: Reals, waves: Complexes, double: Complexes) -> float:
+        """Which of frequencies (c,) explains most, from the sums (4, c) and (c,) with exp(i w n) and its
+        square."""
+        c, s = waves.real, waves.imag
+        cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
+        ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
+        cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
+        det = np.maximum(cc * ss - cs * cs, 1e-9 * total * total + 1e-300)
+        x, y = c[:2], s[:2]
+        return float(w[np.argmax(np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0))])
+
+    size = 1 << (8 * frames - 1).bit_length()
+    at = np.arange(size // (4 * frames), size // 2 + 1)
+    apart = 2 * np.pi / size
+    waves, double = np.fft.fft(summed, size).conj(), np.fft.fft(square, size // 2).conj()
+    found = best(apart * at, waves[:, at], double[at % (size // 2)])
+    for room in (apart, apart / 20):
+        w = found + room * np.linspace(-1, 1, 41)
+        # two rows of squares: of one and a matrix BLAS makes a product in threads, which cost more than it
+        parts = [
+            (summed @ x, (np.stack([square, square]) @ x**2)[0])
+            for x in (np.exp(1j * np.outer(n, y)) for y in np.array_split(w, 1 + frames // LONG))
+        ]
+        waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
+        found = best(w, waves, double)
+    return found
+
+
+def waves(q: Floats, v: Floats, carrier: Floats, turn: float) -> list[Floats]:
+    """q, v and a carrier times the cosine and sine of an angle that turns by so much a frame."""
+    n = np.arange(len(q))
+    return [q, v, carrier * np.cos(turn * n), carrier * np.sin(turn * n)]
+
+
+TUNING_STEPS = 12
+"""Gauss-Newton steps of a frequency: three or four reach the last digits."""
+
+STARTS_BESIDE, FEW_FRAMES = 6, 2000
+"""Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
+
+MOST_SCHEMES = 3
+"""That a sentence names: on a spring of unknown stiffness several have one map."""
+
+AGREES = 1e-6
+"""Share of b by which that of a scheme may miss it: what rounding leaves of b is less by decades."""
+
+
+def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
+    """The best of `_tuned` from some starts around: near a resonance the drive beats with the motion."""
+    apart = np.pi / (2 * len(z)) if len(z) <= FEW_FRAMES else 0.0
+    found = []
+    for away in sorted(range(-STARTS_BESIDE, STARTS_BESIDE + 1) if apart else (0,), key=abs):
+        found.append(_tuned(z, carrier, abs(turn + away * apart)))
+        if found[-1][2] <= AGREES**2:
+            break
+    return min(found, key=lambda one: one[2])[:2]
+
+
+def _tuned(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats, float]:
+    """The turn in a frame, by least squares, the rows (5, 2) of z, 1, carrier cos and carrier sin, and the
+    largest residual."""
+    n, ends = np.arange(len(z) - 1), z[1:]
+    rows, worst = np.empty((5, 2)), np.inf
+    for _ in range(TUNING_STEPS):
+        cosine, sine = np.cos(turn * n), np.sin(turn * n)
+        columns = np.stack([*z[:-1].T, np.ones(len(n)), carrier * cosine, carrier * sine], axis=1)
+        rows = np.linalg.lstsq(columns, ends)[0]
+        slope = (n * carrier)[:, None] * (cosine[:, None] * rows[4] - sine[:, None] * rows[3])
+        # what of the slope the other columns do not take up
+        slope -= columns @ np.linalg.lstsq(columns, slope)[0]
+        left = ends - columns @ rows
+        worst = float(np.max(np.abs(left)))
+        move = float(np.sum(slope * left) / max(float(np.sum(slope * slope)), 1e-300))
+        turn += move
+        if abs(move) * len(n) < 1e-15:
+            break
+    return turn, np.asarray(rows), worst
+
+
+def said(e: Evidence, forced: bool, turn: float) -> str:
+    """What more there is to say of a drive, or of a stiffness that changes, in words."""
+    z = e.found.z.astype(np.float64)
+    turn, rows = _best(z, np.ones(e.pairs) if forced else z[:-1, 0], turn)
+    w = turn / float(e.record.interval)
+    b = rows[3] - 1j * rows[4]
+    if not forced:
+        deep = b[1] / rows[0, 1]
+        return f": about as 1 + {_wave(deep, w, '.2g', '.4g')}, the phase at the first frame"
+    found: dict[str, str] = {}
+    for match, unit in _schemes(e, rows, b, turn):
+        strength = complex(np.vdot(unit, b) / np.vdot(unit, unit))
+        if np.max(np.abs(b - strength * unit)) <= AGREES * np.max(np.abs(b)):
+            found.setdefault(match.scheme, _wave(strength, w, ".9g", ".9g"))
+    if found:
+        of = "" if e.record.mass is not None else " for each unit of mass"
+        ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_SCHEMES]]
+        return f". It is a spring with the force {', or '.join(ways)}, the phase at the first frame"
+    mass = 1.0 if e.record.mass is None else float(e.record.mass[e.j])
+    size = b[1] * float(e.found.size[1]) / float(e.record.interval) ** 2 * mass
+    return f": about {_wave(size, w, '.2g', '.6g')}, the phase at the first frame"
+
+
+def _wave(strength: complex, w: float, first: str, digits: str) -> str:
+    if w < 0:
+        strength, w = strength.conjugate(), -w
+    phase = math.atan2(strength.imag, strength.real)
+    sign = "-" if phase < 0 else "+"
+    return f"{abs(strength):{first}} cos({w:{digits}} t {sign} {abs(phase):{first}})"
+
+
+def _schemes(
+    e: Evidence, rows: Floats, b: NDArray[np.complex128], turn: float
+) -> Iterator[tuple[Match, NDArray[np.complex128]]]:
+    """The schemes of what is left without the steady state, and their b of a force of amplitude 1."""
+    record, j, found = e.record, e.j, e.found
+    n = np.arange(len(found.z))
+    turned = np.exp(1j * turn * n)[:, None]
+    try:
+        steady = np.linalg.solve(np.exp(1j * turn) * np.eye(2) - rows[:2].T, b)
+        centre = np.linalg.solve(np.eye(2) - rows[:2].T, rows[2])
+    except np.linalg.LinAlgError:
+        return
+    left = found.z - (turned * steady).real - centre
+    q, v = record.q.copy(), record.v.copy()
+    q[:, j], v[:, j] = left[:, 0] * found.size[0], left[:, 1] * found.size[1] / record.interval
+    try:
+        alone = fit(replace(record, q=q, v=v), j)
+    except IdentificationError:
+        # it is in its steady state all along
+        return
+    joints = [
+        x for damped in (False, True) for x in compare([alone], [e.terms], distinct(damped=damped), FEW[:4])
+    ]
+    for joint in sorted(joints, key=lambda x: x.plainness):
+        match = joint.parts[0]
+        unit = _response(e, match, turn)
+        if unit is not None and match.turns == 0 and _has_stated(e, match):
+            yield match, unit
+
+
+def _has_stated(e: Evidence, match: Match) -> bool:
+    """Whether it has the stiffness that is stated, where one is: other schemes have its map with others."""
+    if e.stiffness is None or e.record.mass is None:
+        return True
+    stated = e.stiffness / float(e.record.mass[e.j]) * (float(e.record.interval) / match.stride) ** 2
+    return abs(match.a - stated) <= AGREES * stated
+
+
+def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] | None:
+    """b of a force cos(w t), in the units of the map: a frame from rest, by the scheme with a clock."""
+    law = scheme(match.scheme)
+    if not law.has("one-step") or (law.has("friction") and match.friction <= 6 * match.g_error):
+        # without friction such a scheme is one without a stage for it
+        return None
+    h = float(e.record.interval) / match.stride
+    m = 1.0 if e.record.mass is None else float(e.record.mass[e.j])
+    one, number = np.array([0]), np.ones(1)
+    terms: list[Any] = [WallSpring(i=one, k=match.a * m / h**2 * number, at=0 * number)]
+    if match.friction > 0:
+        terms.append(Damping(i=one, c=match.friction * m / h * number))
+    parts = []
+    for phase in (0.0, np.pi / 2):
+        drive = Drive(
+            i=one, amplitude=number, frequency=turn / h / match.stride * number, phase=phase * number
+        )
+        scene = Scene(m=m * number, q=0 * number, p=0 * number, terms=(*terms, drive), step=h, steps=1)
+        whole = Law(scheme=law, scene=scene.system.clocked, h=h)
+        q: Extended
+        p: Extended
+        q, p = np.zeros(2, np.longdouble), np.array([0, CLOCK], np.longdouble)
+        for _ in range(match.stride):
+            a, c = whole.step(q, p)
+            q, p = np.asarray(a, np.longdouble), np.asarray(c, np.longdouble)
+        parts.append([float(q[0]), float(p[0]) / m * float(e.record.interval)])
+    # Re(b exp(i phase)) at two phases
+    return (np.array(parts[0]) - 1j * np.array(parts[1])) / e.found.size.astype(np.float64)

@@ -1,0 +1,73 @@
+"""Identify on driven motions: what drives them is said with its numbers, and no scheme that is not theirs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Drive
+
+ONE = np.array([0])
+
+
+def driven(*, damped: bool = True, **drive: float) -> Scene:
+    scene = scenes.load_scene("driven-spring")
+    given = {"amplitude": 0.43, "frequency": 0.87, "phase": 0.6} | drive
+    terms = [x for x in scene.terms if x.key == "wall-spring" or (damped and x.key == "damping")]
+    made: Any = Drive(i=ONE, **{name: np.array([x]) for name, x in given.items()})
+    return replace(scene, terms=(*terms, made))
+
+
+def said(scene: Scene, label: str, **stated: float) -> str:
+    run = springcheck.simulate(scene, label)
+    found = springcheck.identify(run.t, run.q, run.p, **stated)
+    assert not found.fits
+    assert found.scheme is None
+    return found.statement
+
+
+NAMES = {"velocity-verlet": "velocity Verlet", "rk4": "classical Runge-Kutta (RK4)",
+         "semi-implicit-euler": "semi-implicit Euler, kick-drift", "implicit-midpoint": "implicit midpoint",
+         "position-verlet": "position Verlet"}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("damped", [True, False])
+def test_amplitude_frequency_phase_and_scheme_of_a_drive_are_said(name: str, damped: bool) -> None:
+    why = said(driven(damped=damped), f"own:{name}", mass=3.7, stiffness=2.9)
+    assert f"the force 0.43 cos(0.87 t + 0.6) by {NAMES[name]}, the phase at the first frame" in why
+
+
+def test_an_amplitude_below_zero_is_a_phase_beyond_a_quarter_turn() -> None:
+    why = said(
+        driven(amplitude=-0.013, frequency=7.1, phase=-1.0), "own:velocity-verlet", mass=3.7, stiffness=2.9
+    )
+    assert f"0.013 cos(7.1 t + {np.pi - 1:.9g}) by velocity Verlet" in why
+
+
+def test_without_a_stated_stiffness_every_scheme_of_the_map_is_said_with_its_amplitude() -> None:
+    """Position Verlet and the implicit midpoint have one map on springs of unlike stiffness."""
+    why = said(driven(damped=False), "own:implicit-midpoint", mass=3.7)
+    assert "by position Verlet" in why
+    assert "0.43 cos(0.87 t + 0.6) by implicit midpoint" in why
+
+
+@pytest.mark.parametrize(("name", "frequency"), [("mathieu-stable", 1.3723), ("mathieu-tongue", 1.7706)])
+def test_a_modulated_stiffness_is_said_to_first_order(name: str, frequency: float) -> None:
+    why = said(scenes.load_scene(name), "own:velocity-verlet", mass=3.7, stiffness=2.9)
+    assert why.startswith("The stiffness changes in time, up and down")
+    assert "about as 1 + 0.3 cos(" in why
+    assert float(why.partition("cos(")[2].partition(" t")[0]) == pytest.approx(frequency, rel=1e-3)
+
+
+def test_a_drive_of_two_frequencies_is_given_no_scheme() -> None:
+    scene = driven(damped=False)
+    both: Any = Drive(i=ONE, amplitude=np.array([0.3]), frequency=np.array([7.1]), phase=np.array([0.2]))
+    why = said(replace(scene, terms=(*scene.terms, both)), "own:velocity-verlet", mass=3.7, stiffness=2.9)
+    assert " by " not in why.partition("each frame")[2]
