@@ -18,10 +18,10 @@ BUDGETS = {
     ("engines",): 2398,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 3954,
-    ("identify",): 7534,
+    ("identify",): 7536,
     ("formats", "store"): 4937,
     ("studies",): 1583,
-    ("studies/*",): 9877,
+    ("studies/*",): 9890,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5465,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

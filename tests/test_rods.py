@@ -26,6 +26,7 @@ from springcheck.physics.terms import Rod, WallRod
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.steppers import record
+from springcheck.studies.precision import accuracy, sweeps
 
 Need = Callable[[str], None]
 OWN = ("own:velocity-verlet", "own:semi-implicit-euler", "own:position-verlet", "own:forest-ruth")
@@ -247,3 +248,22 @@ def test_a_run_says_that_it_exercises_constraints(tmp_path: Path, capsys: pytest
 def test_a_damped_rod_is_refused_by_what_has_none(need: Need) -> None:
     with pytest.raises(MethodError, match="no rod term"):
         driver.run(dumbbell(), "own:rk4")
+
+
+def test_studies_of_springs_refuse_rods_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "a.h5")
+    assert main(["run", "dumbbell", "--method", "own:velocity-verlet", "--steps", "50", "-o", path]) == 0
+    capsys.readouterr()
+    assert main(["stability", "dumbbell", "-o", str(tmp_path / "b.h5")]) == 2
+    assert "a step below h w = 1, here h < 0.666667, and none beyond" in capsys.readouterr().err
+    assert main(["identify", path]) == 2
+    said = capsys.readouterr().err
+    assert "its scene has rods, and schemes are told by springs; judge it instead" in said
+    assert said.count("\n") == 1
+
+
+def test_a_study_of_precision_begins_where_a_rod_still_has_a_step() -> None:
+    label = engines.parse("own:velocity-verlet")
+    sweep = sweeps.begin(dumbbell(), label, accuracy.truth(dumbbell()))
+    assert sweep.scene is not None
+    assert sweep.scene.step == pytest.approx(0.9 / 1.5, rel=0.02)

@@ -106,7 +106,9 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
 
 
 def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[FileStates]:
-    m = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)").m
+    scene = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)")
+    if scene.system.rods:
+        raise StoreError(f"{path}: its scene has rods, and schemes are told by springs; judge it instead")
     for run in runs:
         if wanted in (None, run.label):
             piece = next(store.windows(path, run.label, MOST_FRAMES))
@@ -115,7 +117,7 @@ def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator
             chosen, remarks = _chosen(piece.q, piece.p, notes)
             yield FileStates(
                 label=run.label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None,
-                mass=m[chosen], notes=remarks, adaptive=_adaptive(run),
+                mass=scene.m[chosen], notes=remarks, adaptive=_adaptive(run),
             )  # fmt: skip
 
 

@@ -96,6 +96,8 @@ def _frequency(scene: Scene) -> float:
     """The largest w along the motion: from the modes, or from the stiffness on the true path."""
     if scene.system.has_modes:
         return float(np.sqrt(np.maximum(np.max(scene.system.modes.w2), 0)))
+    if scene.system.rods:
+        return float(np.max(scene.system.rods.rates(scene.q, scene.p)))
     samples = 256
     q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
     root = np.sqrt(scene.m)

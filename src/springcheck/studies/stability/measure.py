@@ -13,9 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
+import numpy as np
+
 from springcheck import engines
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
@@ -36,8 +38,14 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
-        SceneError: forces of the scene overflow at its start.
+        SceneError: forces of the scene overflow at its start, or it has rods.
     """
+    if rods := scene.system.rods:
+        rate = float(np.max(rods.rates(scene.q, scene.p)))
+        raise SceneError(
+            f"scene {scene.name} has rods, and stability is a study of springs: a rod that turns freely has "
+            f"a step below h w = 1, here h < {1 / rate if rate else np.inf:.6g}, and none beyond"
+        )
     fastest(scene)
     chosen = engines.match(tuple(methods) or ("*",))
 

@@ -1,0 +1,141 @@
+"""Rods of engines beside their law: SHAKE and RATTLE turn a free rod by asin(h w) a step.
+
+Claim: where an engine solves for its rods to rounding, each step is that of the closed form to 1e-13 of the
+rod; where it ends at a tolerance, length, turn and steps are off by what its last iteration leaves, up to
+2,000 times less than the tolerance, and momentum and angular momentum are kept to rounding all the same, for
+pushes along a rod cancel and turn nothing.
+
+Command: python validation/constraints.py            (springcheck with OpenMM and ASE; 20 s)
+         python validation/constraints.py --write    (keeps the table in data/reference/constraints.csv)
+
+The scene is `dumbbell` at the origin, 400 steps at each h w.  Columns: engine with its version and method,
+tolerance of lengths, h w; then the largest over all steps of: the length's error, relative; the turn a step
+over asin(h w), less 1; the distance of a step from the closed form, of positions over the length or momenta
+over those of the rod; the change of momentum and of angular momentum, relative to those of the rod.
+
+Expected (springcheck 0.1.0, OpenMM 8.6.1, ASE 3.29.0): data/reference/constraints.csv.  At tolerances from
+1e-12 down lengths to 9e-16, steps to 2.6e-14 at h w = 0.01 and 2e-15 from 0.15 on (a velocity that is x' - x
+over h rounds by 1/(h w)), turns to 7e-14.  OpenMM at its own tolerance, 1e-5, is off by 5e-9 to 6e-6 in
+length and by 1e-8 to 2e-5 in the turn.  The momenta of OpenMM and ASE walk by 5e-13 at most.
+
+Exit status 0 while the claim holds, 1 otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springcheck import checks, driver, engines
+from springcheck.engines.openmm import rounding
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+
+TABLE = Path(__file__).parents[1] / "data" / "reference" / "constraints.csv"
+TURNS = (0.01, 0.15, 0.6, 0.95)
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
+COLUMNS = (
+    "engine", "version", "method", "tolerance", "h w", "length", "turn", "step", "momentum",
+    "angular momentum", "verdicts",
+)  # fmt: skip
+ROUNDED = 1e-13
+
+
+def dumbbell(turn: float) -> Scene:
+    """The shipped dumbbell about the origin, without its drift, at this h w."""
+    scene = scenefile.load_scene("dumbbell")
+    centre, drift = (np.array([np.sum(x[j::2]) for j in (0, 1)]) / 5.0 for x in (scene.m * scene.q, scene.p))
+    q, p = scene.q - np.tile(centre, 2), scene.p - scene.m * np.tile(drift, 2)
+    rods = scene.system.rods
+    assert rods is not None
+    return replace(scene, q=q, p=np.asarray(rods.projected(q, p), np.float64), step=turn / 1.5)
+
+
+def measured(label: str, turn: float, tolerance: float) -> dict[str, Any]:
+    """One row of the table."""
+    scene = dumbbell(turn)
+    rods = scene.system.rods
+    assert rods is not None
+    run = driver.run(scene, label)
+    case = checks.Case(trajectory=run, scene=scene)
+    q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
+    r = rods.ways(q)
+    angle = np.unwrap(np.arctan2(r[:, 1], r[:, 0]).astype(np.float64))
+    sine = r[:-1, 0] * r[1:, 1] - r[:-1, 1] * r[1:, 0]
+    each = np.arctan2(sine, rods.dot(r[:-1], r[1:])[:, 0])
+    law = np.arcsin(np.longdouble(scene.step) * rods.rates(q[0], p[0])[0])
+    near_q, near_p = case.next_states
+    size = 0.6 / float(rods.inverse_mass[0]) * float(rods.rates(q[0], p[0])[0])
+    step = max(np.max(np.abs(near_q - q[1:])) / 0.6, np.max(np.abs(near_p - p[1:])) / size)
+    area = [q[:, i] * p[:, i + 1] - q[:, i + 1] * p[:, i] for i in (0, 2)]
+    momentum = np.max(np.abs(p[:, :2] + p[:, 2:] - (p[0, :2] + p[0, 2:]))) / size
+    angular = np.max(np.abs(sum(area) - sum(area)[0])) / np.abs(sum(area)[0])  # type: ignore[index]
+    verdicts = checks.judge(scene, run)
+    assert np.all(np.diff(angle) > 0)
+    failed = [v.check for v in verdicts if v.passed is False]
+    found = engines.load(run.label.partition(":")[0]).version()
+    name, method = run.label.split(":")
+    return dict(
+        zip(
+            COLUMNS,
+            (
+                name, next(iter(found.values())), method, f"{tolerance:.0e}" if tolerance else "rounding",
+                f"{turn:g}", *(f"{float(x):.1e}" for x in (
+                    np.max(np.abs(rods.strain(q))), np.max(np.abs(each / law - 1)), step, momentum, angular)),
+                "passed" if not failed else " ".join(failed),
+            ),
+            strict=True,
+        )
+    )  # fmt: skip
+
+
+def rows() -> list[dict[str, Any]]:
+    """The whole table."""
+    found = []
+    for turn in TURNS:
+        found += [measured(f"own:{name}", turn, 0.0) for name in ("velocity-verlet", "semi-implicit-euler")]
+        found.append(measured("ase:rattle", turn, 1e-13))
+        for tolerance in TOLERANCES:
+            rounding.LENGTHS["verlet-rods"] = tolerance
+            found.append(measured("openmm:verlet-rods", turn, tolerance))
+    return found
+
+
+def holds(row: dict[str, Any]) -> bool:
+    """Whether a row is as claimed: near h w = 1 a rounding grows by 1/(1 - (h w)**2), and that of a velocity
+    x' - x over h is 1/(h w) of it, 400 times."""
+    tolerance = 0.0 if row["tolerance"] == "rounding" else float(row["tolerance"])
+    length, turn, step, momentum, angular = (float(row[name]) for name in COLUMNS[5:10])
+    turned = float(row["h w"])
+    walked = 400 * 2.0**-52 / turned
+    if tolerance <= ROUNDED:
+        right = length < ROUNDED and step < ROUNDED and turn < ROUNDED / (1 - turned**2)
+    else:
+        right = length <= tolerance
+    return right and momentum < walked and angular < walked and row["verdicts"] == "passed"
+
+
+def main() -> int:
+    """Print the table; returns the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="keep the table in data/reference")
+    options = parser.parse_args()
+    table = rows()
+    for one in table:
+        print("  ".join(f"{one[name]:>12}" for name in COLUMNS), "" if holds(one) else "  not as claimed")
+    if options.write:
+        with TABLE.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(table)
+    return 0 if all(map(holds, table)) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
