@@ -265,6 +265,15 @@ def test_nothing_is_made_where_nothing_is_asked_for() -> None:
     assert not ci.asked(Namespace())
 
 
+def test_the_schema_of_scene_files_is_what_reads_them() -> None:
+    kept = schemas.FOLDER / "scene-1.json"
+    assert kept.read_text() == schemas.of_scenes(), "python validation/schemas.py write"
+    known = json.loads(kept.read_text())["$defs"]
+    assert known["SpringTable"]["required"] == ["ends", "stiffness"]
+    assert "[M/T2]" in known["SpringTable"]["description"]
+    assert known["SpringTable"]["additionalProperties"] is False
+
+
 @pytest.mark.parametrize("command", ["judge", "identify"])
 def test_a_document_keeps_to_its_schema_and_one_that_does_not_is_seen(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -4,6 +4,8 @@ A document names its schema and version first.  Here each command is run in seve
 is put together: the types that were met, and the names that were always there.  A name that goes, or another
 type, needs another version (`springcheck.cli.output.SCHEMA`); a name more does not.
 
+`scene-1.json` is that of scene files, made of the structs that read them.
+
 Run:   python validation/schemas.py            (50 s: 0 documents of 14 are off)
        python validation/schemas.py write      (writes data/schemas anew)
 """
@@ -16,9 +18,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from arguments import arguments
 from springcheck.cli import main as springcheck
 from springcheck.cli.output import SCHEMA
+from springcheck.physics.scenefile import tables
 
 FOLDER = Path(__file__).parents[1] / "data" / "schemas"
 
@@ -118,10 +123,20 @@ def schema_of(command: str, documents: list[Any]) -> dict[str, Any]:
     }
 
 
+def of_scenes() -> str:
+    """The schema of scene files."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "a scene of springcheck"}
+    return json.dumps(head | msgspec.json.schema(tables.scene_table()), indent=1) + "\n"
+
+
 def main() -> int:
     """Compare, or write; the exit status says whether every document keeps to its schema."""
     given = arguments(__doc__, what="compare")
-    wrong = 0
+    wrong, scenes = 0, FOLDER / "scene-1.json"
+    if given.what == "write":
+        scenes.write_text(of_scenes())
+    wrong += scenes.read_text() != of_scenes()
+    print(f"scene files: {'another schema than data/schemas' if wrong else 'as their schema says'}")
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("table.csv").write_text(table())
         for command, ways in WAYS.items():

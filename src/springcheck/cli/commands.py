@@ -267,6 +267,28 @@ def _list(options: Namespace) -> int:
     return 0
 
 
+def _doctor(options: Namespace) -> int:
+    from springcheck.cli import doctor
+
+    with output.alone():
+        found = doctor.found()
+    if options.json:
+        output.document(options.name, found)
+    else:
+        for line in doctor.lines(found):
+            print(output.folded(plain(line)))
+    return 0 if any(one["problem"] is None for one in found["engines"]) else 2
+
+
+def _completion(options: Namespace) -> int:
+    from springcheck.cli import completing
+    from springcheck.studies import STUDIES
+
+    known = {one.name: one.arguments for one in STUDIES} | {one.name: one.arguments for one in COMMANDS}
+    print(completing.script(options.shell, known))
+    return 0
+
+
 FORMATS = (
     "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
     ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, text tables; texts also gzipped"
@@ -341,5 +363,9 @@ COMMANDS = (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
     Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
+    Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
+    Command("completion", "a script that completes commands in your shell", _completion, (
+        argument("shell", choices=("bash", "zsh"), help="put its lines where your shell begins"),
+    )),
 )  # fmt: skip
 """Every command that is no study, in the order in which `--help` names them."""

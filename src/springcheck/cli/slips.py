@@ -40,7 +40,8 @@ class Parser(argparse.ArgumentParser):
         wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong:
             known = [word.strip(" '") for word in wrong[2].split(",")]
-            message = f"{wrong[1]!r} is no command{nearest(wrong[1], known)}; there are {', '.join(known)}"
+            kind = "command" if "run" in known or len(known) == 1 else "choice"
+            message = f"{wrong[1]!r} is no {kind}{nearest(wrong[1], known)}; there are {', '.join(known)}"
         sys.stderr.write(f"springcheck: {plain(message, LONGEST_MESSAGE)}\n")
         raise SystemExit(2)
 
