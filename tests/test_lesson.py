@@ -81,6 +81,74 @@ def test_the_grader_counts(
     assert "2 of 2" in capsys.readouterr().out
 
 
+def graded(folder: Path, text: str, capsys: pytest.CaptureFixture[str], *options: str) -> tuple[int, str]:
+    """Exit status and words of the grader for a file."""
+    (folder / "mine.py").write_text(text)
+    status = _module("grade").main([str(folder / "mine.py"), *options])
+    return status, capsys.readouterr().out
+
+
+VERLET = """
+AIMS = {"two": "velocity-verlet"}
+
+def two(q, p, h, force, mass):
+    print("noise")
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return %s
+"""
+
+
+@pytest.mark.parametrize(
+    ("returned", "said"),
+    [
+        ("(p + h / 2 * force(q), q)", "(q, p) look exchanged"),
+        ("q, (p + h / 2 * force(q)) / mass", "momentum or velocity?"),
+        ("q, p + h / 3 * force(q)", "hold it beside"),
+    ],
+)
+def test_a_hint_names_the_slip_and_only_where_it_is_asked_for(
+    returned: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out = graded(tmp_path, VERLET % returned, capsys)
+    assert status == 1
+    assert said not in out
+    assert "noise" not in out
+    assert out.splitlines()[0] == "two    not yet"
+    status, out = graded(tmp_path, VERLET % returned, capsys, "--hint")
+    assert said in out
+    assert "answer" not in out
+    status, out = graded(tmp_path, VERLET % returned, capsys, "--answer")
+    assert "answer: The second half kick took the force of the first" in out
+    assert graded(tmp_path, VERLET % "q, p + h / 2 * force(q)", capsys)[0] == 0
+
+
+def test_an_implicit_step_is_told_to_iterate_further(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (LESSON / "exercises.py").read_text()
+    out = graded(tmp_path, text, capsys, "--hint")[1].splitlines()
+    third = next(i for i, line in enumerate(out) if line.startswith("three"))
+    assert "iterate further" in out[third + 1]
+
+
+def test_what_never_ends_or_cannot_be_read_is_answered_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for text, said in (("def two(:\n", "SyntaxError"), ("import nothing_there\n", "nothing_there")):
+        status, out = graded(tmp_path, text, capsys)
+        assert (status, out.count("\n")) == (2, 1)
+        assert said in out
+    assert _module("grade").main([str(tmp_path / "no.py")]) == 2
+    assert "no such file" in capsys.readouterr().out
+    endless = VERLET.replace('print("noise")', "while True: pass") % "q, p"
+    grade = _module("grade")
+    monkeypatch.setattr(grade, "SECONDS", 0.2)
+    (tmp_path / "mine.py").write_text(endless)
+    assert grade.main([str(tmp_path / "mine.py")]) == 1
+    assert "does a loop in it never end?" in capsys.readouterr().out
+
+
 def test_how_to_cite_names_this_version() -> None:
     text = (LESSON.parents[1] / "CITATION.cff").read_text()
     assert re.search(r"^version: (.*)$", text, re.M)[1] == version("springcheck")  # type: ignore[index]

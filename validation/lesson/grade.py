@@ -1,44 +1,166 @@
-"""Grade steppers: python grade.py exercises.py; exit status 0 where all are what they are meant to be.
+"""Grade steppers: python grade.py exercises.py; exit status 0 where all are right, 1 not yet, 2 unreadable.
 
-Each function of `AIMS` is given to `springcheck identify --stepper FILE:NAME --json`, whose document says
-which scheme its states show, whether all of them fit it to rounding, and otherwise what may be wrong.
+    python grade.py FILE.py            right, or not yet
+    python grade.py FILE.py --hint     and what the states show, and where to look
+    python grade.py FILE.py --answer   and what was wrong, where solutions.py lies beside this file
+
+`springcheck identify` says which scheme the states of each function show, and whether all of them fit it to
+rounding.  What a function prints is kept back; one that takes longer than five seconds is stopped.
 """
 
-import json
-import os
+import signal
 import sys
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
-from springcheck.cli import main as springcheck
-from springcheck.doors.function import load
+from springcheck import schemes
+from springcheck.engines import module_of
+from springcheck.errors import SpringcheckError
+from springcheck.identify import identify_stepper
+
+AIMS = {
+    "one": "semi-implicit-euler",
+    "two": "velocity-verlet",
+    "three": "implicit-euler",
+    "four": "semi-implicit-euler-drift-kick",
+    "five": "velocity-verlet",
+    "six": "rk4",
+}
+"""What each is meant to be, whatever the file says; of other exercises the file's own `AIMS` does."""
+
+SECONDS = 5.0
+
+Step = Callable[..., Any]
 
 
-def document(module: str, name: str) -> dict[str, object]:
-    """What `springcheck identify` says of one function."""
-    out = StringIO()
-    with redirect_stdout(out):
-        status = springcheck(["identify", "--stepper", f"{module}:{name}", "--json"])
-    if status not in (0, 1):
-        return {"fits": False, "statement": "it is no stepper, see above"}
-    found: dict[str, object] = json.loads(out.getvalue())
-    return found
+class TooLongError(BaseException):
+    """Passes by whoever catches the mistakes of a function."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Stop what takes longer, where the system has timers."""
+
+    def stop(*_: object) -> None:
+        raise TooLongError
+
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def shows(step: Step, aim: str) -> tuple[bool, str]:
+    """Whether the states of a function are those of a scheme, and what they show."""
+    try:
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), limited(SECONDS):
+            found = identify_stepper(step)
+    except TooLongError:
+        return False, f"stopped after {SECONDS:g} s: does a loop in it never end?"
+    except SpringcheckError as error:
+        return False, f"it is no stepper: {error}"
+    return bool(found.fits) and aim in (found.scheme, *found.aliases), found.statement
+
+
+def _exchanged(step: Step) -> Step:
+    return lambda q, p, h, force, mass: tuple(step(q, p, h, force, mass))[::-1]
+
+
+def _velocity_out(step: Step) -> Step:
+    def other(q: Any, p: Any, h: Any, force: Any, mass: Any) -> Any:
+        q, v = step(q, p, h, force, mass)
+        return q, v * mass
+
+    return other
+
+
+def _velocity(step: Step) -> Step:
+    def other(q: Any, p: Any, h: Any, force: Any, mass: Any) -> Any:
+        q, v = step(q, p / mass, h, force, mass)
+        return q, v * mass
+
+    return other
+
+
+SLIPS: dict[str, Callable[[Step], Step]] = {
+    "(q, p) look exchanged: a step returns the position first": _exchanged,
+    "momentum or velocity? It returns v, and p = m v is asked for": _velocity_out,
+    "momentum or velocity? It takes p for v: what it is given is the momentum p = m v": _velocity,
+}
+"""What the function does after all, once this is undone."""
+
+
+def hint(step: Step, aim: str) -> str:
+    """Where to look."""
+    for said, undone in SLIPS.items():
+        if shows(undone(step), aim)[0]:
+            return said
+    scheme = schemes.scheme(aim)
+    if scheme.has("implicit"):
+        return "iterate further: the equation of the step is solved when another round changes nothing"
+    stages = " then ".join(
+        f"{kind.name} {c}" for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True)
+    )
+    return f"hold it beside {scheme.title}{f': {stages}' if stages else ''}; try a mass that is not 1"
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line for each stepper."""
-    path = Path(arguments[0] if arguments else "exercises.py").resolve()
-    os.chdir(path.parent)
-    aims = load(f"{path.stem}:AIMS.copy")()
+    """Print a line for each stepper, and what is asked for below it."""
+    files = [one for one in arguments if not one.startswith("--")]
+    wanted = set(arguments) - set(files)
+    if wanted - {"--hint", "--answer"} or len(files) > 1:
+        print("usage: python grade.py FILE.py [--hint] [--answer]")
+        return 2
+    path = Path(files[0] if files else "exercises.py").resolve()
+    sys.path.insert(0, str(path.parent))
+    try:
+        with redirect_stdout(StringIO()), limited(SECONDS):
+            module = module_of(path)
+    except SpringcheckError as error:
+        print(error)
+        return 2
+    except TooLongError:
+        print(f"{path.name}: stopped after {SECONDS:g} s, before a function was called")
+        return 2
+    finally:
+        sys.path.remove(str(path.parent))
+    named = dict(getattr(module, "AIMS", AIMS))
+    aims: dict[str, str] = {name: AIMS.get(name) or str(aim) for name, aim in named.items()}
     mended = 0
     for name, aim in aims.items():
-        found = document(path.stem, name)
-        right = bool(found["fits"]) and found.get("scheme") == aim
+        step = getattr(module, name, None)
+        right, said = shows(step, aim) if callable(step) else (False, f"{path.name} has no function {name}")
         mended += right
-        print(f"{name:6} {'right' if right else 'not yet'}: {found['statement']}")
-    print(f"{mended} of {len(aims)}")
+        told = right or said.startswith(("it is no", "stopped", path.name)) or wanted
+        print(f"{name:6} {'right' if right else 'not yet'}{f': {said}' if told else ''}")
+        if not right and wanted and callable(step):
+            print(f"       look: {hint(step, aim)}")
+        if not right and "--answer" in wanted:
+            print(f"       answer: {answer(name)}")
+    print(f"{mended} of {len(aims)}{'' if mended == len(aims) or wanted else '; --hint says where to look'}")
     return 0 if mended == len(aims) else 1
+
+
+def answer(name: str) -> str:
+    """What was wrong, as the solutions say it."""
+    place = Path(__file__).with_name("solutions.py")
+    if not place.is_file():
+        return "your teacher has it"
+    sys.path.insert(0, str(place.parent))
+    try:
+        found = getattr(module_of(place), name, None)
+    finally:
+        sys.path.remove(str(place.parent))
+    return " ".join((found.__doc__ or "").split()) if found else "none is known"
 
 
 if __name__ == "__main__":
