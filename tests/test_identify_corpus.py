@@ -52,7 +52,16 @@ def test_every_case_states_how_its_truth_is_known_and_what_it_wants() -> None:
         assert set(case.true) <= set(corpus.CLAIMS)
         assert len(case.t) == len(case.q)
         assert (case.v is None) or (case.p is None)
-    assert sum(file.stat().st_size for file in corpus.FOLDER.iterdir()) < 1.7e6
+    assert sum(file.stat().st_size for file in corpus.FOLDER.iterdir()) < 1.9e6
+
+
+def test_the_corpus_has_trajectories_of_thirty_programs_of_other_people() -> None:
+    """What `validation/programs` made."""
+    names = [case.name for case in corpus.load() if case.group == "programs"]
+    assert len({name.split(",")[0].split(":")[0].split(" ")[0].lower() for name in names}) >= 30
+    today = [case.today for case in corpus.load() if case.group == "programs"]
+    assert set(today) <= {"right", "short"}
+    assert today.count("short") <= 23
 
 
 def test_the_judge_tells_what_is_false() -> None:

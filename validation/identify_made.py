@@ -4,7 +4,7 @@
 
 Written once and kept as data; it is here to show how the truth of each case is known.  Cases that are there
 already keep what was said of them when they were frozen; those of the groups "census" and "drawn", which a
-generator drew whose draws change with the catalogue, are kept as they are.
+generator drew whose draws change with the catalogue, and of "programs" are kept as they are.
 """
 
 # mypy: disable-error-code="assignment,arg-type,call-arg,attr-defined,list-item,misc"
@@ -461,7 +461,7 @@ def main() -> None:
         group()
     names = {x["name"] for x in ROWS}
     assert len(names) == len(ROWS)
-    kept = [x for x in known.values() if x["group"] in ("census", "drawn")]
+    kept = [x for x in known.values() if x["group"] in ("census", "drawn", "programs")]
     # drawn by the generator of another day: kept as they are
     with np.load(folder / "states.npz") as file:
         states = {name: file[name] for name in file.files}

@@ -26,6 +26,9 @@ from springcheck.schemes import rotation
 FEWEST_MISSES = 24.0
 """Pairs that count in what is left over from which its pattern shows."""
 
+FIXED = 2.0**-46
+"""What a map leaves over, of a state's size, that is still rounding: 64 units in the last place."""
+
 DRIFTING = 64.0
 """Roundings that may be left over where a constant that is added to the position is the cause."""
 
@@ -78,7 +81,7 @@ def _solver(e: Evidence) -> list[Explanation]:
             return []
         # the error of a solver scatters: one that is the same in every frame may be that of fixed steps
         least = min((d for _, d in alike), default=math.inf)
-        if distances[near] > 30 * residual and least < 0.1 * distances[near]:
+        if distances[near] > 30 * residual and (least < 0.1 * distances[near] or residual < FIXED):
             return []
         size = max(residual, distances[near])
     return [
@@ -98,13 +101,13 @@ def _drift(e: Evidence) -> list[Explanation]:
         return []
     fitting = matched(e.found, e.terms)
     whose = title(fitting[0].scheme) if fitting else "The scheme"
-    return [
-        Explanation(
-            cause=f"{whose} with a constant added to the position in every frame: {back[0]:.6g}",
-            remedy="look for a drift that is not the velocity's, such as a removed centre-of-mass motion",
-            misfit=float(np.max(e.found.residual)),
-        )
-    ]
+    size = np.abs(back) / e.found.size.astype(np.float64)
+    what, much = ("position", back[0]) if size[0] >= size[1] else ("velocity", back[1] / e.record.interval)
+    cause = f"{whose} with a constant added to the {what} in every frame: {float(much):.6g}"
+    remedy = "look for a drift that is not the velocity's, such as a removed centre-of-mass motion"
+    if what == "velocity":
+        remedy = "look for a constant force, or a Jacobian by differences, which rounds to one side"
+    return [Explanation(cause=cause, remedy=remedy, misfit=float(np.max(e.found.residual)))]
 
 
 # forces that are not linear, or not constant ------------------------------------------------------------
@@ -333,7 +336,8 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
         return Explanation(
             cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about {counted:.0f} "
             "frames: too few to show its cause",
-            remedy="record more of the motion before it dies down, or after it has begun to grow",
+            remedy="record more of the motion, before it dies down or after it has begun to grow; a solver "
+            "that chooses its steps has no fixed scheme to find",
             misfit=size,
         )
     rows = e.found.residual
@@ -343,7 +347,8 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
-            remedy="look for several errors at once, and take them out one by one",
+            remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
+            "steps has no fixed scheme to find",
             misfit=size,
         )
     return Explanation(

@@ -183,8 +183,9 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
             power = b @ power
         if first == 0:
             return (
-                f"The motion is one{whose}, but frame 0 does not belong to it: a wrong start, or a scheme "
-                "with memory, whose force or velocity is that of the step before",
+                f"The motion is one{whose}, but frame 0 does not belong to it: a wrong start, a scheme with "
+                "memory, whose force or velocity is that of the step before, or a solver that begins with "
+                "steps of its own",
                 "look at how the start is set and recorded, or leave frame 0 out",
             )
         off = (to - b @ from_).astype(np.float64)
@@ -213,9 +214,11 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         return f"The motion is one{whose}, but frames {first + 1} and {first + 2} have changed places", (
             "sort the frames by time"
         )
+    begins = ": a solver of several orders or steps begins so" if first == 0 else ""
+    part = "after" if first == 0 else "before"
     return (
-        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}",
-        "look at what happens there, or give the part before it",
+        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}{begins}",
+        f"look at what happens there, or give the part {part} it",
     )
 
 

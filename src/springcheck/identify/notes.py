@@ -84,10 +84,11 @@ def of_few(record: Record, found: Identification) -> Identification:
     )  # fmt: skip
 
 
-def beside_unknown(found: Identification) -> Identification:
+def beside_unknown(found: Identification, *, deep: bool = False) -> Identification:
     """What was found in coarse numbers at a number of steps that nobody stated: what lies between two schemes
-    fits as well, and above `CERTAIN_STEPS` names none."""
-    if not found.fits or found.stride == 1 or found.scheme == "exact":
+    fits as well, and above `CERTAIN_STEPS` names none.  In `deep` ones a list of many steps says so."""
+    few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
+    if not found.fits or found.stride == 1 or found.scheme == "exact" or (deep and few):
         return found
     statement = f"{found.statement}; or a scheme that is not known here"
     out = replace(found, statement=statement, notes=(*found.notes, "what would tell: the step, stated"))

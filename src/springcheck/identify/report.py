@@ -170,7 +170,7 @@ def _of_record(
         precisions = {x: ds[0].precision for x, ds in explained.items()}
         joints = of_stated_stiffness(record, moving, precisions, stated)
     if stride is not None and stride > 0:
-        # a step that divides the interval leaves the flow, which has none, and schemes of that stride
+        # a step that divides the interval leaves the flow and schemes of that stride
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
         joints, stated_fits = agreeing or joints, bool(agreeing)
     else:
@@ -185,7 +185,7 @@ def _of_record(
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    found = beside_unknown(found) if stride is None and not record.deep else found
+    found = beside_unknown(found, deep=record.deep) if stride is None else found
     if stated is None:
         return of_rotation(record, moving, found)
     found = of_unasked_friction(found) if friction is None else found
