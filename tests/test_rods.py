@@ -22,7 +22,7 @@ from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact, scenefile
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Rod, WallRod
+from springcheck.physics.terms import Cosine, Rod, WallRod
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.steppers import record
@@ -69,6 +69,39 @@ def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) ->
     thorough = checks.judge_thoroughly(scene, label, driver.run, experiments)
     assert [v for v in thorough if v.passed is False] == []
     assert {v.check for v in thorough if v.passed} >= {"mirror", "repeatability"}
+
+
+@pytest.mark.parametrize("label", RIGHT)
+def test_right_engines_pass_every_check_of_a_rigid_pendulum(label: str, need: Need) -> None:
+    need(label)
+    scene = scenefile.load_scene("rigid-pendulum")
+    run = driver.run(scene, label)
+    verdicts = checks.judge(scene, run)
+    assert [v for v in verdicts if v.passed is False] == []
+    assert {"step-defect", "rod-length", "rod-velocity"} <= {v.check for v in verdicts if v.passed}
+    assert next(v.passed for v in verdicts if v.check == "turn") is None
+    energy = scene.system.energy(run.q, run.p)
+    # h w = 0.1 is the error of a scheme of first order
+    assert np.max(np.abs(energy - energy[0])) < 0.1 * np.ptp(scene.system.kinetic_energy(run.p))
+
+
+@pytest.mark.parametrize(("low", "speed"), [(0.05, 0.1), (-0.6, 0.8), (0.3, 30.0), (-0.65, 5.0)])
+def test_the_exact_motion_of_a_rigid_pendulum_is_that_of_the_angle(low: float, speed: float) -> None:
+    """Small swings, wide ones, over the top, and from the very top."""
+    side = float(np.sqrt(0.65**2 - low**2))
+    p = 1.7 * speed * np.array([-low, side]) / 0.65
+    pendulum = scenefile.load_scene("rigid-pendulum")
+    rigid = pendulum.derived(q=np.array([0.2 + side, 0.1 + low]), p=p)
+    angle = np.arctan2(side, -low)
+    alone = Scene(
+        m=[1.7 * 0.65**2], q=[angle], p=[1.7 * 0.65 * speed], step=0.03, steps=400, kind="rotor",
+        terms=(Cosine(i=[0], depth=[12.6 * 0.65], wave=[1.0], at=[0.0]),),
+    )  # type: ignore[arg-type]  # fmt: skip
+    steps = np.arange(0, 100, 7)
+    (q, _), (turned, _) = (exact.true_motion(x, steps, 0.03) for x in (rigid, alone))
+    x, y = 0.2 + 0.65 * np.sin(turned[:, 0]), 0.1 - 0.65 * np.cos(turned[:, 0])
+    # from the top a rounding of the start grows by exp(w t): those of the angle are 1e-16 of it
+    assert np.max(np.abs(q - np.stack([x, y], axis=1))) < 1e-12
 
 
 @pytest.mark.parametrize("label", OWN)

@@ -201,7 +201,10 @@ def test_a_class_that_is_no_term_is_refused() -> None:
 LAW = ("potential", "slope", "second", "rounding")
 
 
-@pytest.mark.parametrize("term", [term for term in known().values() if term.kind == "potential"])
+# a weight pulls everywhere, and so rests nowhere
+@pytest.mark.parametrize(
+    "term", [term for term in known().values() if term.kind == "potential" and term.key != "weight"]
+)
 def test_the_law_of_every_term_is_consistent(term: type[Term]) -> None:
     termcheck.check(term)
 

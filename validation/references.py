@@ -56,9 +56,13 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
         for axis in row.get("axis", "xyz"[: len(rows[particle]["position"])]):
             ends = [end if end == "wall" else number[end, axis] for end in row["ends"]]
             springs.append({**row, "ends": ends})
-    rods = [[[number[i, axis] for i in row["ends"]] for axis in "xyz"[: len(rows[0]["position"])]]
-            for row in table.get("rod", ())]  # fmt: skip
-    return {**table, "particle": apart, "spring": springs, "rod": rods}
+    axes = "xyz"[: len(rows[0]["position"])]
+    rods = [
+        [([number[i, axis] for i in row["ends"] if i != "wall"], row.get("wall", [0.0] * 3)[j])
+         for j, axis in enumerate(axes)] for row in table.get("rod", ())
+    ]  # fmt: skip
+    weights = [(number[row["particle"], row["axis"]], row["force"]) for row in table.get("weight", ())]
+    return {**table, "particle": apart, "spring": springs, "rod": rods, "weight": weights}
 
 
 class System:
@@ -74,18 +78,20 @@ class System:
         }[next(name for name in ("particle", "rotor", "inductor") if name in table)]
         self.m, self.q, self.p = ([mp.mpf(row.get(name, 0)) for row in rows] for name in names)
         self.table = table
+        self.weights = [mp.mpf(0)] * len(self.m)
+        for i, force in table.get("weight", ()):
+            self.weights[i] += mp.mpf(force)
         for axes in table.get("rod", ()):
             self.take_off(axes)
 
-    def take_off(self, axes: list[list[int]]) -> None:
+    def take_off(self, axes: list[Any]) -> None:
         """Take off the momenta what moves the ends of a rod apart, which doubles leave of them."""
-        r = [self.q[b] - self.q[a] for a, b in axes]
-        v = [self.p[b] / self.m[b] - self.p[a] / self.m[a] for a, b in axes]
+        r = [way(self.q, ends) - (mp.mpf(at) if len(ends) == 1 else 0) for ends, at in axes]
+        v = [way([p / m for p, m in zip(self.p, self.m, strict=True)], ends) for ends, _ in axes]
         along = mp.fsum(x * y for x, y in zip(r, v, strict=True)) / mp.fsum(x * x for x in r)
-        for (a, b), x in zip(axes, r, strict=True):
-            push = along * x / (1 / self.m[a] + 1 / self.m[b])
-            self.p[a] += push
-            self.p[b] -= push
+        for (ends, _), x in zip(axes, r, strict=True):
+            for sign, i in zip((1, -1), ends[::-1], strict=False):
+                self.p[i] -= sign * along * x / mp.fsum(1 / self.m[j] for j in ends)
 
     def springs(self) -> list[tuple[list[tuple[int, int]], Any, Any]]:
         """((particle, sign) of each end, stiffness, rest) with elongation sum of sign * q - rest."""
@@ -118,10 +124,10 @@ class System:
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
         laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
-        laws += [_Rod(axes, self.m) for axes in self.table.get("rod", ())]
+        laws += [_Rod(axes, self.m, self.weights) for axes in self.table.get("rod", ())]
         springs, friction = self.springs(), self.friction()
         for order in range(ORDER):
-            force = [mp.mpf(0)] * n
+            force = [mp.mpf(0)] * n if order else list(self.weights)
             for ends, k, rest in springs:
                 stretch = sum(sign * u[i][order] for i, sign in ends) - (rest if order == 0 else 0)
                 for i, sign in ends:
@@ -208,24 +214,33 @@ class _Driven:
         force[self.i] -= _product(self.k, self.x, order)
 
 
-class _Rod:
-    """Between two particles that nothing else pulls; the multiplier from r r = l**2, differentiated twice."""
+def way(x: list[Any], ends: list[int]) -> Any:
+    """From one end of a rod to the other, or from a fixed point, along an axis."""
+    return x[ends[-1]] - (x[ends[0]] if len(ends) == 2 else 0)
 
-    def __init__(self, axes: list[list[int]], m: list[Any]) -> None:
+
+class _Rod:
+    """Between two particles or from a fixed point, weights on them; the multiplier from r r = l**2,
+    differentiated twice."""
+
+    def __init__(self, axes: list[Any], m: list[Any], weights: list[Any]) -> None:
         self.axes = axes
-        self.mass = 1 / (1 / m[axes[0][0]] + 1 / m[axes[0][1]])
+        self.k: list[Any] = []
+        self.mass = 1 / mp.fsum(1 / m[i] for i in axes[0][0])
+        self.free = [way([f / x for f, x in zip(weights, m, strict=True)], ends) for ends, _ in axes]
 
     def add(self, u: Series, order: int, force: list[Any]) -> None:
-        r = [[u[b][j] - u[a][j] for j in range(order + 2)] for a, b in self.axes]
+        r = [[way([x[j] for x in u], ends) for j in range(order + 2)] for ends, _ in self.axes]
+        for x, (ends, at) in zip(r, self.axes, strict=True):
+            x[0] -= mp.mpf(at) if len(ends) == 1 else 0
         v = [[(j + 1) * x[j + 1] for j in range(order + 1)] for x in r]
         square = mp.fsum(x[0] ** 2 for x in r)
-        if order == 0:
-            self.k: list[Any] = []
-        self.k.append(-mp.fsum(_product(x, x, order) for x in v) / square)
-        for (a, b), x in zip(self.axes, r, strict=True):
+        pulled = mp.fsum(f * x[order] for f, x in zip(self.free, r, strict=True))
+        self.k.append(-(mp.fsum(_product(x, x, order) for x in v) + pulled) / square)
+        for (ends, _), x in zip(self.axes, r, strict=True):
             push = self.mass * _product(self.k, x, order)
-            force[b] += push
-            force[a] -= push
+            for sign, i in zip((1, -1), ends[::-1], strict=False):
+                force[i] += sign * push
 
 
 def moved(system: System, start: Any, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:

@@ -32,7 +32,7 @@ class Need(Enum):
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function, whatever its law."""
 
-EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse"})
+EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse", "weight"})
 """The terms of a method that takes the force as a function: the potentials that are known, and all others."""
 
 EVERY_FORCE = EVERY_POTENTIAL | {"damping"}

@@ -199,6 +199,15 @@ class Rods:
                 return np.full_like(wanted, np.nan)
         return found
 
+    def reach(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The coordinates (n,) that rods join to some of these (n,), they among them."""
+        while True:
+            taken = self._rows("most_stretch", chosen.astype(np.float64))
+            more = chosen | (self.spread(self.each(self.dot(taken, taken)), size=True) > 0)
+            if np.array_equal(more, chosen):
+                return chosen
+            chosen = more
+
     # what they do to a step
 
     def multiplier(self, r: Reals, s: Reals) -> Reals:

@@ -20,7 +20,7 @@ from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "ModulatedSpring", "Morse", "OnPairs", "OnParticles", "Quartic",
-    "Rod", "Spring", "Term", "WallRod", "WallSpring", "known", "register",
+    "Rod", "Spring", "Term", "WallRod", "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -149,6 +149,32 @@ class Cosine(OnParticles):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Weight(OnParticles):
+    """Constant forces on particles i: V = -force (q - at).  force [M L/T2], at [L]: nothing rests in them."""
+
+    key: ClassVar[str] = "weight"
+    formula: ClassVar[str] = "-force (q - at)"
+    columns: ClassVar[tuple[Column, ...]] = (Column("force", "force"), Column("at", "at", 0.0))
+    force: Floats
+
+    @staticmethod
+    def potential(u: Reals, force: Floats) -> Reals:
+        return -force * u
+
+    @staticmethod
+    def slope(u: Reals, force: Floats) -> Reals:
+        return 0 * u - force
+
+    @staticmethod
+    def second(u: Reals, force: Floats) -> Reals:
+        return 0 * u
+
+    @staticmethod
+    def rounding(size: Reals, u: Reals, force: Floats) -> Reals:
+        return 0 * size + np.abs(force)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Morse(OnPairs):
     """Bonds between particles a and b: V = depth (1 - exp(-steepness (q[b] - q[a] - rest)))**2.
 
@@ -239,6 +265,7 @@ _KNOWN: dict[str, type[Term]] = {
         Spring,
         Quartic,
         Cosine,
+        Weight,
         Morse,
         Damping,
         Drive,

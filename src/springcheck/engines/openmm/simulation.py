@@ -44,6 +44,7 @@ CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
     "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
     "quartic": ("0.25*b*(x-at)^4", ("b", "at")),
     "cosine": ("depth*(1-cos(wave*(x-at)))", ("depth", "wave", "at")),
+    "weight": ("-force*(x-at)", ("force", "at")),
     "morse": ("depth*(1-exp(-steepness*(r-rest)))^2", ("depth", "steepness", "rest")),
 }
 """Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or

@@ -12,7 +12,7 @@ from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide
 from springcheck.physics.rods import Rods
-from springcheck.physics.terms import Cosine
+from springcheck.physics.terms import Cosine, Weight
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -170,4 +170,74 @@ def _turning_doubt(scene: Scene, found: _Turning, t: np.longdouble) -> States:
 ROD, WALL_ROD = (
     Well(key=key, terms=frozenset({key}), prepare=_turning, motion=_turned, doubt=_turning_doubt)
     for key in ("rod", "wall-rod")
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Hung:
+    """Rods to fixed points in a plane, a weight on each: unit vectors along it and across (c, 2), swings."""
+
+    rods: Rods
+    start: Extended
+    down: Extended
+    across: Extended
+    swing: _Swing
+
+
+def _hung(scene: Scene) -> _Hung | None:
+    rods, weight = scene.system.rods, np.zeros(scene.n, np.longdouble)
+    for term in scene.terms:
+        if isinstance(term, Weight):
+            np.add.at(weight, term.i, term.force)
+    if rods is None or rods.share or any(len(ends) > 1 for ends in rods.ends) or scene.n != 2 * len(rods):
+        return None
+    q, shape = wide(scene.q), (len(rods), 2)
+    r, v = rods.ways(q).reshape(shape), rods.apart(rods.projected(q, wide(scene.p)) / scene.m).reshape(shape)
+    f = rods.apart(weight).reshape(shape)
+    size, length = np.hypot(*f.T), np.hypot(*r.T)
+    if np.any(size == 0):
+        return None
+    down = f / size[:, None]
+    across = np.stack([-down[:, 1], down[:, 0]], axis=1)
+    low, side, slow, fast = (np.sum(x * y, axis=1) for x in (r, v) for y in (down, across))
+    mass = 1 / wide(rods.inverse_mass)
+    w = np.sqrt(size / (mass * length))
+    half, rate = np.arctan2(side, low) / 2, (low * fast - side * slow) / (length**2 * 2 * w)
+    sine, cosine = np.sin(half), np.cos(half)
+    swing = _Swing(
+        length=wide(length), mass=wide(mass), w=wide(w), half=wide(half), sine=wide(sine),
+        cosine=wide(cosine), rate=wide(rate), m=wide(sine * sine + rate * rate),
+        m1=wide((cosine - rate) * (cosine + rate)),
+    )  # fmt: skip
+    return _Hung(rods=rods, start=wide(r.ravel()), down=wide(down), across=wide(across), swing=swing)
+
+
+def _hanging(scene: Scene, found: _Hung, t: Extended) -> States:
+    """The angle from the weight swings as that of any pendulum: w**2 = force / (mass length)."""
+    rods, swing = found.rods, found.swing
+    half, rate = _swung(swing, t)
+    sine, cosine = np.sin(2 * half)[..., None], np.cos(2 * half)[..., None]
+    speed = (swing.length * 2 * swing.w * rate)[..., None]
+    r = swing.length[:, None] * (cosine * found.down + sine * found.across)
+    v = speed * (cosine * found.across - sine * found.down)
+    rows = (*t.shape[:-1], -1)
+    q = scene.q + rods.spread(r.reshape(rows) - found.start)
+    return wide(q), wide(rods.spread((swing.mass[:, None] * v).reshape(rows)))
+
+
+def _hanging_doubt(scene: Scene, found: _Hung, t: np.longdouble) -> States:
+    rods, swing = found.rods, found.swing
+    speed = 2 * swing.length * swing.w * np.sqrt(swing.m)
+    time = np.abs(t) + latency(swing.m1 / np.maximum(swing.m, 1)) / swing.w
+    q = rods.spread(rods.each(swing.length + speed * time))
+    p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
+    return wide(LAST * (np.abs(scene.q) + q)), wide(LAST * p)
+
+
+RIGID = Well(
+    key="weight",
+    terms=frozenset({"weight", "wall-rod"}),
+    prepare=_hung,
+    motion=_hanging,
+    doubt=_hanging_doubt,
 )

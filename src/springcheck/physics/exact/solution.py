@@ -77,17 +77,21 @@ def solution(system: System) -> Solution | None:
                 return Solution(n=system.n, groups=(here,))
         return None
     from springcheck.physics.exact.bond import MORSE
-    from springcheck.physics.exact.pendulum import COSINE, ROD, WALL_ROD
+    from springcheck.physics.exact.pendulum import COSINE, RIGID, ROD, WALL_ROD
     from springcheck.physics.exact.quartic import QUARTIC
 
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
+    acting = system.acting
+    if system.rods:
+        # what acts along one axis of a rod is felt along all of them
+        acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
-        for law in (QUARTIC, COSINE, MORSE, ROD, WALL_ROD, linear.LINEAR):
-            others = (here for key, here in system.acting.items() if key not in law.terms)
+        for law in (QUARTIC, COSINE, MORSE, ROD, WALL_ROD, RIGID, linear.LINEAR):
+            others = (here for key, here in acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
-            mine = left if law is linear.LINEAR else system.acting.get(law.key, nothing) & ~other
+            mine = left if law is linear.LINEAR else acting.get(law.key, nothing) & ~other
             chosen = np.flatnonzero(mine)
             if len(chosen):
                 part = system.part(chosen)
