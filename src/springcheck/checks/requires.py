@@ -78,8 +78,8 @@ _ALL = (
     Requirement("energies", "energies that are asked for", _unless(
         lambda case: case.trajectory.energy is not None, "the scene keeps no energies")),
     Requirement("unheld", "nothing that holds a particle", _unless(
-        lambda x: all(term.bodies > 1 for term in x.scene.terms),
-        "walls and fixed potentials take up momentum")),
+        lambda x: all(term.bodies > 1 and term.kind != "magnetic" for term in x.scene.terms),
+        "walls, fixed potentials and fields take up momentum")),
     Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods")),
     Requirement("turning", "rods on which nothing acts", _unless(
         lambda x: x.scheme.stages and not x.scene.system.rods.share
@@ -104,9 +104,9 @@ _ALL = (
         lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
     Requirement("solution", "an exact solution", _unless(
         lambda x: exact.has_true_motion(x.scene), "the exact solution of this scene has no closed form")),
-    Requirement("autonomous", "forces that do not depend on the time", _unless(
-        lambda x: not x.scene.system.is_driven,
-        "a force depends on the time, and a run that starts later or goes back would meet another one")),
+    Requirement("autonomous", "forces that do not depend on the time, and no magnetic field", _unless(
+        lambda x: not x.scene.system.is_driven and "magnetic" not in x.scene.system.acting,
+        "a force depends on the time, or a magnetic field turns with it: going back meets another one")),
     Requirement("undamped", "no friction", _trait(
         "undamped", "friction contracts area and lets a phase decay, and going back does not undo it")),
     Requirement("one-area", "modes that lose area at one rate", _unless(
@@ -125,14 +125,14 @@ _ALL = (
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.state <= 2.0**-53,
         "the rounding of its forces hides that of its steps")),
     Requirement("linear", "a linear scene", _trait(
-        "linear", "the step of an anharmonic or driven scene is no matrix; the step defect judges it")),
+        "linear", "an anharmonic or driven step, or one in a field, is no matrix; step-defect judges it")),
     Requirement("unmixed", "springs that act at one time", _unless(
         lambda x: not x.law.has("mixes"),
         "slow and fast springs act at different times: no normal mode stays by itself")),
     Requirement("modes", "normal modes", _unless(
         lambda x: x.scene.system.has_modes,
-        "no closed form of the discrete motion: the scene is anharmonic or driven, or friction couples its "
-        f"modes, or more than {MOST_JOINED} particles are joined")),
+        "no closed form of the discrete motion: the scene is anharmonic or driven or in a field, or friction "
+        f"couples its modes, or more than {MOST_JOINED} particles are joined")),
     Requirement("few", f"{LARGEST} particles at most", _unless(
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),
     Requirement("resolved", "a step that doubles resolve", _too_long),

@@ -43,6 +43,7 @@ def of_step(
         h=run.step,
         m=m,
         rate=case.law.rate,
+        turns=case.law.turns,
         met=_evaluations(case, places, recorded),
         hold=case.system.rods,
         loose=0.0 if paired else how.lengths / (how.state * case.roundings),
@@ -64,7 +65,7 @@ def of_step(
 def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """What bounds each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
-    acting = {"slow": scene.system.slow, "fast": scene.system.fast}
+    acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
     found: list[Met] = []
     made: dict[tuple[str, float], Met] = {}
     for number, (terms, part, at_end) in enumerate(scheme.evaluations):

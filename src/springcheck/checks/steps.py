@@ -179,7 +179,8 @@ def rates_met(case: Case, *states: Reals) -> Floats:
     """Gershgorin's bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T]."""
     rows = [case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
     steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
-    return np.asarray(np.sqrt(steepest) + np.max(case.system.friction_rates), np.float64)
+    turns = 0.0 if case.law.turns is None else np.max(case.law.turns)
+    return np.asarray(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns, np.float64)
 
 
 def fastest(case: Case) -> float:

@@ -214,8 +214,8 @@ def variational(system: System) -> Callable[[Iterable[Term]], Force]:
     def of(terms: Iterable[Term]) -> Force:
         terms = tuple(terms)
         whole = system.force_of(terms)
-        # friction is linear in p, and so its own change
-        brakes = system.force_of(term for term in terms if term.kind == "friction")
+        # friction, and a magnetic field, are linear in p, and so their own change
+        brakes = system.force_of(term for term in terms if term.kind in ("friction", "magnetic"))
 
         def force(q: Reals, p: Reals) -> Reals:
             change = brakes(q[1:], p[1:])

@@ -18,16 +18,20 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
+    FIELD = "a magnetic field"
     RODS = "rods"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
-        if self is Need.DAMPING:
-            return any(term.key == "damping" for term in scene.terms)
+        if self in KEYS:
+            return any(term.key == KEYS[self] for term in scene.terms)
         if self is Need.RODS:
             return any(term.kind == "constraint" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
+
+KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
+"""The terms that are needed."""
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function, whatever its law."""
@@ -44,6 +48,9 @@ SPRINGS = frozenset({"wall-spring", "spring"})
 
 DRIVEN = frozenset({"drive", "modulated-spring"})
 """The terms of a method whose force may also depend on the time."""
+
+FIELD = frozenset({"magnetic"})
+"""The term of a method whose force may turn velocities."""
 
 EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
 

@@ -14,6 +14,7 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
+    FIELD,
     Engine,
     Label,
     Method,
@@ -107,7 +108,7 @@ ENGINE = Engine(
                 name,
                 f"scipy-{name}",
                 f"scipy.integrate.{solver}, as solve_ivp steps it",
-                EVERY_FORCE | DRIVEN,
+                EVERY_FORCE | DRIVEN | FIELD,
                 adaptive=True,
                 kinds=EVERY_KIND,
             )

@@ -19,6 +19,7 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, 
 from springcheck.physics.driven import with_clock
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.solution import Solution, solution
+from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.rods import Rods, rods_of
 from springcheck.physics.term import Term, in_pieces
@@ -168,7 +169,7 @@ class System:
 
     def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
         """What these functions of (q, v, out), one a term, add up to, as a function of (q, p)."""
-        needs_velocity = any(term.kind == "friction" for term in parts)
+        needs_velocity = any(term.kind in ("friction", "magnetic") for term in parts)
 
         def total(q: Reals, p: Reals) -> Reals:
             out = np.zeros_like(q)
@@ -258,9 +259,9 @@ class System:
 
     def jacobian(self, q: Floats) -> Floats:
         """Derivatives of (p/m, force) by (q, p) at q (n,) -> (2n, 2n), double precision."""
-        n = self.n
-        upper = np.hstack([np.zeros((n, n)), np.diag(1 / self.m)])
-        lower = np.hstack([-self.hessian(q), -np.diag(self.friction_rates)])
+        upper = np.hstack([np.zeros((self.n, self.n)), np.diag(1 / self.m)])
+        turned = (x.by_velocity(self.m) for x in self.terms if isinstance(x, Magnetic))
+        lower = np.hstack([-self.hessian(q), sum(turned, -np.diag(self.friction_rates))])
         return np.vstack([upper, lower]).astype(np.float64)
 
     def curvatures(self, q: Reals) -> Any:

@@ -20,7 +20,7 @@ from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers, Reals
 
 Where: TypeAlias = "slice | Integers"
-Origin: TypeAlias = Literal["potential", "friction", "drive", "constraint"]
+Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
 
 
 @dataclass(frozen=True, slots=True)

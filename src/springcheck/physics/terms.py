@@ -15,12 +15,13 @@ import numpy as np
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
+from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
 
 __all__ = [
-    "Column", "Cosine", "Damping", "Drive", "ModulatedSpring", "Morse", "OnPairs", "OnParticles", "Quartic",
-    "Rod", "Spring", "Term", "WallRod", "WallSpring", "Weight", "known", "register",
+    "Column", "Cosine", "Damping", "Drive", "Magnetic", "ModulatedSpring", "Morse", "OnPairs", "OnParticles",
+    "Quartic", "Rod", "Spring", "Term", "WallRod", "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -268,6 +269,7 @@ _KNOWN: dict[str, type[Term]] = {
         Weight,
         Morse,
         Damping,
+        Magnetic,
         Drive,
         ModulatedSpring,
         WallRod,

@@ -1,7 +1,7 @@
 """Schemes that come about by how a spring is attached to an engine, beside the ones that people choose.
 
 A force that is set once and held over substeps, friction that is taken implicitly where the force is not, and
-a spring that is solved for in every substep.
+a spring that is solved for in every substep; and Boris' rotation, which is position Verlet where no field is.
 """
 
 from __future__ import annotations
@@ -39,6 +39,12 @@ _ALL = (
         (("pull", ONE), ("implicit-friction", ONE), ("drift", ONE)),
         "MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
         symplectic=False,
+    ),
+    splitting(
+        "boris", "Boris: half drift, half kick, turn, half kick, half drift", 2, 2.0,
+        (("drift", HALF), ("pull", HALF), ("gyrate", ONE), ("pull", HALF), ("drift", HALF)),
+        "Boris, Proc. Fourth Conf. Numerical Simulation of Plasmas (1970) 3; Qin et al., Phys. Plasmas 20 "
+        "(2013) 084503: it keeps volume and is not symplectic", symplectic=False,
     ),
     Scheme(
         name="implicit-euler-4", title="implicit Euler, four substeps", order=1, limit=float("inf"),

@@ -16,9 +16,9 @@ import numpy as np
 
 from springcheck.physics.arrays import Reals
 
-Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast"]
+Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast", "magnetic"]
 """By which terms of a scene the force is: none is evaluated, all of them, those of the potential, or the slow
-or the fast springs alone."""
+or the fast springs, or of magnetic fields alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +32,8 @@ class Setting:
     force: Reals
     draws: Reals | None = None
     kT: Any = 0
+    turns: Reals | None = None
+    """Angular frequencies (n,) at which magnetic fields turn the velocities; None where there is no field."""
 
 
 Effect: TypeAlias = Callable[[Reals, Reals, Any, Setting], tuple[Reals, Reals]]
@@ -126,6 +128,21 @@ def _thermal_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Real
     return q, p if at.rate is None or at.draws is None else p + np.abs(_noise(x, at) * at.draws)
 
 
+def _gyrate(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
+    """P - p = x F((P + p)/2), a rotation by 2 atan(x W/2): with T p = x F(p)/2 and T**2 = -(x W/2)**2."""
+    if at.turns is None:
+        return q, p
+    square = (x * at.turns / 2) ** 2
+    return q, p + (x * at.force - 2 * square * p) / (1 + square)
+
+
+def _gyrate_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
+    if at.turns is None:
+        return q, p
+    square = (x * at.turns / 2) ** 2
+    return q, p + (np.abs(x) * at.force + 2 * square * p) / (1 + square)
+
+
 _ALL = (
     StageKind(name="kick", word="p = p + {c}F", act=_kick, sizes=_kick_sizes, roundings=6,
               evaluates="all", kicks=True),
@@ -144,6 +161,9 @@ _ALL = (
     # the sum, and the quotient
     StageKind(name="implicit-friction", word="p = p / (1 + {c}c/m)", act=_implicit_friction,
               sizes=_implicit_friction_sizes, roundings=3, friction=True),
+    # of the force 4, the square 4, its product, the difference, the sum 1 + square, the quotient and the sum
+    StageKind(name="gyrate", word="p turned by 2 atan({c}B/2m) about the magnetic field", act=_gyrate,
+              sizes=_gyrate_sizes, roundings=13, evaluates="magnetic"),
     # those of friction; of the noise exponent, 1 - exp, two products, root; product with the draw; the sum
     StageKind(name="thermal", word="p = p exp(-{c}c/m) + sqrt((1 - exp(-2 {c}c/m)) m kT) N(0, 1)",
               act=_thermal, sizes=_thermal_sizes, roundings=10, friction=True, random=True),

@@ -63,6 +63,18 @@ class Law:
         return self.scene.system.friction_rates if self.scene.system.is_damped else None
 
     @cached_property
+    def fields(self) -> tuple[tuple[Term, ...], ...]:
+        """The magnetic fields in a row of their own, none where there is none."""
+        found = tuple(term for term in self.scene.terms if term.kind == "magnetic")
+        return (found,) if found else ()
+
+    @cached_property
+    def turns(self) -> Reals | None:
+        """The rates at which magnetic fields turn velocities (n,) [1/T]; None where there is none."""
+        found: list[Any] = [term for row in self.fields for term in row]
+        return found[0].turns(self.scene.m) if found else None
+
+    @cached_property
     def stiffness(self) -> Any:
         """What an implicit step needs of the second derivatives: see `schemes.step`."""
         if not self.scheme.has("implicit"):
@@ -96,7 +108,8 @@ class Law:
             h=self.h,
             m=self.scene.m,
             force=forces(self.scene.terms),
-            parts=(forces(system.slow), forces(system.fast)),
+            parts=tuple(forces(part) for part in (system.slow, system.fast, *self.fields)),
+            turns=self.turns,
             stiffness=slope if slope and callable(self.stiffness) else self.stiffness,
             rate=self.rate,
             met=met,

@@ -41,6 +41,7 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
+    turns: Reals | None = None,
     draws: Sequence[Reals] | None = None,
     kT: Any = 0,
     hold: Rods | None = None,
@@ -64,7 +65,7 @@ def magnitude_step(
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
                 pull = here.pull
             mine = next(drawn) if kind.random and draws is not None else None
-            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
+            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT, turns=turns)
             part = number(c, np.float64) * wide
             q, p = kind.sizes(q, p, part, setting)
             if hold is not None:

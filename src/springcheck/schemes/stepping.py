@@ -35,7 +35,8 @@ def step(
     force: Force,
     stiffness: Reals | Slope | None = None,
     rate: Reals | None = None,
-    parts: tuple[Force, Force] | None = None,
+    parts: tuple[Force, ...] | None = None,
+    turns: Reals | None = None,
     met: list[Reals] | None = None,
     near: Reals | None = None,
     draws: Sequence[Reals] | None = None,
@@ -48,7 +49,8 @@ def step(
     particle is joined to another; or a function of the position, where that bends.  Double precision is
     enough, because it only steers an iteration whose residual has the full width.  `rate` is
     `System.friction_rates`, left out where nothing is damped; `parts` are the forces of the slow and the fast
-    springs, for the schemes that part them.  `met` takes the position (..., n) of each evaluation of the
+    springs, for the schemes that part them, and of magnetic fields, which turn velocities at the rates
+    `turns` (n,).  `met` takes the position (..., n) of each evaluation of the
     force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
     solutions of an implicit stage the one there is found; a force after the last drift is taken there, at the
     position that an engine has rounded.  `draws` are the standard normal numbers of each random stage in
@@ -69,7 +71,7 @@ def step(
                     met.append(at)
                 last = acting(kind.evaluates, force, parts)(at, p)
             mine = next(each) if kind.random and draws is not None else None
-            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT)
+            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT, turns=turns)
             before, part = q, number(c, width) * h
             q, p = kind.act(q, p, part, setting)
             if hold is not None:
@@ -100,12 +102,14 @@ def step(
     return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
-def acting(terms: Acting, force: Force, parts: tuple[Force, Force] | None) -> Force:
+def acting(terms: Acting, force: Force, parts: tuple[Force, ...] | None) -> Force:
     """The force of these terms."""
     if terms == "all":
         return force
     if terms == "potential":
         return lambda q, p: force(q, np.zeros_like(p))
+    if terms == "magnetic":
+        return parts[2] if parts is not None and len(parts) > 2 else lambda q, p: np.zeros_like(p)
     if parts is None:
         raise ValueError("this scheme needs the slow and the fast force apart")
     return parts[terms == "fast"]

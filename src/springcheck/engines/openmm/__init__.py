@@ -6,6 +6,7 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
+    FIELD,
     RODS,
     Engine,
     Need,
@@ -73,6 +74,9 @@ ENGINE = Engine(
             "verlet-rods-as-it-is", "velocity-verlet",
             "VerletIntegrator, its own constraint tolerance 1e-5, started and read synchronised",
             _TERMS | RODS, Need.RODS, rebuilds_velocity=True,
+        ),
+        by_name(
+            "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
         ),
         by_name(
             "nose-hoover", "semi-implicit-euler",

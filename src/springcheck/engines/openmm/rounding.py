@@ -33,7 +33,7 @@ _PRECISIONS = {
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
-CUSTOM = ("euler", "semi-implicit-euler", "mts")
+CUSTOM = ("euler", "semi-implicit-euler", "mts", "boris")
 """Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
 
 CUSTOM_EXCESS = 2.0**-32

@@ -10,6 +10,7 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
+    FIELD,
     RODS,
     SPRINGS,
     Engine,
@@ -19,7 +20,7 @@ from springcheck.engines.contract import (
     named,
     thermostat,
 )
-from springcheck.schemes import SCHEMES, Scheme
+from springcheck.schemes import ATTACHED, SCHEMES, Scheme
 from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
@@ -45,6 +46,10 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | {"damping"}
+    kicked = all(kind.drifts or kind.evaluates == "all" for kind in scheme.kinds)
+    if scheme.has("explicit") and kicked and not scheme.has("mixes"):
+        # a field is a force like any other
+        return EVERY_FORCE | FIELD | (RODS if scheme.has("symplectic", "splitting") else frozenset())
     # rods hold after every stage of a splitting
     return EVERY_FORCE | RODS if scheme.has("symplectic", "splitting") else EVERY_FORCE
 
@@ -69,7 +74,17 @@ _SCHEMES = sorted(
 ENGINE = Engine(
     name="own",
     title="springcheck",
-    methods=named(*map(_method, _SCHEMES)),
+    methods=named(
+        *map(_method, _SCHEMES),
+        Method(
+            name="boris",
+            scheme="boris",
+            about=ATTACHED["boris"].title,
+            terms=EVERY_POTENTIAL | DRIVEN | FIELD,
+            requires=frozenset({Need.FIELD}),
+            default=False,
+        ),
+    ),
     # compiled
     step_seconds=4e-9,
     any_axis=True,

@@ -137,7 +137,7 @@ def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
         x = float(number(c, np.float64) * h)
         if kind.decay:
             found.append(Operation(code=FRICTION, x=x))
-        elif kind.evaluates:
+        elif kind.evaluates and kind.kicks:
             found.append(Operation(code=KICK, x=x, force=kind.evaluates))
         elif not kind.drifts:
             raise NoKernelError(f"a stage that is not served: {kind.name}")

@@ -25,8 +25,11 @@ class Vectors:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._law = Law(scheme=scheme, scene=scene, h=step)
         self._hold = system.rods
-        self._force = _kept(system.force, system.is_damped)
-        self._parts = _kept(system.parts[0], system.is_damped), _kept(system.parts[1], system.is_damped)
+        moving = system.is_damped or bool(self._law.fields)
+        self._force = _kept(system.force, moving)
+        self._parts = tuple(
+            _kept(system.force_of(part), moving) for part in (system.slow, system.fast, *self._law.fields)
+        )
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
@@ -38,7 +41,7 @@ class Vectors:
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
                         rate=self._law.rate, parts=self._parts, stiffness=self._law.stiffness,
-                        hold=self._hold,
+                        turns=self._law.turns, hold=self._hold,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
                 q[row], p[row] = self._q[: self._n], self._p[: self._n]

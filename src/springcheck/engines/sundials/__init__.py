@@ -6,6 +6,7 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
+    FIELD,
     SPRINGS,
     Engine,
     by_default,
@@ -13,7 +14,7 @@ from springcheck.engines.contract import (
     named,
 )
 
-_TERMS = EVERY_FORCE | DRIVEN
+_TERMS = EVERY_FORCE | DRIVEN | FIELD
 _SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 
 ENGINE = Engine(

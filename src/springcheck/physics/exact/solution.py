@@ -67,6 +67,12 @@ def solution(system: System) -> Solution | None:
     if system.has_modes:
         whole = _Group(particles=np.arange(system.n), scene=system.scene, found=True, law=linear.LINEAR)
         return Solution(n=system.n, groups=(whole,))
+    if "magnetic" in system.acting:
+        from springcheck.physics.exact.gyration import GYRATION
+
+        ready = GYRATION.prepare(system.scene)
+        here = _Group(particles=np.arange(system.n), scene=system.scene, found=ready, law=GYRATION)
+        return Solution(n=system.n, groups=(here,)) if ready else None
     if system.is_driven:
         from springcheck.physics.exact.mathieu import MATHIEU
         from springcheck.physics.exact.response import RESPONSE

@@ -14,7 +14,7 @@ from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene, Units
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import Column, Damping, Rod, Spring, Term, WallRod, WallSpring
+from springcheck.physics.terms import Column, Damping, Magnetic, Rod, Spring, Term, WallRod, WallSpring
 
 
 class MistakeError(ValueError):
@@ -197,6 +197,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
         yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
     yield from _by_columns(Damping, table.damping, bodies)
     yield from _rods(table.rod, bodies)
+    yield from _magnetic(table.magnetic, bodies)
     loops = [bodies.number(row.loop, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
     if loops:
         yield Damping(i=np.array(loops), c=np.array([row.resistance for row in table.resistor]))
@@ -252,6 +253,21 @@ def _rods(rods: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
         kind = rows.setdefault((WallRod if len(numbers) == 1 else Rod, False), [])
         kind += [(*at, length, *([x] if len(numbers) == 1 else [])) for at, x in zip(ends, wall, strict=True)]
     yield from _of_rows(rows)
+
+
+def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+    """The plane at right angles to each field, its two axes in their cyclic order."""
+    found: list[tuple[float, ...]] = []
+    for j, row in enumerate(rows):
+        field = f"magnetic[{j}].particle"
+        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
+        if not set(plane) <= set(bodies.axes[bodies.number(row.particle, field)] if bodies.axes else "x"):
+            raise MistakeError(
+                f"{field}: a field along {row.axis} needs a particle along {plane[0]} and {plane[1]}"
+            )
+        (one,), (other,) = (bodies.along(field, axis, row.particle) for axis in plane)
+        found.append((*one, *other, row.strength))
+    yield from _of_rows({(Magnetic, False): found} if found else {})
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:

@@ -95,6 +95,14 @@ class DampingTable(SceneTable, frozen=True):
     axis: Axis | None = None
 
 
+class MagneticTable(SceneTable, frozen=True):
+    """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
+
+    particle: int
+    strength: float
+    axis: Axis = "z"
+
+
 class WaveTable(SceneTable, frozen=True):
     """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
 
@@ -186,6 +194,7 @@ class SceneBase(SceneTable, frozen=True):
     spring: tuple[SpringTable, ...] = ()
     damping: tuple[DampingTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
+    magnetic: tuple[MagneticTable, ...] = ()
     box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
@@ -220,7 +229,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "damping", "wall-rod", "rod")
+OTHERWISE = ("wall-spring", "spring", "damping", "magnetic", "wall-rod", "rod")
 """Terms that have tables of their own."""
 
 
@@ -263,7 +272,7 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, RodTable, BoxTable, BathTable, TimeTable, MethodsTable, RecordTable,
+        DampingTable, RodTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable, RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
     found |= {key: table for key, (_, table) in of_terms().items()}

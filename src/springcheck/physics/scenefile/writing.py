@@ -14,7 +14,7 @@ from springcheck.physics.builders import standing
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Damping, Magnetic, Rod, Spring, WallRod, WallSpring
 
 MOST_WAVES = 64
 """Standing waves up to which the start of a chain is written as such."""
@@ -117,6 +117,13 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
     elif isinstance(term, Spring):
         for a, b, k, rest in term.rows():
             yield _spring(scene, [], [a, b], k, rest, 0.0, fast=term.fast)
+    elif isinstance(term, Magnetic):
+        assert scene.places is not None
+        for a, b, strength in term.rows():
+            (particle, one), (_, other) = (divmod(int(scene.places[x]), 3) for x in (a, b))
+            sign = 1.0 if (other - one) % 3 == 1 else -1.0
+            row = {"particle": particle, "strength": sign * strength, "axis": "xyz"[3 - one - other]}
+            yield _table("[[magnetic]]", row.items())
     elif isinstance(term, Rod | WallRod):
         rods = scene.derived(terms=(term,)).system.rods
         assert rods is not None

@@ -1,0 +1,88 @@
+"""The exact solution of a charge in a magnetic field, on an isotropic spring or free, with friction or not.
+
+In its plane z = x + i y moves by z'' + (r + i W) z' + w2 z = 0, W the field's strength over the mass: the
+sum of two exponentials (Fock-Darwin, or Foucault's pendulum, where w2 > 0).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.exact.response import first_difference
+from springcheck.physics.exact.well import LAST, States, Well
+
+if TYPE_CHECKING:
+    from springcheck.physics.scene import Scene
+
+
+class _Planes(NamedTuple):
+    """Particles (s,) in planes of coordinates a and b: their roots, start and centres."""
+
+    a: Integers
+    b: Integers
+    one: NDArray[Any]
+    other: NDArray[Any]
+    z: NDArray[Any]
+    v: NDArray[Any]
+    centre: NDArray[Any]
+
+
+def prepare(scene: Scene) -> _Planes | None:
+    """None where something else acts, or acts unlike on both coordinates of a plane, or beside them."""
+    planes = [term for term in scene.terms if term.key == "magnetic"]
+    if len(planes) != 1 or {term.key for term in scene.terms} - {"magnetic", "wall-spring", "damping"}:
+        return None
+    a, b = planes[0].particles
+    if len(np.unique(np.append(a, b))) != scene.n or len(a) * 2 != scene.n:
+        return None
+    alone = scene.derived(terms=tuple(term for term in scene.terms if term.key != "magnetic")).system
+    modes = alone.modes
+    if np.any(modes.w2[a] != modes.w2[b]) or np.any(modes.rate[a] != modes.rate[b]):
+        return None
+    turn = np.zeros(scene.n, np.longdouble)
+    turn[a] = planes[0].parameters[0] / scene.m[a].astype(np.longdouble)
+    half = (modes.rate[a] + 1j * turn[a]) / 2
+    root = np.sqrt(half * half - modes.w2[a])
+    # the larger root without cancellation, the other by their product
+    far = -half - np.where((half.conjugate() * root).real < 0, -root, root)
+    near = np.where(far == 0, 0, modes.w2[a] / np.where(far == 0, 1, far))
+    rest = np.asarray(modes.rest, np.longdouble)
+    q, v = scene.q - rest, scene.p / scene.m.astype(np.longdouble)
+    return _Planes(a, b, near, far, q[a] + 1j * q[b], v[a] + 1j * v[b], rest)
+
+
+def motion(scene: Scene, found: _Planes, t: Extended) -> States:
+    """Exact q and p (f, n) at times t (f, 1) [T]."""
+    part = first_difference(found.one, found.other, t)
+    slope = np.exp(found.one * t) + found.other * part
+    z = found.z * (np.exp(found.one * t) - found.one * part) + found.v * part
+    v = -found.z * found.one * found.other * part + found.v * slope
+    q, p = np.empty((2, len(t), scene.n), np.longdouble)
+    q[:, found.a], q[:, found.b] = z.real, z.imag
+    p[:, found.a], p[:, found.b] = v.real, v.imag
+    return q + found.centre, p * scene.m
+
+
+def doubt(scene: Scene, found: _Planes, t: np.longdouble) -> States:
+    """Bounds (n,) of the errors of `motion`: roundings of its angles, times the largest state."""
+    grown = np.exp(np.maximum(np.maximum((found.one * t).real, (found.other * t).real), 0))
+    rate = np.maximum(np.abs(found.one), np.abs(found.other))
+    hold = np.minimum(
+        np.abs(t), 2 / np.where(np.abs(found.one - found.other) > 0, np.abs(found.one - found.other), 1e-300)
+    )
+    far = np.abs(found.z) * (1 + np.abs(found.one) * hold) + np.abs(found.v) * hold
+    fast = np.abs(found.z * found.one * found.other) * hold + np.abs(found.v) * (
+        1 + np.abs(found.other) * hold
+    )
+    q, p = np.empty((2, scene.n), np.longdouble)
+    q[found.a] = q[found.b] = LAST * (1 + rate * np.abs(t)) * grown * far
+    p[found.a] = p[found.b] = LAST * (1 + rate * np.abs(t)) * grown * fast
+    return q + LAST * np.abs(found.centre), p * scene.m
+
+
+GYRATION = Well(key="magnetic", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
+"""A whole scene of charges in a field, each on an isotropic spring or on none."""

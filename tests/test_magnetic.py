@@ -1,0 +1,163 @@
+"""A charge in a magnetic field: Boris' rotation, the exact motion, and what is wrong with others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, schemes
+from springcheck.errors import SceneError
+from springcheck.physics import exact
+from springcheck.physics import scenefile as scenes
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Magnetic, Spring, WallSpring
+
+SCENES = ("magnetic", "foucault")
+
+
+@pytest.mark.parametrize("step", [0.1, 1.7, -0.3])
+def test_boris_turns_by_twice_the_arc_tangent_and_keeps_the_speed(step: float) -> None:
+    scene = replace(scenes.load_scene("magnetic"), step=step, steps=50)
+    run = springcheck.simulate(scene, "own:boris")
+    v = run.p[:, 0] + 1j * run.p[:, 1]
+    turn = np.angle(v[1:] / v[:-1])
+    # z'' = -i W z': clockwise
+    assert turn == pytest.approx(-2 * np.arctan(2.3 / 1.7 * step / 2), rel=1e-13)
+    assert np.abs(v) == pytest.approx(np.abs(v[0]), rel=1e-14)
+
+
+@pytest.mark.parametrize("label", ["own:boris", "own:euler", "own:semi-implicit-euler", "own:rk4",
+                                   "own:velocity-verlet", "openmm:boris"])  # fmt: skip
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("step", [0.1, -0.07])
+def test_every_method_in_a_field_is_its_scheme_to_rounding(
+    name: str, label: str, step: float, need: Any
+) -> None:
+    need(label)
+    scene = replace(scenes.load_scene(name), steps=60, step=step)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert found["step-defect"].passed is True
+    assert not [v.check for v in found.values() if v.passed is False]
+    coarse = replace(scene, every=6)
+    found = {v.check: v for v in checks.judge(coarse, springcheck.simulate(coarse, label))}
+    assert found["step-defect"].passed is True
+
+
+@pytest.mark.parametrize("label", ["scipy:dop853", "scipy:radau", "sundials:adams", "sundials:bdf"])
+@pytest.mark.parametrize("name", SCENES)
+def test_solvers_keep_their_tolerance_in_a_field(name: str, label: str, need: Any) -> None:
+    need(label)
+    scene = replace(scenes.load_scene(name), steps=100, tolerance=1e-9)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert found["tolerance"].passed is True
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_field_along_each_axis_turns_about_it(axis: str) -> None:
+    """The same circle, its plane turned; what moves along the field moves straight on."""
+    text = scenes.load_scene("magnetic").to_toml()
+    text = text.replace('axes = "xy"', 'axes = "xyz"').replace(
+        "position = [0.3, -0.2]", "position = [0.3, -0.2, 0.1]"
+    )
+    text = text.replace("momentum = [0.7, 0.4]", "momentum = [0.7, 0.4, -0.5]").replace(
+        'axis = "z"', f'axis = "{axis}"'
+    )
+    scene = scenes.parse(text, name="turned")
+    assert scenes.parse(scene.to_toml(), name="again").digest == scene.digest
+    run = springcheck.simulate(replace(scene, steps=50), "own:boris")
+    along = "xyz".index(axis)
+    assert np.ptp(run.p[:, along]) == 0
+    plane = [(along + 1) % 3, (along + 2) % 3]
+    v = run.p[:, plane[0]] + 1j * run.p[:, plane[1]]
+    assert np.angle(v[1:] / v[:-1]) == pytest.approx(-2 * np.arctan(2.3 / 1.7 * 0.1 / 2), rel=1e-13)
+
+
+def wrong(name: str, scene: Scene) -> Any:
+    """Boris' states with a mistake: the turn of another angle, its sign, or E and B in the wrong order."""
+    size = float(scene.terms[-1].parameters[0][0]) / float(scene.m[0]) * scene.step
+    angle = {"small-angle": size, "exact-turn": size, "other-way": -2 * np.arctan(size / 2)}.get(
+        name, 2 * np.arctan(size / 2)
+    )
+    q, p = scene.q.copy(), scene.p.copy()
+    k = next((float(x.k[0]) for x in scene.terms if isinstance(x, WallSpring)), 0.0)
+    states = [(q, p)]
+    for _ in range(scene.steps):
+        q = q + scene.step / 2 * p / scene.m
+        kick = -scene.step / 2 * k * q
+        p = p + kick * (2 if name == "kick-first" else 1)
+        z = (p[0] + 1j * p[1]) * np.exp(-1j * angle)
+        p = np.array([z.real, z.imag]) + kick * (0 if name == "kick-first" else 1)
+        q = q + scene.step / 2 * p / scene.m
+        states.append((q, p))
+    return np.array(states)
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [("small-angle", "magnetic"), ("other-way", "magnetic"), ("kick-first", "foucault")],
+)
+def test_another_turn_is_rejected(name: str, scene: str) -> None:
+    law = replace(scenes.load_scene(scene), steps=40)
+    run = springcheck.simulate(law, "own:boris")
+    right, states = wrong("right", law), wrong(name, law)
+    assert right[:, 0] == pytest.approx(run.q, abs=1e-13)
+    broken = replace(run, q=states[:, 0].copy(), p=states[:, 1].copy(), energy=None)
+    found = {v.check: v for v in checks.judge(replace(law, quantities=("q", "p")), broken)}
+    assert found["step-defect"].passed is False
+
+
+def test_the_exact_motion_has_friction_and_a_resting_place_too() -> None:
+    """Against RK4 in steps so short that it is exact to 1e-11."""
+    scene = Scene(
+        m=[1.7, 1.7], q=[0.3, -0.2], p=[0.7, 0.4], places=[0, 1], step=0.002, steps=1000,
+        terms=(WallSpring(i=[0, 1], k=[2.9, 2.9], at=[0.1, -0.3]), Damping(i=[0, 1], c=[0.2, 0.2]),
+               Magnetic(a=[0], b=[1], strength=[2.3])),
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "own:rk4")
+    q, p = exact.true_motion(scene, np.array([1000]), scene.step)
+    assert np.max(np.abs(run.q[-1] - q)) < 1e-11
+    assert np.max(np.abs(run.p[-1] - p)) < 1e-11
+
+
+def test_springs_unlike_along_two_axes_have_no_closed_form_here() -> None:
+    scene = scenes.load_scene("foucault")
+    unlike = replace(scene, terms=(WallSpring(i=[0, 1], k=[2.9, 2.8], at=[0.0, 0.0]), scene.terms[-1]))
+    assert not exact.has_true_motion(unlike)
+
+
+def test_a_field_needs_a_plane() -> None:
+    with pytest.raises(SceneError, match="two axes of one particle"):
+        Scene(
+            m=[1.0, 1.0],
+            q=[0, 1],
+            p=[1, 0],
+            step=0.1,
+            steps=1,
+            terms=(Magnetic(a=[0], b=[1], strength=[2.0]),),
+        )
+    text = scenes.load_scene("magnetic").to_toml().replace('axis = "z"', 'axis = "x"')
+    with pytest.raises(SceneError, match="a field along x needs a particle along y and z"):
+        scenes.parse(text, name="flat")
+
+
+def test_boris_is_reversible_in_its_stages_and_not_symplectic() -> None:
+    boris = schemes.ATTACHED["boris"]
+    assert boris.has("reversible")
+    assert not boris.has("symplectic")
+    assert schemes.KINDS["gyrate"].evaluates == "magnetic"
+
+
+def test_a_joined_pair_in_a_field_is_judged_to_rounding() -> None:
+    scene = Scene(
+        m=[1.7, 1.7, 2.9, 2.9], q=[0.3, -0.2, 1.1, 0.4], p=[0.7, 0.4, -0.3, 0.2], places=[0, 1, 3, 4],
+        step=0.1, steps=40, every=2,
+        terms=(Spring(a=[0, 1], b=[2, 3], k=[2.9, 2.9], rest=[0.0, 0.0]),
+               Magnetic(a=[0, 2], b=[1, 3], strength=[2.3, -0.7])),
+    )  # fmt: skip
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, "own:boris"))}
+    assert found["step-defect"].passed is True
+    assert found["momentum"].passed is None
