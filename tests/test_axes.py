@@ -217,7 +217,7 @@ def test_a_report_says_what_a_pass_does_not_cover(tmp_path: Path) -> None:
 
     for scene, said in (
         (orbit(), "here: periodic boxes"),
-        (spring(), "here: motion along y and z"),
+        (spring(), "here: axes y and z"),
     ):
         report = springcheck.run(scene, "own:euler", path=tmp_path / f"{scene.name}.h5")
         assert said in str(lines(report))

@@ -16,6 +16,7 @@ import pytest
 
 import schemas
 from springcheck.cli import ci, main
+from springcheck.studies.arguments import reported
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "ci-examples"
@@ -261,8 +262,8 @@ def test_a_scheme_that_is_not_the_one_asked_for_fails(
 
 
 def test_nothing_is_made_where_nothing_is_asked_for() -> None:
-    assert not ci.asked(Namespace(junit=None, badge=None, summary=None))
-    assert not ci.asked(Namespace())
+    assert not reported(Namespace(junit=None, badge=None, summary=None))
+    assert not reported(Namespace())
 
 
 def test_the_schema_of_scene_files_is_what_reads_them() -> None:

@@ -273,7 +273,7 @@ def test_mistakes_in_rods_are_said_in_a_line(momentum: str, rod: str, said: str)
 def test_a_run_says_that_it_exercises_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = ["--method", "own:velocity-verlet", "--steps", "9"]
     assert main(["run", "dumbbell", *given, "-o", str(tmp_path / "a.h5")]) == 0
-    assert "Not exercised here: motion along z, periodic boxes, friction" in capsys.readouterr().out
+    assert "Not exercised here: axis z, periodic boxes, friction" in capsys.readouterr().out
     assert main(["run", "orbit", *given, "-o", str(tmp_path / "b.h5")]) == 0
     assert "constraints" in capsys.readouterr().out
 

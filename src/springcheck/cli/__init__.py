@@ -18,10 +18,11 @@ from typing import Any
 
 import springcheck
 from springcheck import interrupts
-from springcheck.cli import ci, output, slips
+from springcheck.cli import output, slips
 from springcheck.cli.commands import COMMANDS, Command
 from springcheck.errors import SpringcheckError, StoreWarning, plain
 from springcheck.studies import STUDIES
+from springcheck.studies.arguments import REPORTING, REPORTS, reported
 from springcheck.studies.study import Study
 
 INTERRUPTED = interrupts.STATUS
@@ -44,7 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupts.announce(f"interrupted; {what}")
     try:
         slips.look(options)
-        ci.check_paths(options)
+        if reported(options):
+            from springcheck.cli import ci
+
+            ci.check_paths(options)
         read = getattr(options, "file", None) or getattr(options, "source", None)
         with _said(), output.readable(read):
             if any(getattr(options, name, None) for name in ("engine", "stepper", "program")):
@@ -57,7 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             try:
                 status = command(options)
             except SpringcheckError as error:
-                ci.failed(options, error)
+                if reported(options):
+                    ci.failed(options, error)
                 raise
             # while a full disk can still be said
             sys.stdout.flush()
@@ -123,7 +128,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     for one in [one for one in every if one.name in words[:1]] or every:
         parser_of = commands.add_parser(one.name, help=one.about)
         if one.name in words:
-            for names, how in (*one.arguments, *(ci.ARGUMENTS if one.name in ci.COMMANDS else ())):
+            for names, how in (*one.arguments, *(REPORTS if one.name in REPORTING else ())):
                 parser_of.add_argument(*names, **how)
         if isinstance(one, Study):
             parser_of.set_defaults(command=partial(_study, one), keeps=one.keeps)
@@ -147,9 +152,12 @@ def _study(study: Study, options: argparse.Namespace) -> int:
         found = study.perform(options, progress)
     output.warn(str(source), doubts)
     status = found.status or int(bool(doubts))
-    if options.json or ci.asked(options):
+    if options.json or reported(options):
         document = {**found.document(), **({"not_trusted": doubts} if source else {})}
-        ci.report(options, document, status)
+        if reported(options):
+            from springcheck.cli import ci
+
+            ci.report(options, document, status)
     if options.json:
         output.document(study.name, document)
     elif not options.quiet:

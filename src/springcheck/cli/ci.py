@@ -15,21 +15,8 @@ from typing import Any
 
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError, plain
-from springcheck.studies.arguments import argument
+from springcheck.studies.arguments import REPORT_FORMS
 from springcheck.text.wording import count
-
-COMMANDS = ("run", "judge", "identify")
-"""Those that judge something, and take these options."""
-
-ARGUMENTS = (
-    argument("--junit", metavar="FILE.xml", help="write a JUnit report, as every CI shows it"),
-    argument("--badge", metavar="FILE.json", help="write a badge, the JSON of a shields.io endpoint"),
-    argument(
-        "--summary", metavar="FILE.md", help="append a summary in Markdown, as for $GITHUB_STEP_SUMMARY"
-    ),
-)
-
-FORMS = ("junit", "badge", "summary")
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
 OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
@@ -61,7 +48,7 @@ class Case:
 
 def check_paths(options: Namespace) -> None:
     """SpringcheckError where a report cannot be written, or would take the place of a file that is none."""
-    given = {name: getattr(options, name, None) for name in FORMS}
+    given = {name: getattr(options, name, None) for name in REPORT_FORMS}
     read = [getattr(options, name, None) for name in ("file", "source", "scene", "output")]
     others = [str(x) for x in (*read, *(getattr(options, "files", None) or ())) if x]
     for name, path in given.items():
@@ -85,23 +72,14 @@ def check_paths(options: Namespace) -> None:
                     raise SpringcheckError(f"{said}: it is there and no such report; name another")
 
 
-def asked(options: Namespace) -> bool:
-    """Whether a command line asks for any of the three."""
-    return any(getattr(options, name, None) for name in FORMS)
-
-
 def report(options: Namespace, document: dict[str, Any], status: int) -> None:
     """Write what was asked for of a command's JSON document and exit status."""
-    if asked(options):
-        _write(options, list(cases(options.name, document, status)), status)
+    _write(options, list(cases(options.name, document, status)), status)
 
 
 def failed(options: Namespace, error: BaseException) -> None:
     """Write what was asked for of a command that ended in a mistake."""
-    if asked(options):
-        _write(
-            options, [Case(subject=options.name, name="input", passed=None, why=str(error), error=True)], 2
-        )
+    _write(options, [Case(subject=options.name, name="input", passed=None, why=str(error), error=True)], 2)
 
 
 def cases(command: str, document: dict[str, Any], status: int) -> Iterator[Case]:

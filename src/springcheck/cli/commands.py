@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from springcheck import interrupts
-from springcheck.cli import ci, output
+from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
-from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument
+from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument, reported
 from springcheck.studies.team import processes
 
 
@@ -167,7 +167,10 @@ def _identify(options: Namespace) -> int:
         statuses.append(1 if doubts or not fits or any(unlike.values()) else 2 if undecided else 0)
     status = 1 if 1 in statuses else max(statuses)
     document = {"files": documents} if many else documents[0]
-    ci.report(options, document, status)
+    if reported(options):
+        from springcheck.cli import ci
+
+        ci.report(options, document, status)
     if options.json:
         output.document(options.name, document)
     return status
@@ -225,7 +228,10 @@ def _judge(options: Namespace) -> int:
     )
     output.warn(options.file, doubts)
     document, status = {**found.document(), "not_trusted": doubts}, found.status or int(bool(doubts))
-    ci.report(options, document, status)
+    if reported(options):
+        from springcheck.cli import ci
+
+        ci.report(options, document, status)
     if options.json:
         output.document(options.name, document)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from typing import Any, Protocol
 
 Argument = tuple[tuple[str, ...], dict[str, Any]]
@@ -54,3 +55,20 @@ def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
         JSON,
         QUIET,
     )  # fmt: skip
+
+
+REPORTING = ("run", "judge", "identify")
+"""Commands that judge something, and take these options."""
+REPORTS = (
+    argument("--junit", metavar="FILE.xml", help="write a JUnit report, as every CI shows it"),
+    argument("--badge", metavar="FILE.json", help="write a badge, the JSON of a shields.io endpoint"),
+    argument(
+        "--summary", metavar="FILE.md", help="append a summary in Markdown, as for $GITHUB_STEP_SUMMARY"
+    ),
+)
+REPORT_FORMS = ("junit", "badge", "summary")
+
+
+def reported(options: Namespace) -> bool:
+    """Whether a command line asks for any of the three."""
+    return any(getattr(options, name, None) is not None for name in REPORT_FORMS)

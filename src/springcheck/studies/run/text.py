@@ -352,7 +352,7 @@ def _not_covered(scene: Scene) -> Lines:
     if scene.kind != "particles":
         return []
     missing = [axis for axis in "xyz" if axis not in scene.axes]
-    left = [f"motion along {' and '.join(missing)}"] if missing else []
+    left = [f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}"] if missing else []
     left += [] if scene.box else ["periodic boxes"]
     left += [] if scene.system.rods else ["constraints"]
     left += [] if scene.system.is_damped or scene.bath else ["friction"]

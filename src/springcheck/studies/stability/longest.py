@@ -118,7 +118,8 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
         return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
     if system.has_modes:
         modes, rate = system.modes, system.modes.rate
-        some = np.argsort(modes.w2)[np.unique(np.linspace(0, scene.n - 1, MOST_MODES).astype(int))]
+        # no np.unique, which imports masked arrays
+        some = np.argsort(modes.w2)[np.linspace(0, scene.n - 1, min(scene.n, MOST_MODES)).astype(int)]
         # of particles side by side each has its own friction
         some = np.append(some, [np.argmax(rate), np.argmin(np.where(rate > 0, rate, np.inf))])
         return Linear.of_modes(modes.w2[some], rate[some])
