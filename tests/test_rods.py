@@ -22,7 +22,7 @@ from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact, scenefile
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Rod, WallRod
+from springcheck.physics.terms import Cosine, Rod, WallRod, WallSpring
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.steppers import record
@@ -300,3 +300,59 @@ def test_a_study_of_precision_begins_where_a_rod_still_has_a_step() -> None:
     sweep = sweeps.begin(dumbbell(), label, accuracy.truth(dumbbell()))
     assert sweep.scene is not None
     assert sweep.scene.step == pytest.approx(0.9 / 1.5, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "label", ["own:velocity-verlet", "own:forest-ruth", "ase:rattle", "openmm:verlet-rods"]
+)
+def test_on_a_line_two_masses_on_a_rod_are_one(label: str, need: Need) -> None:
+    need(label)
+    held = WallSpring(i=[0], k=[2.9], at=[0.3])  # type: ignore[arg-type]
+    rod = Rod(a=[0], b=[1], length=[1.5])  # type: ignore[arg-type]
+    grid = {"step": 0.1, "steps": 300}
+    two = Scene(m=[1.3, 2.7], q=[0.25, 1.75], p=[0.39, 0.81], terms=(held, rod), **grid)  # type: ignore[arg-type]
+    one = Scene(m=[4.0], q=[0.25], p=[1.2], terms=(held,), **grid)  # type: ignore[arg-type]
+    run = driver.run(two, label)
+    assert [v.check for v in checks.judge(two, run) if v.passed is False] == []
+    engine, _, method = label.partition(":")
+    alone = driver.run(one, f"own:{method}" if engine == "own" else "own:velocity-verlet")
+    # a length may be off by its tolerance at every step, and the force with it
+    limit = 300 * (run.arithmetic.lengths + 2.0**-50)
+    assert np.max(np.abs(run.q - alone.q - [0.0, 1.5])) < limit
+    assert np.max(np.abs(np.sum(run.p, axis=1) - alone.p[:, 0])) < 4 * limit
+
+
+def water(half: float = 3 / 64, low: float = 4 / 64) -> Scene:
+    """A rigid triangle of two equal light masses and a heavy one, turning about its axis and drifting."""
+    q = np.array([0.1, 0.2, 0.3, 0.1 - half, 0.2 - low, 0.3, 0.1 + half, 0.2 - low, 0.3])
+    m = np.repeat([16.0, 1.1, 1.1], 3)
+    centre = np.average(q.reshape(3, 3), axis=0, weights=m[::3])
+    v = np.cross([0.0, 0.0, 4.7], q.reshape(3, 3) - centre) + np.array([0.3, -0.2, 0.1])
+    axes = np.tile(np.arange(3), 3)
+    rods = Rod(
+        a=np.repeat([0, 0, 3], 3) + axes, b=np.repeat([3, 6, 6], 3) + axes,
+        length=np.repeat([np.hypot(half, low), np.hypot(half, low), 2 * half], 3),
+    )  # fmt: skip
+    return Scene(m=m, q=q, p=m * v.ravel(), places=np.arange(9), terms=(rods,), step=0.05, steps=200)
+
+
+@pytest.mark.parametrize("label", ["own:velocity-verlet", "ase:rattle", "openmm:verlet-rods"])
+def test_a_rigid_triangle_turns_about_its_axis_by_the_same_arc_sine(label: str, need: Need) -> None:
+    """OpenMM has SETTLE for it, ASE iterates, the own method solves three equations by Newton."""
+    need(label)
+    scene = water()
+    run = driver.run(scene, label)
+    assert [v.check for v in checks.judge(scene, run) if v.passed is False] == []
+    r = run.q[:, 3:5] - run.q[:, 6:8]
+    turn = np.diff(np.unwrap(np.arctan2(r[:, 1], r[:, 0])))
+    assert np.max(np.abs(turn / np.arcsin(0.05 * 4.7) - 1)) < 1e-12
+
+
+def test_settle_in_openmm_keeps_lengths_in_single_precision_and_is_told(need: Need) -> None:
+    need("openmm:verlet-rods")
+    scene = water(0.0757, 0.0586)
+    run = driver.run(scene, "openmm:verlet-rods")
+    assert {"step-defect", "rod-length"} == {v.check for v in checks.judge(scene, run) if v.passed is False}
+    length = rods(scene).length
+    kept = length.astype(np.float32).astype(np.float64) / length - 1
+    assert np.max(np.abs(rods(scene).strain(run.q[1:]) - kept)) < 1e-13
