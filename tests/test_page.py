@@ -263,7 +263,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             replace(faults.examine(fault, limits=False), limits={"step-defect": 5e-15}) for fault in FEW
         )
         clean = Clean(runs=3, verdicts=20, alarms=())
-        faults.record(kept, FaultReport(results=found, clean=clean))
+        faults.keep(kept, FaultReport(results=found, clean=clean))
     return {name: folder / f"{name}.h5" for name in NAMES}
 
 
@@ -480,6 +480,30 @@ def test_the_sliders_change_the_orbit(content: page.Content, opened: Any) -> Non
     assert chromium.run(said) == "h ω = 0.1: explicit Euler spirals out, the two others stay"
 
 
+def test_a_number_is_typed_stands_in_the_address_and_moves_the_mass(
+    content: page.Content, opened: Any, tmp_path: Path
+) -> None:
+    chromium = opened(content)
+    value = 'document.getElementById("show-k").value'
+    chromium.run(f'{value} = "2.5"; document.getElementById("show-k").dispatchEvent(new Event("change")); 0')
+    assert chromium.run("location.hash") == "#k=2.5"
+    assert "h ω = 0.158" in chromium.run('document.getElementById("live-said").textContent')
+    place = 'document.querySelector("#moving rect").getAttribute("x")'
+    first = chromium.run(place)
+    slide = 'document.getElementById("slide-t")'
+    chromium.run(f'{slide}.value = 9; {slide}.dispatchEvent(new Event("input")); 0')
+    assert chromium.run(place) != first
+    assert chromium.run('document.getElementById("show-t").textContent') == "t = 0.9"
+    # a mass below 0 is none
+    chromium.run('document.getElementById("show-m").value = "-1"; 0')
+    chromium.run('document.getElementById("show-m").dispatchEvent(new Event("change")); 0')
+    assert chromium.run('document.getElementById("show-m").value') == "1"
+    chromium.send("Page.reload")
+    while chromium._next().get("method") != "Page.loadEventFired":
+        pass
+    assert chromium.run(value) == "2.5"
+
+
 @pytest.mark.parametrize("zeta", [0.0, 0.3, 1.0, 1.7])
 def test_factors_and_exact_motion_in_the_page_are_those_of_the_library(
     spring: Path, content: page.Content, opened: Any, zeta: float
@@ -489,17 +513,13 @@ def test_factors_and_exact_motion_in_the_page_are_those_of_the_library(
     times = chromium.run(f"exactMotion({{q: 0, p: 1, at: 0, m: 1, k: 1, c: {2 * zeta}}}, [0.5, 7])")
     q, p = exact.true_motion(scene, np.array([1, 14]), 0.5)
     np.testing.assert_allclose(np.array(times).T, [q[:, 0], p[:, 0]], rtol=1e-12, atol=1e-15)
-    for loop, name in LOOPS.items():
+    for name in THREE:
         one = stepped(name, 0.5, 2 * zeta)
         largest = float(np.max(np.abs(np.linalg.eigvals(one))))
-        assert chromium.run(f"radius({loop}, 0.5, {zeta})") == pytest.approx(largest, rel=1e-7)
+        assert chromium.run(f"radius(THREE['{name}'], 0.5, {zeta})") == pytest.approx(largest, rel=1e-7)
 
 
-LOOPS = {
-    "euler": "explicit-euler",
-    "semiImplicitEuler": "semi-implicit-euler",
-    "velocityVerlet": "velocity-verlet",
-}
+THREE = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
 
 DAMPED = """
 title = "damped"
@@ -587,7 +607,7 @@ def test_a_scheme_has_the_colour_that_it_has_in_figures(
             f"[...document.querySelectorAll('{place} .plot')[0].querySelectorAll('.curve')]"
             ".map((x) => getComputedStyle(x).stroke)"
         )
-        for scheme in LOOPS.values():
+        for scheme in THREE:
             shade = looks.ON_SCREEN[looks.look(scheme).color][dark]
             rgb = ", ".join(str(int(shade[i : i + 2], 16)) for i in (1, 3, 5))
             assert f"rgb({rgb})" in drawn_in, (place, scheme)

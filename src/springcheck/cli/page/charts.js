@@ -7,7 +7,7 @@ let clips = 0;
 class Chart {
   // spec: {title, x, y, curves, tiles, rules, equal, times, most}; `looks` of its curves by name, `isOn` of a name
   constructor(place, spec, looks, isOn) {
-    Object.assign(this, { spec, looks, isOn, view: null, at: null });
+    Object.assign(this, { spec, looks, isOn, view: null, at: null, dots: [] });
     const figure = html("figure"), caption = html("figcaption", spec.title), tools = html("div");
     this.box = html("div");
     this.box.className = "plot";

@@ -1,64 +1,45 @@
 "use strict";
-// The three loops, in the order of operations of the methods named: JavaScript's numbers are IEEE doubles.
-// Each takes (q, p) one step on and returns it; `s` is {h, k, m, at} and, beside the stored runs, friction c.
+// Steps in the order of operations of the methods named: JavaScript's numbers are IEEE doubles.  `s` is
+// {h, k, m, c} and the force f - k q - c p/m, or -k (q - at) - c p/m of a wall spring.
 
-function force(s, q, p) {
-  const spring = -s.k * (q - s.at);
-  return s.c ? spring - (s.c * p) / s.m : spring;
-}
-
-function euler() {
-  return (s, q, p) => [q + (p / s.m) * s.h, p + force(s, q, p) * s.h];
-}
-
-function semiImplicitEuler() {
-  return (s, q, p) => {
-    const next = p + force(s, q, p) * s.h;
-    return [q + (next / s.m) * s.h, next];
-  };
-}
-
-function velocityVerlet() {
-  return (s, q, p) => {
-    const x = 0.5 * s.h;
-    const half = p + force(s, q, p) * x;
-    const moved = q + (half / s.m) * s.h;
-    return [moved, half + force(s, moved, half) * x];
-  };
-}
+const THREE = {
+  "explicit-euler": { a: [[]], b: [1] },
+  "semi-implicit-euler": [["kick", 1], ["drift", 1]],
+  "velocity-verlet": [["kick", 0.5], ["drift", 1], ["kick", 0.5]],
+};
 
 // ASE multiplies by the step before it divides by the mass, and keeps a force for positions within 1e-15
-function aseVelocityVerlet() {
+function aseVelocityVerlet(s) {
   let where = NaN, kept = NaN;
-  const forceAt = (s, q) => {
+  const forceAt = (q) => {
     if (!(Math.abs(q - where) <= 1e-15)) {
       where = q;
       kept = -s.k * (q - s.at);
     }
     return kept;
   };
-  return (s, q, p) => {
+  return (q, p) => {
     const x = 0.5 * s.h;
-    const half = p + x * forceAt(s, q);
+    const half = p + x * forceAt(q);
     const moved = q + (s.h * half) / s.m;
-    return [moved, half + x * forceAt(s, moved)];
+    return [moved, half + x * forceAt(moved)];
   };
 }
 
 const LOOPS = {
-  "own:euler": euler,
-  "own:semi-implicit-euler": semiImplicitEuler,
-  "own:velocity-verlet": velocityVerlet,
+  "own:euler": (s) => stepper(THREE["explicit-euler"], s),
+  "own:semi-implicit-euler": (s) => stepper(THREE["semi-implicit-euler"], s),
+  "own:velocity-verlet": (s) => stepper(THREE["velocity-verlet"], s),
   "ase:velocity-verlet": aseVelocityVerlet,
 };
 
 // The first frame in which a stored run is not what its loop gives here, to the last bit; null where none is.
 function firstDifference(run, spring) {
-  const step = LOOPS[run.label](), s = { ...spring, h: run.step };
+  const step = LOOPS[run.label]({ ...spring, h: run.step });
   let q = spring.q, p = spring.p;
   for (let i = 0; i < run.t.length; i++) {
     if (i > 0) {
-      for (let j = 0; j < run.every; j++) [q, p] = step(s, q, p);
+      for (let j = 0; j < run.every; j++) [q, p] = step(q, p);
     }
     if (!Object.is(q, run.q[i]) || !Object.is(p, run.p[i])) {
       return { frame: i, t: run.t[i], q, p, fileQ: run.q[i], fileP: run.p[i] };
@@ -67,10 +48,10 @@ function firstDifference(run, spring) {
   return null;
 }
 
-// Spectral radius of a loop's one-step matrix at h omega = w and damping ratio c / (2 sqrt(k m)) = zeta.
-function radius(loop, w, zeta) {
-  const s = { h: w, k: 1, m: 1, at: 0, c: 2 * zeta };
-  const [a, c] = loop()(s, 1, 0), [b, d] = loop()(s, 0, 1);
+// Spectral radius of a scheme's one-step matrix at h omega = w and damping ratio c / (2 sqrt(k m)) = zeta.
+function radius(law, w, zeta) {
+  const step = stepper(law, { h: w, k: 1, m: 1, at: 0, c: 2 * zeta });
+  const [a, c] = step(1, 0), [b, d] = step(0, 1);
   const half = (a + d) / 2, rest = half * half - (a * d - b * c);
   return rest < 0 ? Math.sqrt(a * d - b * c) : Math.abs(half) + Math.sqrt(rest);
 }
@@ -88,18 +69,19 @@ function exactMotion(s, times) {
   });
 }
 
-// One step of any scheme that the data describes, for one particle in the force f - k q - c p/m.
+// One step of any scheme that the data describes, for one particle.
 function stepper(law, s) {
-  const { h, k, f, c, m } = s, force = (q, p) => f - k * q - (c * p) / m;
+  const { h, k, f, c, m, at } = s, pull = (q) => (at === undefined ? f - k * q : -k * (q - at));
+  const force = (q, p) => (c ? pull(q) - (c * p) / m : pull(q));
   if (Array.isArray(law)) {
     return (q, p) => {
       let last = 0;
       for (const [kind, part] of law) {
         const x = part * h;
-        if (kind === "drift") q += (x * p) / m;
+        if (kind === "drift") q += (p / m) * x;
         else if (kind === "friction") p *= Math.exp((-x * c) / m);
         else if (kind === "implicit-friction") p /= 1 + (x * c) / m;
-        else p += x * (last = kind === "held" ? last : kind === "pull" ? force(q, 0) : force(q, p));
+        else p += x * (last = kind === "held" ? last : kind === "pull" ? pull(q) : force(q, p));
       }
       return [q, p];
     };
@@ -111,7 +93,7 @@ function stepper(law, s) {
       let [Q, P] = [sum(q, row, speeds), sum(p, row, forces)];
       const x = (row[i] || 0) * h;
       // an implicit stage: Q = q + x P/m, P = p + x F(Q, P)
-      if (x) P = (P + x * (f - k * Q)) / (1 + (x * c) / m + (x * x * k) / m);
+      if (x) P = (P + x * pull(Q)) / (1 + (x * c) / m + (x * x * k) / m);
       Q += (x * P) / m;
       forces.push(force(Q, P));
       speeds.push(P / m);

@@ -115,60 +115,101 @@ function counted() {
 }
 
 const TRIED = [
-  ["explicit Euler", euler, "explicit-euler"],
-  ["semi-implicit Euler", semiImplicitEuler, "semi-implicit-euler"],
-  ["velocity Verlet", velocityVerlet, "velocity-verlet"],
+  ["explicit Euler", "explicit-euler"], ["semi-implicit Euler", "semi-implicit-euler"], ["velocity Verlet", "velocity-verlet"],
 ];
 const EXACT = "exact";
 const RANGE = 200;
 
 function live() {
   if (!DATA.spring) return;
-  const own = { ...DATA.spring, c: 0 }, now = { ...own };
-  document.getElementById("live").hidden = false;
+  const own = { ...DATA.spring, c: 0 }, now = { ...own }, by = (id) => document.getElementById(id);
+  by("live").hidden = false;
   const omega = Math.sqrt(Math.abs(own.k) / own.m) || 1;
-  const sign = Math.sign(own.h);
   const most = Math.max(3 / omega, 2 * Math.abs(own.h)), least = Math.min(0.01 / omega, Math.abs(own.h) / 2);
   const start = Math.abs(own.p) || Math.abs(own.q - own.at) * own.m * omega || 1;
   const log = (low, high, s) => (u) => s * low * (high / low) ** u;
   const sliders = {
-    h: log(least, most, sign),
+    h: log(least, most, Math.sign(own.h)),
     k: log(Math.abs(own.k) / 10 || 0.1, Math.abs(own.k) * 10 || 10, Math.sign(own.k) || 1),
     m: log(own.m / 10, own.m * 10, 1),
     p: (u) => (2 * u - 1) * 3 * start,
     c: (u) => u * 3 * own.m * omega,
   };
-  const inputs = {};
-  const put = (name) => {
-    // where the slider stands for the scene's own number
-    let best = 0;
-    for (let i = 0; i <= RANGE; i++) {
-      if (Math.abs(sliders[name](i / RANGE) - own[name]) < Math.abs(sliders[name](best / RANGE) - own[name])) best = i;
-    }
-    inputs[name].value = best;
-    now[name] = own[name];
+  const right = { h: (v) => v !== 0, m: (v) => v > 0, c: (v) => v >= 0 };
+  // the slider stands where it is nearest
+  const put = (name, value) => {
+    if (!Number.isFinite(value) || (right[name] && !right[name](value))) return;
+    const places = Array.from({ length: RANGE + 1 }, (_, i) => Math.abs(sliders[name](i / RANGE) - value));
+    by(`slide-${name}`).value = places.indexOf(Math.min(...places));
+    now[name] = value;
   };
+  const asked = new URLSearchParams(location.hash.slice(1));
+  let charts = tried(now);
+  const bank = new Bank(by("orbits"), { title: "Drawn", on: [...TRIED.map(([name]) => name), EXACT], charts });
+  const show = () => {
+    charts = tried(now);
+    charts.forEach((chart, i) => bank.charts[i].show(chart));
+    said(now, sliders);
+    const changed = Object.keys(sliders).filter((name) => now[name] !== own[name]).map((name) => [name, now[name]]);
+    if (changed.length || asked.size) history.replaceState(null, "", `#${new URLSearchParams(changed)}`);
+    move();
+  };
+  const move = () => moving(now, bank.charts[0], Number(by("slide-t").value));
   for (const name of Object.keys(sliders)) {
-    const input = document.getElementById(`slide-${name}`);
+    const input = by(`slide-${name}`), field = by(`show-${name}`);
     Object.assign(input, { min: 0, max: RANGE, step: 1 });
-    inputs[name] = input;
-    put(name);
+    put(name, own[name]);
+    if (asked.has(name)) put(name, Number(asked.get(name)));
     input.addEventListener("input", () => {
       now[name] = sliders[name](Number(input.value) / RANGE);
       show();
     });
+    field.addEventListener("change", () => {
+      put(name, field.valueAsNumber);
+      show();
+    });
   }
-  document.getElementById("reset").addEventListener("click", () => {
-    Object.keys(sliders).forEach(put);
+  by("slide-t").max = charts[0].curves[1].x.length - 1;
+  by("slide-t").addEventListener("input", move);
+  by("play").addEventListener("click", () => {
+    const began = performance.now(), from = Number(by("slide-t").value) % Number(by("slide-t").max);
+    const next = (time) => {
+      // twenty steps a second
+      const step = Math.min(Number(by("slide-t").max), from + Math.round((time - began) / 50));
+      by("slide-t").value = step;
+      move();
+      if (step < Number(by("slide-t").max)) requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+  });
+  by("reset").addEventListener("click", () => {
+    for (const name of Object.keys(sliders)) put(name, own[name]);
     show();
   });
-  const names = [...TRIED.map(([name]) => name), EXACT];
-  const bank = new Bank(document.getElementById("orbits"), { title: "Drawn", on: names, charts: tried(now) });
-  const show = () => {
-    tried(now).forEach((chart, i) => bank.charts[i].show(chart));
-    said(now, inputs);
-  };
-  said(now, inputs);
+  show();
+}
+
+// Mass and spring by each scheme after a step, a row each, and their places on the orbits of the chart.
+function moving(s, chart, step) {
+  const drawn = chart.spec.curves.filter((curve) => curve.group !== EXACT), W = 720, row = 46, left = 14;
+  const size = 1.5 * Math.max(...drawn.map(() => Math.hypot(s.q - s.at, s.p / Math.sqrt(Math.abs(s.k * s.m) || 1)))) || 1;
+  const x = (q) => Math.max(left + 20, Math.min(W - 20, W / 2 + ((q - s.at) / size) * (W / 2 - 60)));
+  const root = element("svg", { viewBox: `0 0 ${W} ${row * drawn.length}`, role: "img", "aria-label": `mass and spring after ${step} steps` });
+  drawn.forEach((curve, j) => {
+    const end = x(curve.x[step]), y = row * j + 30, look = lookOf(curve.group, 0);
+    const turns = Array.from({ length: 13 }, (_, i) => `L${left + ((end - 9 - left) * (i + 0.5)) / 13} ${y + (i % 2 ? 6 : -6)}`);
+    root.append(element("path", { class: "frame", d: `M${left} ${y - 12}V${y + 12}M${left} ${y}${turns.join("")}L${end - 9} ${y}` }));
+    const mass = element("rect", { x: end - 9, y: y - 9, width: 18, height: 18 });
+    mass.style.fill = look.colour;
+    root.append(mass, element("text", { x: left + 4, y: y - 14 }, curve.name));
+    const dot = chart.dots[j] || (chart.dots[j] = element("circle", { r: 5 }));
+    dot.style.fill = look.colour;
+    dot.setAttribute("cx", chart.px(curve.x[step]));
+    dot.setAttribute("cy", chart.py(curve.y[step]));
+    chart.ring.parentNode.append(dot);
+  });
+  document.getElementById("moving").replaceChildren(root);
+  document.getElementById("show-t").textContent = `t = ${number(step * s.h)}`;
 }
 
 // The orbits by these numbers, and by what factor a step multiplies the motion at any h omega.
@@ -181,11 +222,11 @@ function tried(s) {
   const exact = bound ? exactMotion(s, times) : [];
   const orbits = [curveOf(EXACT, EXACT, exact.map(([q]) => q), exact.map(([, p]) => p), { notes: times.map((t) => `t ${t}`) })];
   const far = [];
-  for (const [name, loop, group] of TRIED) {
-    const step = loop(), x = [s.q], y = [s.p];
+  for (const [name, group] of TRIED) {
+    const step = stepper(THREE[group], s), x = [s.q], y = [s.p];
     let q = s.q, p = s.p;
     for (let i = 0; i < steps; i++) {
-      [q, p] = step(s, q, p);
+      [q, p] = step(q, p);
       x.push(q);
       y.push(p);
     }
@@ -195,11 +236,11 @@ function tried(s) {
   const range = (at, size) => ({ ...PLAIN, shown: [at - 4 * size, at + 4 * size] });
   const zeta = s.k > 0 ? Math.sign(s.h) * s.c / (2 * Math.sqrt(s.k * s.m)) : 0;
   const ws = Array.from({ length: 301 }, (_, i) => i / 100);
-  const radii = TRIED.map(([name, loop, group]) => curveOf(name, group, ws, ws.map((w) => radius(loop, w, zeta))));
+  const radii = TRIED.map(([name, group]) => curveOf(name, group, ws, ws.map((w) => radius(THREE[group], w, zeta))));
   const here = s.k > 0 ? [{ axis: "x", at: Math.abs(s.h) * Math.sqrt(omega2), name: "here", look: "here" }] : [];
   return [
     plain(`Momentum over position, ${steps} steps.${beyond(far)}`, "q", "p", orbits, {
-      x: { ...range(s.at, a), name: "q" }, y: { ...range(0, b), name: "p" },
+      x: { ...range(s.at, a), name: "q" }, y: { ...range(0, b), name: "p" }, equal: DATA.equal && a < 3 * b && b < 3 * a,
     }),
     plain("Factor by which one step multiplies the motion; above 1 it explodes.", "h \u03c9", "factor a step", radii, {
       x: { ...PLAIN, name: "h \u03c9", shown: [0, 3] }, y: { ...PLAIN, name: "factor a step", shown: [0, 3] },
@@ -208,10 +249,10 @@ function tried(s) {
   ];
 }
 
-function said(s, inputs) {
-  for (const [name, input] of Object.entries(inputs)) {
-    document.getElementById(`show-${name}`).textContent = number(s[name]);
-    input.setAttribute("aria-valuetext", number(s[name]));
+function said(s, sliders) {
+  for (const name of Object.keys(sliders)) {
+    document.getElementById(`show-${name}`).value = number(s[name], 6);
+    document.getElementById(`slide-${name}`).setAttribute("aria-valuetext", number(s[name]));
   }
   const size = s.k > 0 ? Math.abs(s.h) * Math.sqrt(s.k / s.m) : NaN;
   const place = document.getElementById("live-said");
@@ -221,8 +262,8 @@ function said(s, inputs) {
       : size > 2 ? "beyond 2, all three explode" : "the limit itself");
   } else {
     const zeta = s.c / (2 * Math.sqrt(s.k * s.m));
-    const each = TRIED.map(([name, loop]) => {
-      const factor = radius(loop, size, Math.sign(s.h) * zeta);
+    const each = TRIED.map(([name, group]) => {
+      const factor = radius(THREE[group], size, Math.sign(s.h) * zeta);
       return `${name} ${factor > 1 ? "explodes" : "decays"} by a factor ${number(factor, 4)} a step`;
     });
     place.textContent = `h \u03c9 = ${number(size)}, damping ratio ${number(zeta)}: ${each.join(", ")}`;

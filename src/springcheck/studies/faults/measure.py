@@ -254,9 +254,14 @@ def record(path: str | Path | None, **how: Unpack[How]) -> FaultReport:
     command = keeper.command("faults", list(map(engines.parse, labels)))
     with keeper.kept(path, command, **how) as kept:
         found = study(driver.run, labels, kept=kept)
-        kept.keep(SEEN, "limits", seen(found))
-        kept.commit("faults", found.document())
+        keep(kept, found)
     return found
+
+
+def keep(kept: Keeper, found: FaultReport) -> None:
+    """Keep a study in a store."""
+    kept.keep(SEEN, "limits", seen(found))
+    kept.commit("faults", found.document())
 
 
 @keeper.restoring("faults")
