@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2406,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 3956,
-    ("identify",): 7545,
+    ("identify",): 7607,
     ("formats", "store"): 4937,
     ("studies",): 1601,
     ("studies/*",): 9896,

@@ -71,3 +71,27 @@ def test_a_drive_of_two_frequencies_is_given_no_scheme() -> None:
     both: Any = Drive(i=ONE, amplitude=np.array([0.3]), frequency=np.array([7.1]), phase=np.array([0.2]))
     why = said(replace(scene, terms=(*scene.terms, both)), "own:velocity-verlet", mass=3.7, stiffness=2.9)
     assert " by " not in why.partition("each frame")[2]
+
+
+@pytest.mark.parametrize(("name", "label"), [("boris", "own:boris"), ("rk4", "own:rk4")])
+def test_a_spring_in_a_field_is_told_by_the_turn_of_its_velocity(name: str, label: str) -> None:
+    scene = scenes.load_scene("foucault")
+    why = said(scene, label, mass=1.7, stiffness=2.9)
+    angle = float(why.partition("turns by ")[2].partition(" in")[0])
+    assert angle == pytest.approx(-2 * np.arctan(0.37 / 1.7 * 0.1 / 2), rel=1e-4)
+    assert ("strength over mass 0.217647059, stiffness over mass 1.70588235" in why) == (name == "boris")
+
+
+def test_a_charge_in_a_field_alone_is_told_as_a_rotation() -> None:
+    run = springcheck.simulate(scenes.load_scene("magnetic"), "own:boris")
+    found = springcheck.identify(run.t, run.q, run.p, mass=1.7)
+    assert found.scheme is None
+    assert "as of a charge in a magnetic field (Boris)" in found.statement
+
+
+def test_springs_that_couple_two_axes_are_no_field() -> None:
+    """The same size of coupling, symmetric: real in the normal modes."""
+    scene = scenes.load_scene("chain")
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    found = springcheck.identify(run.t, run.q[:, :2], run.p[:, :2], mass=scene.m[:2])
+    assert "magnetic" not in found.statement

@@ -12,6 +12,7 @@ from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched
 from springcheck.identify.families import title
+from springcheck.identify.field import of_plane
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Terms, distinct
 from springcheck.identify.interrupted import few_bad_frames
@@ -133,6 +134,8 @@ def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
     def look(e: Evidence) -> list[Explanation]:
         if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
             return []
+        if turned_by := of_plane(e.record, maps):
+            return turned_by
         others = np.concatenate([m.z[:-1].astype(np.float64) for m in maps], axis=1)
         share = _left(others, e.misses)
         if share > 0.3:

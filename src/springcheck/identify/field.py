@@ -1,0 +1,59 @@
+"""Two coordinates that turn into each other: a magnetic field across their plane, or a turning frame.
+
+With z = x + i y, on springs alike along both axes, a frame takes (z, z') to A (z, z') with a complex A, where
+without a field A is real.  Its determinant is turned by the angle at which the field turns a velocity.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.identify.fit import Map
+from springcheck.identify.record import Record
+from springcheck.identify.result import Explanation
+
+LEFT = 1e-9
+"""Of the states' size, what a right complex map leaves over at most, the roundings of a long motion in it."""
+
+BORIS_AGREES = 1e-10
+"""Share of the largest entry by which Boris' map may miss the measured one."""
+
+
+def of_plane(record: Record, maps: list[Map]) -> list[Explanation]:
+    """What turns the two coordinates of these maps into each other, if that is all that couples them."""
+    if len(maps) != 2 or len(maps[0].z) != len(maps[1].z):
+        return []
+    x, y = ((one.z * one.size).astype(np.float64) for one in maps)
+    z = x + 1j * y
+    rows, *_ = np.linalg.lstsq(z[:-1], z[1:])
+    size = np.max(np.abs(z), axis=0)
+    off = np.max(np.abs(z[1:] - z[:-1] @ rows) / size)
+    entries = np.asarray(rows.T, np.complex128)
+    if off > LEFT or np.max(np.abs(entries.imag) * size / size[:, None]) < LEFT:
+        return []
+    interval = abs(float(record.interval))
+    angle = cmath.phase(complex(np.linalg.det(entries)))
+    cause = (
+        f"The velocity turns by {angle:.9g} in each frame beside what springs alike along both axes do: a "
+        "magnetic field across the plane, or Coriolis' force in a turning frame"
+    )
+    half = math.tan(-angle / 2)
+    turn = cmath.exp(1j * angle)
+    stiff = (-2 * entries[1, 0] / (1 + turn)).real
+    boris = _boris(stiff, turn)
+    if np.max(np.abs(boris - entries)) <= BORIS_AGREES * np.max(np.abs(entries)):
+        cause += (
+            f". By Boris, if every step was recorded: strength over mass {2 * half / interval:.9g}, "
+            f"stiffness over mass {stiff / interval**2:.9g}"
+        )
+    return [Explanation(cause=cause, remedy="judge it against a scene with [[magnetic]]", misfit=float(off))]
+
+
+def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:
+    """Its map of (z, z' h) by (h w)**2 and the factor exp(-2 i atan(W h/2)) of the velocity."""
+    drift, kick = np.array([[1, 0.5], [0, 1]]), np.array([[1, 0], [-stiff / 2, 1]])
+    return np.asarray(drift @ kick @ np.diag([1, turn]) @ kick @ drift, np.complex128)
