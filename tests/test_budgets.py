@@ -18,10 +18,10 @@ BUDGETS = {
     ("engines",): 2406,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 3956,
-    ("identify",): 7607,
+    ("identify",): 7663,
     ("formats", "store"): 4937,
     ("studies",): 1601,
-    ("studies/*",): 9896,
+    ("studies/*",): 9897,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5624,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

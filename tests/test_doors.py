@@ -78,6 +78,9 @@ def test_a_wrong_function_runs_among_the_engines_without_a_name(
     # nothing of it failed, and nothing of its scheme was judged
     assert found["status"] == 2
     assert all(v["passed"] is not False for v in found["verdicts"])
+    assert main(["run", "spring", "--method", "own:euler", "--stepper", "mine.py:leapfrog", "--force"]) == 2
+    said = " ".join(capsys.readouterr().out.split())
+    assert "springcheck identify FILE --trajectory stepper:leapfrog looks for it" in said
     assert main(["plot", "spring-uneven.h5", "--quiet"]) == 0
 
 

@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from springcheck.errors import IdentificationError
-from springcheck.identify import Identification, identify
+from springcheck.errors import IdentificationError, MethodError
+from springcheck.identify import Identification, identify, identify_stepper
 
 M, K, H = 3.7, 2.9, 0.1
 STATED = {"mass": M, "stiffness": K}
@@ -608,3 +608,55 @@ def test_friction_of_the_half_steps_velocity_is_named_by_its_first_step_too(stri
     assert not wrong.fits
     assert "frame 0 does not belong to it" in wrong.statement
     assert "BBK" not in wrong.statement
+
+
+@pytest.mark.parametrize(
+    ("there", "stated", "said"),
+    [
+        (0.08, 0.02, "friction 4 to 4.0"),
+        (0.08, 0.0, "with a friction, c = 0.08 to 0.08"),
+        (0.0, 1.0, "without friction, where c = 1 is stated"),
+        (0.08, 0.08, ""),
+    ],
+)
+def test_a_stated_friction_that_does_not_fit_stands_in_the_first_sentence(
+    there: float, stated: float, said: str
+) -> None:
+    q, v, frames = 0.3, 0.19, [(0.3, 0.19)]
+    for _ in range(300):
+        v = (v - H / 2 * K / M * q) * np.exp(-there / M * H)
+        q = q + H * v
+        v = v - H / 2 * K / M * q
+        frames.append((q, v))
+    q_all, v_all = np.array(frames).T
+    found = identify(H * np.arange(301), q_all, v=v_all, **STATED, friction=stated)
+    assert found.scheme == "velocity-verlet"
+    assert found.fits == (not said)
+    assert found.statement.startswith("Velocity Verlet, but " if said else "Velocity Verlet with exponential")
+    assert said in found.statement
+    assert str(found).startswith(f"the states: {found.statement[:40]}" if said else "the states: velocity")
+
+
+def test_velocities_that_follow_from_positions_alone_are_called_that() -> None:
+    t, q, _ = march(verlet(lambda i, q, p: -K * q))
+    for v, said in ((0 * q, "do not change"), (0.5 * q, "0.5 times its positions")):
+        with pytest.raises(IdentificationError, match=said):
+            identify(t, q, v=v)
+    with pytest.raises(IdentificationError, match="one exponential, as of an overdamped motion"):
+        identify(t, np.exp(-0.3 * t), v=-0.3 * np.exp(-0.3 * t))
+
+
+def test_a_stepper_that_fails_names_its_line_and_one_of_arrays_is_taken() -> None:
+    def fails(q: float, p: float, h: float, force: Callable[..., float], mass: float) -> tuple[float, float]:
+        return {"q": q}["x"], p
+
+    def of_arrays(q: np.ndarray, p: np.ndarray, h: float, force: Callable[..., float], mass: float) -> object:
+        if not isinstance(q, np.ndarray):
+            raise ValueError("arrays alone")
+        p = p + h * force(q)
+        return q + h * p / mass, p
+
+    where = re.escape(f"KeyError: 'x' (test_identify_hard.py, line {fails.__code__.co_firstlineno + 1})")
+    with pytest.raises(MethodError, match=where):
+        identify_stepper(fails)
+    assert identify_stepper(of_arrays).scheme == "semi-implicit-euler"

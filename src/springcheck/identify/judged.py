@@ -44,6 +44,8 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
             raise IdentificationError(
                 f"no force acts on oscillator {j}: every scheme moves it in a straight line"
             )
+        if proportion := _proportional(record, lost[0]):
+            raise IdentificationError(f"the velocities of oscillator {lost[0]} {proportion}")
         raise IdentificationError(
             f"the states of oscillator {lost[0]} do not span its plane (a standing state, or whole or half "
             "periods between frames, or an arc shorter than the rounding): record more of the motion"
@@ -53,6 +55,30 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     if lost:
         notes.append(f"{_names(lost)} shows too little of its motion to be judged, and is left out")
     return record, good, [maps[j] for j in good], notes
+
+
+ALIKE = 1e-9
+"""Share of a motion's size that velocities may differ by from a multiple of the positions."""
+
+
+def _proportional(record: Record, j: int) -> str:
+    """What is the matter where the velocities follow from the positions alone, in more frames than an arc of
+    few roundings shows; "" where they do not."""
+    q, v = (x[:, j].astype(np.float64) for x in (record.q, record.v))
+    q, v = q - np.mean(q), v - np.mean(v)
+    size = float(np.max(np.abs(q)))
+    coarse = max(float(np.max(record.q_quantum[:, j])), ROUNDING * float(np.max(np.abs(record.q[:, j]))))
+    if size * ALIKE < coarse or not size:
+        return ""
+    slope = float(q @ v / (q @ q))
+    if np.max(np.abs(v)) * abs(float(record.interval)) <= ALIKE * size:
+        return "do not change while its positions do: look at what is written as velocity"
+    if np.max(np.abs(v - slope * q)) > ALIKE * abs(slope) * size:
+        return ""
+    return (
+        f"are {slope:.6g} times its positions, but for a constant: one exponential, as of an overdamped "
+        "motion, half periods between frames, or velocities made from positions; they show no scheme"
+    )
 
 
 def _names(which: list[int]) -> str:

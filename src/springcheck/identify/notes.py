@@ -97,6 +97,32 @@ def beside_unknown(found: Identification, *, deep: bool = False) -> Identificati
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 
 
+def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
+    """What was found, where the stated friction c [M/T] is that of no law: one of another size, or none."""
+    rates = sorted(mass * x.friction[0] for x in found.candidates)
+    whose = either(list(dict.fromkeys(title(x.scheme) for x in found.candidates))[:4])
+    low, high = rates[0], rates[-1]
+    if not (low or high):
+        cause = f"{whose}, but without friction, where c = {stated:g} is stated"
+    elif not stated:
+        cause = f"{whose}, but with a friction, c = {_between(low, high)} where 0 is stated"
+    else:
+        share = _between(*sorted((low / stated, high / stated)))
+        cause = f"{whose}, but with a friction {share} times the stated"
+    remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
+    wrong = Explanation(cause=cause, remedy=remedy, misfit=0.0)
+    notes = (*found.notes, "the stated friction does not fit by any of the laws that are known")
+    statement = found.statement if found.explanations else cause
+    return replace(found, statement=statement, explanations=(*found.explanations, wrong), notes=notes)
+
+
+def _between(low: float, high: float) -> str:
+    """One number, or the ends of those that laws of friction give."""
+    if abs(high - low) <= 1e-6 * abs(high):
+        return f"{high:.6g}"
+    return f"{low:.5g} to {high:.5g} (by its law)"
+
+
 def of_unasked_friction(found: Identification) -> Identification:
     """What was found, where the friction is that of a scheme written down wrongly: h k/(n m), n whole.
 

@@ -33,6 +33,7 @@ from springcheck.identify.notes import (
     beside_unknown,
     hidden_friction,
     of_few,
+    of_stated_friction,
     of_unasked_friction,
     same_maps,
     untold,
@@ -170,8 +171,7 @@ def _of_record(
         precisions = {x: ds[0].precision for x, ds in explained.items()}
         joints = of_stated_stiffness(record, moving, precisions, stated)
     if stride is not None and stride > 0:
-        # a step that divides the interval leaves the flow and schemes of that stride
-        agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]
+        agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
         joints, stated_fits = agreeing or joints, bool(agreeing)
     else:
         stated_fits = stride is None
@@ -181,17 +181,17 @@ def _of_record(
     if friction is not None:
         of_rate = [x for x in joints if candidates_of(record, moving, x, friction)]
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
-        notes += [] if of_rate else ["the stated friction does not fit by any of the laws that are known"]
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
     found = beside_unknown(found, deep=record.deep) if stride is None else found
+    if asked is not None and friction is None and record.mass is not None:
+        found = of_stated_friction(found, asked, float(record.mass[moving[0]]))
     if stated is None:
         return of_rotation(record, moving, found)
     found = of_unasked_friction(found) if friction is None else found
-    unlike = found.explanations and found.candidates
     of = record, moving[0], maps[0], base[0], float(stated[moving[0]]), asked
-    faults = faults_of(*of) if unlike else []
+    faults = faults_of(*of) if found.explanations and found.candidates else []
     if faults:
         # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
         return replace(

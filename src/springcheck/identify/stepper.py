@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.errors import IdentificationError, MethodError
+from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
@@ -51,16 +51,20 @@ def _one(
     try:
         try:
             out = step(q, p, h, force, mass)
-        except (TypeError, IndexError, AttributeError):
-            out = step(np.array([q]), np.array([p]), h, force, np.array([mass]))
+        except Exception as first:
+            try:
+                out = step(np.array([q]), np.array([p]), h, force, np.array([mass]))
+            except Exception:
+                raise first from None
         new_q, new_p = out
         q, p = (
             float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
             for x in (new_q, new_p)
         )
     except (Exception, SystemExit) as error:
+        file = getattr(getattr(step, "__code__", None), "co_filename", "")
         raise MethodError(
-            f"the stepper failed at q={q:.6g}, p={p:.6g}, h={h:.6g}: {type(error).__name__}: {error}; "
+            f"the stepper failed at q={q:.6g}, p={p:.6g}, h={h:.6g}: {told(error, file)}; "
             "it is called as step(q, p, h, force, mass) and returns (q, p)"
         ) from error
     if not (math.isfinite(q) and math.isfinite(p)):

@@ -289,9 +289,10 @@ def unjudged(verdicts: Sequence[Verdict]) -> Lines:
         why = dict.fromkeys(
             v.why for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING
         )
-        out.append(
-            plain(f"not judged: {method}: nothing that applied could tell ({'; '.join(why)})", "bold yellow")
-        )
+        line = f"not judged: {method}: nothing that applied could tell ({'; '.join(why)})"
+        if any("--scheme NAME states it" in x for x in why):
+            line += f"; springcheck identify FILE --trajectory {method} looks for it"
+        out.append(plain(line, "bold yellow"))
     return out
 
 
