@@ -254,3 +254,22 @@ def test_the_report_page_shows_an_ensemble_of_two_fields_as_maps_of_powers_of_te
             words = chart.tiles.kinds[kind][0].replace("below", "0 to").replace("and above", "to inf")
             low, high = map(float, words.split(" to "))
             assert low <= number <= high
+
+
+def test_a_figure_says_what_was_found_and_where_the_limit_is() -> None:
+    import springcheck
+
+    two = ["own:euler", "own:velocity-verlet"]
+    found = springcheck.ensemble("spring", {"time.step": "0.5:2.5:9"}, two)
+    figure = found.figures()["ensemble-max_error"]
+    assert figure.get_suptitle() == "largest error over step h; own:velocity-verlet has the smallest"
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "step h"
+    limit = next(line for line in axes.lines if line.get_color() == "#b00020")
+    assert list(limit.get_xdata()) == [2, 2], "of a spring and a mass of 1"
+    grid = springcheck.ensemble(
+        "spring", {"spring.0.stiffness": [1, 9, 25], "time.step": [0.1, 0.5, 0.9]}, two
+    )
+    curve = grid.figures()["ensemble-max_error"].axes[0].lines[0]
+    k, h = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    np.testing.assert_allclose(h * np.sqrt(k), 2, rtol=1e-12)

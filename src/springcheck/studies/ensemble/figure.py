@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from springcheck.figures import looks, overlay
+from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
 from springcheck.studies.ensemble.measure import OUTCOMES
 from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.ensemble.shown import (
@@ -45,8 +49,75 @@ def pictures(found: Ensemble, *, quantity: str | None = None, over: str | None =
         shown = dict(parts(found, choice))
         if shown:
             fields = "" if over is None else "-over-" + "-".join(choice.over)
-            out[f"ensemble-{choice.quantity}{fields}"] = picture(shown, choice)
+            out[f"ensemble-{choice.quantity}{fields}"] = drawn = picture(shown, choice)
+            _say(drawn, found, shown, choice)
     return out
+
+
+WORDS = {
+    "stiffness": ("stiffness k", {"md": "kJ/mol/nm2", "si": "N/m"}),
+    "mass": ("mass m", {"md": "u", "si": "kg"}),
+    "step": ("step h", {"md": "ps", "si": "s"}),
+    "steps": ("number of steps", {}),
+}  # fmt: skip
+"""The last part of a field's name in words, and its unit."""
+
+
+def named(field: str, scene: Scene) -> str:
+    """A field as an axis names it: "spring.0.stiffness" is the stiffness k of spring 0."""
+    *table, last = field.split(".")
+    words, of = WORDS.get(last, (last, {}))
+    whose = f" of {' '.join(table)}" if table and table[-1].isdigit() else ""
+    return with_unit(f"{words}{whose}", of.get(scene.units, ""))
+
+
+def _say(figure: Figure, found: Ensemble, shown: Mapping[str, Line | Map], choice: Choice) -> None:
+    """Words for the axes, the finding as the title, and the limit h omega = 2 of one spring."""
+    scene, panels = (
+        found.scene,
+        figure.axes[: len(shown) if isinstance(next(iter(shown.values())), Map) else 1],
+    )
+    if isinstance(next(iter(shown.values())), Map):
+        figure.supxlabel(named(choice.over[0], scene), fontsize=9)
+        figure.supylabel(named(choice.over[1], scene), fontsize=9)
+    else:
+        panels[0].set_xlabel(named(choice.over[0], scene))
+    typical = {x: float(np.nanmedian(y.y if isinstance(y, Line) else y.values)) for x, y in shown.items()}
+    best = min(typical, key=lambda x: abs(typical[x]))
+    said = f"; {best} has the smallest" if len(shown) > 1 and choice.quantity in SIZES else ""
+    over = " and ".join(named(x, scene) for x in choice.over)
+    parts = [f"{TITLES[choice.quantity].partition(',')[0]} over {over}{said}", figure.get_suptitle()]
+    overlay.heading(figure, "; ".join(filter(None, parts)), 100)
+    walls = [term for term in scene.terms if isinstance(term, WallSpring)]
+    if scene.n > 1 or len(scene.terms) != 1 or not walls or len(walls[0]) != 1 or not walls[0].k[0] > 0:
+        return
+    m, k, h = float(scene.m[0]), float(walls[0].k[0]), abs(scene.step)
+    limits = {"spring.0.stiffness": 4 * m / h**2, "time.step": 2 * np.sqrt(m / k)}
+    how: Any = {"color": "#b00020", "linestyle": (0, (4, 2)), "linewidth": 1.0}
+    for axes in panels:
+        low, high = axes.get_xlim()
+        if set(choice.over) == set(limits):
+            # a linear axis begins below the first cell, perhaps below 0
+            few, most = axes.get_xlim() if choice.over[0] != "time.step" else axes.get_ylim()
+            ks = np.geomspace(max(few, 1e-3 * most), most, 200)
+            across = (ks, 2 * np.sqrt(m / ks))
+            with _kept(axes):
+                axes.plot(*(across if choice.over[0] != "time.step" else across[::-1]), **how)
+            axes.annotate("h ω = 2", (0.98, 0.9), xycoords="axes fraction",
+                          ha="right", fontsize=7.5, color=how["color"])  # fmt: skip
+        elif len(choice.over) == 1 and low < limits.get(choice.over[0], np.inf) < high:
+            axes.axvline(limits[choice.over[0]], **how)
+            axes.annotate("h ω = 2", (limits[choice.over[0]], 0.97), xytext=(3, -4),
+                          xycoords=("data", "axes fraction"), textcoords="offset points", fontsize=7.5,
+                          color=how["color"])  # fmt: skip
+
+
+@contextmanager
+def _kept(axes: Axes) -> Iterator[None]:
+    """Draw without another range of the axes."""
+    x, y = axes.get_xlim(), axes.get_ylim()
+    yield
+    axes.set(xlim=x, ylim=y)
 
 
 def picture(shown: Mapping[str, Line | Map], choice: Choice) -> Figure:
