@@ -38,7 +38,7 @@ def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) ->
 
 def test_every_check_rejects_a_fault_that_it_must_reject() -> None:
     named = {check for fault in FAULTS for check in fault.caught_by}
-    assert named == {check.name for check in checks.ALL} | set(baths.CHECKS)
+    assert named == {check.name for check in checks.ALL} | set(baths.OF_THERMOSTATS)
 
 
 def test_there_are_at_least_thirty_faults_of_different_names() -> None:

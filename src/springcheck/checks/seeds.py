@@ -17,12 +17,12 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, SMALLEST, law_of
+from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, SMALLEST, law_of, read
 
 FEW = 8
 """Particles up to which each is pushed by itself."""
 
-LONG, UNLIKELY = 10_000, 1e-9
+LONGEST_WAIT, NONE_LEFT = 10_000, 1e-9
 """Steps in which a collision is waited for at most, and the chance of none that is left."""
 
 COLLIDED = 30
@@ -104,6 +104,8 @@ def noise_map(subject: Seeded) -> Finding | str:
     scene, scheme = subject.scene, subject.scheme
     if scheme.collides:
         return "a collision leaves nothing of the difference of two momenta"
+    if scheme.rescales:
+        return "a factor of all momenta is of both starts: no map of their difference"
     if not scene.system.is_linear or scene.n > FEW:
         return f"a linear scene of {FEW} particles at most is needed"
     size_p = np.sqrt(scene.m * scene.thermal)
@@ -127,17 +129,21 @@ def noise_map(subject: Seeded) -> Finding | str:
 @check("size", family="noise")
 def noise_size(subject: Seeded) -> Finding | str:
     """One seed at four times the temperature doubles the noise, and at four times all masses and stiffnesses
-    doubles it in momenta and halves it in positions."""
-    scene = subject.at_rest()
-    if not scene.system.is_linear or np.any(scene.system.potential_force(scene.q, scene.p)):
+    doubles it in momenta and halves it in positions; at another friction it comes of the same draws.
+
+    Particles start at rest, or, where a factor acts on momenta, in motion that is scaled likewise.
+    """
+    scheme, scene = subject.scheme, subject.scene if subject.scheme.rescales else subject.at_rest()
+    if not scene.system.is_linear or np.any(scene.system.potential_force(0 * scene.q, 0 * scene.p)):
         return "a linear scene with its rest in 0 is needed"
     assert scene.bath is not None
     # collisions come now and then; a factor of 2 is exact over any number of steps
-    collides = subject.scheme.collides
+    collides = scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
     hot = replace(scene, bath=Bath(temperature=4 * scene.bath.temperature, friction=scene.bath.friction))
-    heavy = replace(scene.system.scaled(4.0), m=4 * scene.m)
+    hot = replace(hot, q=2 * scene.q, p=2 * scene.p)
+    heavy = replace(scene.system.scaled(4.0), m=4 * scene.m, q=scene.q / 2, p=2 * scene.p)
     worst = 0.0
     allowed = [4 * steps * x for x in subject.allowed(one)]
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
@@ -147,7 +153,32 @@ def noise_size(subject: Seeded) -> Finding | str:
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")
-    return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, of both runs")
+    if not collides and not scheme.rescales:
+        worst = max(worst, _redrawn(subject, one))
+    return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, and the same draws, of both runs")
+
+
+def _redrawn(subject: Seeded, one: Trajectory) -> float:
+    """By how much the draws of a step from rest differ from those of the same seed at another friction.
+
+    An engine that takes 1 - c**2 from c loses digits where x = gamma h is small: 1/2x roundings of the noise.
+    """
+    bath, scene = subject.scene.bath, subject.at_rest()
+    assert bath is not None
+    x = bath.friction * scene.step
+    factor = 4.0 if 4 * x <= 1 else 0.25
+    other = replace(scene, bath=replace(bath, friction=factor * bath.friction))
+    both = [
+        read(
+            subject.scheme, at, run.q, run.p, unit=max(run.arithmetic.state, run.arithmetic.force),
+            rebuilt=run.rebuilds_velocity,
+        )
+        for at, run in ((scene, one), (other, subject.run(other, 1)))
+    ]  # fmt: skip
+    unit = max(one.arithmetic.state, one.arithmetic.force)
+    lost = unit * np.abs(both[0].draws) / min(x, factor * x)
+    error = np.sum([y.error for y in both], axis=0).reshape(lost.shape)
+    return float(np.max(np.abs(both[0].draws - both[1].draws) / (lost + error)))
 
 
 class Script:
@@ -156,12 +187,16 @@ class Script:
     def __init__(self, values: Any) -> None:
         self._left = list(values)
 
-    def standard_normal(self, size: Any) -> Floats:
+    def standard_normal(self, size: Any = ()) -> Floats:
         """Numbers in the shape (steps, draws, particles), or of one draw in any other."""
         out = np.zeros(size)
         for row in out[0] if out.ndim == 3 else [out]:
-            row[...] = self._left.pop(0) if self._left else 0.0
+            row[...] = self._last = self._left.pop(0) if self._left else 0.0
         return out
+
+    def standard_gamma(self, shape: float) -> float:
+        """Half of the squares of so many halves of the last number."""
+        return shape * self._last**2
 
 
 @check("script", family="noise")
@@ -188,9 +223,9 @@ def seed_kept(subject: Seeded) -> Finding | str:
     if subject.scheme.collides:
         # two runs without a collision are equal whatever their seeds
         rare = law_of(subject.scheme, subject.scene).collision * subject.scene.n
-        steps = max(steps, int(np.ceil(-np.log(UNLIKELY) / rare)))
-        if steps > LONG:
-            return f"in {LONG} steps a collision is not certain"
+        steps = max(steps, int(np.ceil(-np.log(NONE_LEFT) / rare)))
+        if steps > LONGEST_WAIT:
+            return f"in {LONGEST_WAIT} steps a collision is not certain"
     one, same, other = (subject.run(subject.scene, steps, subject.seed + i) for i in (0, 0, 1))
     differ = np.count_nonzero(np.any((one.q != same.q) | (one.p != same.p), axis=1))
     if np.array_equal(one.p, other.p):

@@ -114,6 +114,8 @@ def draws_particles(case: Case) -> Chance | str:
     """The draws of one particle say nothing of those of the next."""
     if THERMOSTATS[case.trajectory.scheme].collides:
         return "there are no draws of two particles side by side"
+    if THERMOSTATS[case.trajectory.scheme].rescales:
+        return "one number acts on all particles"
     return _of(
         case, lambda x: chance.neighbours(x.T), lambda x: f"correlation {np.mean(x[:, 1:] * x[:, :-1]):+.2e}"
     )

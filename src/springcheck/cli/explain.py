@@ -157,6 +157,10 @@ _ACTS = {
     "exchange": "p = c p + sqrt((1 - c**2) m kT) xi, c of x = gamma h", "damp": "p = (1 - {c}) p",
     "undamp": "p = p / (1 + {c})", "noise": "p = p + {c} sqrt(2 x m kT) xi",
     "jump": "q = q + {c} h sqrt(2 x kT/m) xi", "creep": "q = q + {c} h**2 F/m", "rebuild": "p = m (q' - q)/h",
+    "rescale": "p = alpha p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
+               "b = (1 - c) kT / sum p**2/m; alpha has the sign of xi_1 + sqrt(c/b)",
+    "scale": "p = |alpha| p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
+             "b = (1 - c) kT / sum p**2/m",
     "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
 }  # fmt: skip
 
@@ -168,6 +172,9 @@ def _thermostat(name: str) -> Iterator[str]:
         yield f"  {_ACTS[act.kind].format(c='c(x)' if callable(act.part) else act.part)}"
     if scheme.carried:
         yield "  the first draw xi of a step is the last of the step before"
+    if scheme.rescales:
+        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
+        return
     turn, x = 0.5, 0.1
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)
     yield (

@@ -44,6 +44,7 @@ from springcheck.engines.registry import (
 from springcheck.errors import MethodError, nearest
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
+from springcheck.thermal import THERMOSTATS
 
 __all__ = [
     "ANY_POTENTIAL", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label",
@@ -222,6 +223,8 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{what.scheme} has no noise, and the scene has a bath; its methods are thermostats"
     if what.generator and not scene.bath:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
+    if what.generator and THERMOSTATS[what.scheme].rescales and not any(scene.p):
+        return "it multiplies all momenta by one factor, and those of the start are all 0"
     if scene.kind not in what.kinds:
         moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))
         others = {kind for other in engine(label.engine).methods.values() for kind in other.kinds}

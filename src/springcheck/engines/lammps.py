@@ -241,6 +241,12 @@ def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r} {seed}"
     if method.name == "langevin":
         return ["fix move mobile nve", f"fix bath mobile langevin {given}"]
+    if method.name == "csvr":
+        # it counts three degrees of freedom for each atom, less three; nothing moves along some
+        given = f"{scene.thermal!r} {scene.thermal!r} {1 / (2 * scene.bath.friction)!r} {seed}"
+        none = 3 * scene.particles - scene.n
+        modified = f"compute_modify bath_temp extra/dof {none}"
+        return ["fix move mobile nve", f"fix bath mobile temp/csvr {given}", modified]
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
@@ -310,6 +316,10 @@ ENGINE = Engine(
     thermostats=named(
         thermostat(
             "langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic", _DRAWS, SPRINGS
+        ),
+        thermostat(
+            "csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", _DRAWS, SPRINGS,
+            default=False,
         ),
         *(
             thermostat(

@@ -7,7 +7,8 @@ Sources: Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34 (splittings by
 Chodera & Crooks, J. Phys. Chem. B 118 (2014) 6466; Zhang et al., J. Phys. Chem. A 123 (2019) 6056 (BAOA);
 Groenbech-Jensen, Mol. Phys. 118 (2020) e1662506 (GJ); Brunger, Brooks & Karplus, Chem. Phys. Lett. 105
 (1984) 495 (BBK); Vanden-Eijnden & Ciccotti, Chem. Phys. Lett. 429 (2006) 310; Andersen, J. Chem. Phys. 72
-(1980) 2384; Ermak & McCammon, J. Chem. Phys. 69 (1978) 1352 (Brownian).
+(1980) 2384; Ermak & McCammon, J. Chem. Phys. 69 (1978) 1352 (Brownian); Bussi, Donadio & Parrinello, J. Chem.
+Phys. 126 (2007) 014101, and the sign: Bussi & Parrinello, Comput. Phys. Commun. 179 (2008) 26.
 """
 
 from __future__ import annotations
@@ -44,7 +45,19 @@ class Act(NamedTuple):
     """One stage: what is done, for which part, and by which draw of the step."""
 
     kind: Literal[
-        "kick", "held", "drift", "exchange", "damp", "undamp", "noise", "jump", "creep", "rebuild", "collide"
+        "kick",
+        "held",
+        "drift",
+        "exchange",
+        "damp",
+        "undamp",
+        "noise",
+        "jump",
+        "creep",
+        "rebuild",
+        "collide",
+        "rescale",
+        "scale",
     ]
     part: Part = ONE
     draw: int = 0
@@ -76,6 +89,11 @@ class Thermostat:
     def collides(self) -> bool:
         """Whether noise comes with a probability."""
         return any(act.kind == "collide" for act in self.acts)
+
+    @property
+    def rescales(self) -> bool:
+        """Whether all momenta get one factor, of their kinetic energy and the draws of all: no linear map."""
+        return any(act.kind in ("rescale", "scale") for act in self.acts)
 
 
 def _stretch(c2: Decay) -> Callable[[Any], Any]:
@@ -113,6 +131,8 @@ class Stepper:
             c = _value(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
             noise = np.sqrt(lost * (2 - lost)) * size if kind == "exchange" else size
+            if kind in ("rescale", "scale"):
+                noise = lost * width(thermal)
             if absolute and kind != "undamp":
                 c = -np.abs(c) if kind == "damp" else np.abs(c)
             self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
@@ -128,8 +148,9 @@ class Stepper:
     ) -> tuple[Reals, Reals]:
         """One step from (q, p), each (..., n).
 
-        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place.  A
-        force after the last drift is taken at `end`, where it is known: draws of other particles act there.
+        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place, or is
+        the factor of all momenta, which else comes of the draws.  A force after the last drift is taken at
+        `end`, where it is known: draws of other particles act there.
         """
         m, h, last, q_old = self.m, self.h, p, q
         for i, (kind, c, noise, number) in enumerate(self._acts):
@@ -152,11 +173,21 @@ class Stepper:
                 p = p + (c * h) * last
             elif kind == "creep":
                 q = q + c * force(q, np.zeros_like(p)) / m
+            elif kind in ("rescale", "scale"):
+                p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
             elif kind == "rebuild":
                 p = m * ((q + self._sign * q_old) / h)
             else:
                 p = np.where(hit, noise * draws[number] + (self._sign > 0) * p, p)
         return q, p
+
+    def _factor(self, p: Reals, c: Any, lost: Any, xi: Any, signed: bool) -> Any:
+        """What all momenta are multiplied by (..., 1), by a draw for each: Bussi & Parrinello 2008; `lost` is
+        (1 - c) kT."""
+        share = lost / np.sum(p * p / self.m, axis=-1, keepdims=True)
+        first = xi[..., :1] + np.sqrt(c / share)
+        size = np.sqrt(share * (first * first + np.sum(xi[..., 1:] ** 2, axis=-1, keepdims=True)))
+        return np.where(first < 0, -size, size) if signed else size
 
 
 def _decay(share: int) -> Decay:
@@ -336,6 +367,27 @@ _OTHERS = (
     ),
 )  # fmt: skip
 
+ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
+"""What a step of Bussi's thermostat leaves of a kinetic energy, which relaxes at twice a momentum's rate."""
+
+_VERLET = (Act("kick", HALF), Act("drift"), Act("kick", HALF))
+
+_RESCALED = (
+    Thermostat(
+        name="bussi", title="Bussi: one factor for all momenta, then velocity Verlet",
+        acts=(Act("rescale", ENERGY_LEFT), *_VERLET), source="Bussi & Parrinello 2008",
+    ),
+    Thermostat(
+        name="bussi-unsigned", title="Bussi without the sign of the factor, then velocity Verlet",
+        acts=(Act("scale", ENERGY_LEFT), *_VERLET), source="Bussi et al. 2007; as ASE runs it",
+    ),
+    Thermostat(
+        name="bussi-after", title="velocity Verlet, then Bussi without the sign of the factor",
+        acts=(*_VERLET, Act("scale", ENERGY_LEFT)), source="Bussi et al. 2007; as LAMMPS runs it",
+    ),
+)  # fmt: skip
+
 THERMOSTATS: dict[str, Thermostat] = {
-    one.name: one for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS)
+    one.name: one
+    for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED)
 }

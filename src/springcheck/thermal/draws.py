@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import Stepper, Thermostat
+from springcheck.thermal.catalogue import ENERGY_LEFT, Stepper, Thermostat
 from springcheck.thermal.laws import Law
 
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
 
+
+_NONE: Extended = np.empty((0, 0), np.longdouble)
 
 LARGEST_DRAW = 8.0
 """No draw of a run of a few steps is larger: its chance is 1e-15."""
@@ -87,11 +89,13 @@ class _Reader:
         self.stepper = Stepper(scheme, **about, width=np.longdouble)
         self.sizer = Stepper(scheme, **about, width=np.longdouble, absolute=True)
         self.roundings = IN_AND_OUT + PER_ACT * len(scheme.acts)
-        self.directions, self.of_q = _directions(scheme, scene)
+        self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)
 
     def read(self, q: Floats, p: Floats) -> Reading:
         z = q.astype(np.longdouble), p.astype(np.longdouble)
         start, end = (z[0][:-1], z[1][:-1]), (z[0][1:], z[1][1:])
+        if self.scheme.rescales:
+            return self._rescaled(start, end)
         if self.scheme.collides:
             return self._collided(start, end)
         draws, across, unit, unseen = self._solved(start, end, hit=False)
@@ -127,13 +131,46 @@ class _Reader:
             np.where(hits, draws[0], np.nan), np.where(hits, across, straight), unit[0], hits
         )
 
+    def _rescaled(self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]) -> Reading:
+        """The factor of all momenta follows from them, and leaves n - 1 of them and all positions to check.
+
+        The kinetic energy that it makes is, over (1 - c) kT/2, noncentral chi-squared of n degrees of freedom
+        about c times that before: its rank is a draw.  Of one degree of freedom it is the normal one itself.
+        """
+        from scipy.special import chndtr, ndtri
+
+        m, n, bath = self.scene.m, self.scene.n, self.scene.bath
+        assert bath is not None
+
+        def at(factor: float) -> Extended:
+            return np.stack(self.stepper(*start, self._force, [0], factor, end[0]))
+
+        none = at(0.0)
+        slope, target = at(1.0) - none, np.stack(end)
+        twice = np.sum(slope[1] ** 2 / m, axis=-1, keepdims=True)
+        factor = np.sum(slope[1] * (target - none)[1] / m, axis=-1, keepdims=True) / twice
+        of = np.stack(self._allowed(start, [0], np.maximum(1, np.abs(factor))))
+        unit = np.sum(np.abs(slope[1]) * of[1] / m, axis=-1, keepdims=True) / twice
+        across = np.abs(target - none - factor * slope) / (of + unit * np.abs(slope))
+        x = np.asarray(bath.friction * self.scene.step)
+        about = twice / (ENERGY_LEFT.lost(x) * self.scene.thermal)
+        here, before = np.asarray(factor**2 * about, float), np.asarray(ENERGY_LEFT(x) * about, float)
+        draws = ndtri(chndtr(here, n, before))
+        if n == 1 and self.scheme.acts[0].kind == "rescale":
+            draws = factor * np.sqrt(about) - np.sqrt(before)
+        # of a normal number of the same variance
+        spread = np.sqrt(2 * (n + 2 * before)) / (2 * np.abs(factor) * about)
+        return self._reading(draws, np.max(across, axis=0), unit / spread)
+
     def _force(self, q: Reals, p: Reals) -> Reals:
         return self.scene.system.potential_force(q, p)
 
-    def _allowed(self, start: tuple[Extended, Extended], draws: Extended) -> tuple[Extended, Extended]:
+    def _allowed(
+        self, start: tuple[Extended, Extended], draws: Any, hit: Any = True
+    ) -> tuple[Extended, Extended]:
         """One rounding of everything that a step adds up."""
         sizes = self.scene.system.magnitude()
-        q, p = self.sizer(np.abs(start[0]), np.abs(start[1]), sizes, list(np.abs(draws)), True)
+        q, p = self.sizer(np.abs(start[0]), np.abs(start[1]), sizes, list(np.abs(draws)), hit)
         if self.rebuilt:
             p = p + self.scene.m * q / abs(self.scene.step)
         return np.asarray(self.unit * q + SMALLEST), np.asarray(self.unit * p + SMALLEST)

@@ -78,7 +78,7 @@ class Thermal:
         return best and self.sparser is None
 
 
-JOINED = 6.0
+JOINED_FROM = 6.0
 """Standard deviations of a correlation, from which on particles are joined: 2e-9 of those that are not."""
 
 
@@ -103,13 +103,16 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         return None
     z = np.stack([x, u])
     left = _left(z)
-    if beside is not None and _follows(left[1], beside[:-1], z):
-        return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
+    rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
+    if beside is not None:
+        moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
+        if _follows(left[1], moved, z) or (weights[4] > 1e-9 * weights[3] and _follows(rest, moved, z)):
+            return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # what digits leave of it is white but for neighbours, which share a frame
-        digits = misfit < 1e-9 or _is_white((frames @ turned[4])[::2] / np.std(frames @ turned[4]))
+        digits = misfit < 1e-9 or _is_white(rest[::2])
         # of one draw the position and the momentum leave the same
         return _of_one(q, v, h, free / free[0], misfit, left[1]) if free[0] and digits else None
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
@@ -129,7 +132,7 @@ def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
     for x in beside.T:
         rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
         size = float(np.linalg.norm(rest))
-        if size > 0 and abs(float(rest @ left)) > JOINED * size:
+        if size > 0 and abs(float(rest @ left)) > JOINED_FROM * size:
             return True
     return False
 
@@ -387,7 +390,7 @@ def _sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int]
     least = minus(best.scheme, 1, start)
     how = {"xatol": 1e-3, "fatol": 1e-2, "maxiter": 300}
     for every in (2, 3, 4, 8):
-        for name in THERMOSTATS:
+        for name in (x for x, one in THERMOSTATS.items() if not one.rescales):
             with np.errstate(all="ignore"):
                 fit: Any = minimize(partial(minus, name, every), start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
             if fit.fun - least < ODDS:

@@ -39,6 +39,10 @@ ENGINE = Engine(
             "andersen", "andersen-after-kick", "ase.md.andersen.Andersen", _DRAWS, EVERY_POTENTIAL,
             rebuilds_velocity=True,
         ),
+        thermostat(
+            "bussi", "bussi-unsigned", "ase.md.bussi.Bussi", _DRAWS, EVERY_POTENTIAL, scripted=True,
+            rebuilds_velocity=True, default=False,
+        ),
     ),
     step_seconds=3e-4,
     any_axis=True,

@@ -89,6 +89,15 @@ def _thermostat(
         from ase.md.andersen import Andersen
 
         return Andersen(atoms, andersen_prob=-np.expm1(-rate * step), fixcm=False, **given)
+    if name == "bussi":
+        from ase.constraints import FixCartesian
+        from ase.md.bussi import Bussi
+
+        # it counts degrees of freedom, and those that nothing moves along are none
+        fixed = np.ones((scene.particles, 3), np.bool_)
+        fixed.reshape(-1)[scene.where] = False
+        atoms.set_constraint([FixCartesian(i, mask=tuple(row)) for i, row in enumerate(fixed) if np.any(row)])
+        return Bussi(atoms, taut=time / (2 * rate), **given)
     from ase.md.langevinbaoab import LangevinBAOAB
 
     return LangevinBAOAB(atoms, T_tau=time / rate, **given)

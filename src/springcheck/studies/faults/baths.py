@@ -24,7 +24,7 @@ from springcheck.thermal.catalogue import HALF, ONE, Act
 Draws: TypeAlias = Callable[[Sequence[Floats], Scene, float], Any]
 """(right draws so far, each (n,) and the last one due; scene, size) -> what is used in place of the last."""
 
-CHECKS: tuple[str, ...] = (*(one.name for one in checks.RANDOM), *(one.name for one in SEEDED))
+OF_THERMOSTATS: tuple[str, ...] = (*(one.name for one in checks.RANDOM), *(one.name for one in SEEDED))
 """What judges thermostats."""
 
 A, B = Act("drift", HALF), Act("kick", HALF)
@@ -177,7 +177,7 @@ class Each:
         return np.array([rng.standard_normal() for rng in self._rngs])
 
 
-STAGES = {
+BROKEN_STAGES = {
     "half kick lost": (B, A, O, A),
     "old force": (B, A, O, A, Act("held", HALF)),
     "whole drifts": (B, Act("drift", ONE), O, Act("drift", ONE), B),

@@ -94,7 +94,7 @@ Passed = Callable[[str, float | None], bool | None]
 
 def checks_of(fault: Fault) -> tuple[str, ...]:
     """By name: those of thermostats, or those of everything else."""
-    return baths.CHECKS if fault.random else tuple(one.name for one in checks.ALL)
+    return baths.OF_THERMOSTATS if fault.random else tuple(one.name for one in checks.ALL)
 
 
 def probe(fault: Fault) -> Passed:

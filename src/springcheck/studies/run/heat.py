@@ -51,7 +51,7 @@ class Heat:
         scene, self._scheme = self._scene, piece.scheme
         assert scene.bath is not None
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
-        if piece.scheme in THERMOSTATS and linear:
+        if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
             self._law = Law(
                 scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n), k=scene.system.modes.w2,
                 rate=scene.bath.friction, thermal=scene.thermal,
