@@ -20,7 +20,7 @@ campaign = importlib.util.module_from_spec(_spec)
 sys.modules["thermal_campaign"] = campaign
 _spec.loader.exec_module(campaign)
 
-WRONG_BEFORE = (37, 104, 123, 134, 135, 148, 154, 185, 292)
+WRONG_BEFORE = (37, 104, 123, 134, 135, 148, 154, 185, 292, 596, 597, 1031)
 """Cases that had a wrong name, or a list without the right one."""
 
 

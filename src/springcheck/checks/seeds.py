@@ -60,14 +60,14 @@ class Seeded:
             width=np.longdouble, absolute=absolute,
         )  # fmt: skip
 
-    def allowed(self, run: Trajectory, row: int = 0) -> tuple[Extended, Extended]:
-        """What a step from a frame of a run may be off by."""
+    def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
+        """What a step from a frame of a run may be off by; `factor` is that of all momenta, if they get one."""
         q, p, how = run.q[row], run.p[row], run.arithmetic
         unit = (IN_AND_OUT + PER_ACT * len(self.scheme.acts)) * max(how.state, how.force)
         draws = [np.full(len(q), LARGEST_DRAW)] * self.scheme.draws
         of_q, of_p = self.stepper(self.scene, absolute=True)(
             np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble),
-            self.scene.system.magnitude(), draws, True,
+            self.scene.system.magnitude(), draws, factor,
         )  # fmt: skip
         if run.rebuilds_velocity:
             of_p = of_p + self.scene.m * of_q / abs(self.scene.step)
@@ -212,7 +212,11 @@ def noise_matrix(subject: Seeded) -> Finding | str:
         draws = [np.full(scene.n, np.longdouble(x)) for x in unit]
         start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
         ideal = subject.stepper(scene)(*start, scene.system.potential_force, draws)
-        worst = max(worst, _off((run.q[1], run.p[1]), ideal, subject.allowed(run)))
+        factor: Any = True
+        if scheme.rescales:
+            _, scaled = subject.stepper(scene)(*start, lambda q, p: 0 * q, draws)
+            factor = max(1.0, float(np.max(np.abs(scaled)) / np.max(np.abs(scene.p))))
+        worst = max(worst, _off((run.q[1], run.p[1]), ideal, subject.allowed(run, factor=factor)))
     return Finding(worst, 1.0, "of what rounding allows", f"{scheme.draws} unit draws")
 
 

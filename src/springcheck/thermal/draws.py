@@ -21,6 +21,9 @@ PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
 
 
+HOTTEST = 1e4
+"""Noncentrality of a chi-squared distribution up to which its rank is worked out to all digits."""
+
 _NONE: Extended = np.empty((0, 0), np.longdouble)
 
 LARGEST_DRAW = 8.0
@@ -155,12 +158,15 @@ class _Reader:
         x = np.asarray(bath.friction * self.scene.step)
         about = twice / (ENERGY_LEFT.lost(x) * self.scene.thermal)
         here, before = np.asarray(factor**2 * about, float), np.asarray(ENERGY_LEFT(x) * about, float)
-        draws = ndtri(chndtr(here, n, before))
+        with np.errstate(all="ignore"):
+            far = ~((before < HOTTEST) & (here < 4 * HOTTEST))
+            draws = np.where(far, np.inf, ndtri(chndtr(*np.where(far, 1.0, [here, n + 0 * here, before]))))
         if n == 1 and self.scheme.acts[0].kind == "rescale":
             draws = factor * np.sqrt(about) - np.sqrt(before)
         # of a normal number of the same variance
         spread = np.sqrt(2 * (n + 2 * before)) / (2 * np.abs(factor) * about)
-        return self._reading(draws, np.max(across, axis=0), unit / spread)
+        # the series of the distribution ends where the motion is that much above the noise
+        return self._reading(draws, np.max(across, axis=0), np.where(before < HOTTEST, unit / spread, np.inf))
 
     def _force(self, q: Reals, p: Reals) -> Reals:
         return self.scene.system.potential_force(q, p)

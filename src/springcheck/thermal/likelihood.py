@@ -161,13 +161,15 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
     found: list[Candidate] = []
-    if near(b, d) and near(c, -1) and not near(b, -h / 2):
-        if -b > h / 2:
+    if near(b, d) and near(c, -1):
+        half = near(b, -h / 2)
+        if half:
+            found = _likely(("aboba", "aoboa"), q, v, h)
+        if -b > h / 2 and not half:
             found = _likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
-        # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-        found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h, len(q)))]
-    elif near(b, d) and near(b, -h / 2) and near(c, -1):
-        found = _likely(("aboba", "aoboa"), q, v, h)
+        if not half or close > 1e-6:
+            # a GJ scheme kicks and drifts by another step: another spring for the same null vector
+            found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h, len(q)))]
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
         found = _likely(("baoa",), q, v, h, turn=2 * (1 + c))
     elif near(c, -1) and near(d, -h) and abs(b) <= close * h:

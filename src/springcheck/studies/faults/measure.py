@@ -78,6 +78,9 @@ SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law
 """Experiments that do not look at the scene, and take most of the time."""
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
+RESCALING = 0.1
+"""Share of random baths whose thermostat has one factor for all momenta."""
+
 BATHS = 160
 """Random scenes in a bath; each meets one thermostat."""
 BY_ENGINES = 40
@@ -181,7 +184,12 @@ def clean_bath(seed: int) -> Clean:
     """A random scene in a bath by a right thermostat, one of all, through every check of thermostats."""
     rng = np.random.default_rng([2028, seed])
     where = baths.random_scene(rng)
-    right = Fault("thermostat", "", (), baths.broken(), scheme=str(rng.choice(list(THERMOSTATS))))
+    linear, others = ([x for x, one in THERMOSTATS.items() if one.rescales == kind] for kind in (False, True))
+    scheme = str(rng.choice(linear))
+    right = Fault(
+        "thermostat", "", (), baths.broken(),
+        scheme=str(rng.choice(others)) if rng.random() < RESCALING and np.any(where.p) else scheme,
+    )  # fmt: skip
     subject = baths.subject(right, None, where, seed + 1)
     verdicts = checks.judge(where, right.run(where, seed=seed + 1)) + [one(subject) for one in SEEDED]
     return _counted(checks.shared(verdicts), f"plain:{right.scheme}", seed)
