@@ -15,7 +15,7 @@ BUDGETS = {
     ("thermal",): 1441,
     ("engines/own",): 1696,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1157,
-    ("engines",): 2419,
+    ("engines",): 2434,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 3997,
     ("identify",): 7663,

@@ -224,6 +224,7 @@ def test_an_engine_that_ends_the_program_is_named_and_what_others_finished_is_ke
         ("advance", "threading.Thread(target=time.sleep, args=(99,)).start()"),
         ("start", "os.fork()"),
         ("version", "print('noise')"),
+        ("version", "os.close(1)"),
     ],
 )
 def test_nothing_that_an_engine_does_to_the_program_stands_in_its_document(

@@ -8,7 +8,9 @@ named in one line where engines are listed or asked for, and takes no other down
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Callable
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -107,7 +109,20 @@ def guarded(label: Label, call: Callable[..., T], *arguments: object) -> T:
     So does what it did before, where it ended the program and this is the next one (`interrupts.supervised`).
     """
     with foreign(str(label), f"{label} failed", origin(label.engine).package):
-        return call(*arguments)
+        try:
+            return call(*arguments)
+        finally:
+            _reopened()
+
+
+def _reopened() -> None:
+    """Open standard streams again that an engine has closed, before a file of ours takes their numbers."""
+    for stream, other in ((1, 2), (2, 1)):
+        try:
+            os.fstat(stream)
+        except OSError:
+            with suppress(OSError):
+                os.dup2(other, stream)
 
 
 def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
