@@ -356,3 +356,53 @@ def test_settle_in_openmm_keeps_lengths_in_single_precision_and_is_told(need: Ne
     length = rods(scene).length
     kept = length.astype(np.float32).astype(np.float64) / length - 1
     assert np.max(np.abs(rods(scene).strain(run.q[1:]) - kept)) < 1e-13
+
+
+@pytest.mark.parametrize("label", ["own:velocity-verlet", "openmm:verlet-rods"])
+def test_where_a_rod_comes_to_turn_too_fast_that_is_said_whatever_the_engine_does(
+    label: str, need: Need
+) -> None:
+    need(label)
+    scene = replace(scenefile.load_scene("rigid-pendulum"), step=0.5, steps=100)
+    run = driver.run(scene, label)
+    if label.startswith("own"):
+        assert run.outcome.status == "diverged"
+        return
+    found = next(v for v in checks.judge(scene, run) if v.check == "rod-length")
+    assert found.passed is False
+    assert "a rod turns by h w of 1 or more, and no push along it keeps its length" in found.why
+
+
+def test_what_rounding_leaves_of_momenta_on_a_line_is_no_turn() -> None:
+    rod = Rod(a=[0], b=[1], length=[1.7])  # type: ignore[arg-type]
+    scene = Scene(m=[0.7, 3.1], q=[0.3, 2.0], p=[0.49, 2.17], terms=(rod,), step=0.1, steps=30)  # type: ignore[arg-type]
+    for label in ("own:velocity-verlet", "own:semi-implicit-euler"):
+        verdicts = checks.judge(scene, driver.run(scene, label))
+        assert [v.check for v in verdicts if v.passed is False] == []
+        assert next(v for v in verdicts if v.check == "turn").why == "no rod turns"
+
+
+def test_random_rods_by_right_methods_raise_no_alarm() -> None:
+    """Masses over six decades, lengths and times over four, far from the origin, h w up to 0.999."""
+    rng = np.random.default_rng(27)
+    for number in range(24):
+        d = int(rng.integers(2, 4))
+        size, time, far = 10 ** rng.uniform(-2, 2, 3)
+        way = rng.normal(size=d)
+        way *= size / np.linalg.norm(way)
+        x = rng.normal(size=d) * far * size
+        m, axes = np.repeat(10 ** rng.uniform(-3, 3, 2), d), np.arange(d)
+        rod = Rod(a=axes, b=axes + d, length=np.full(d, np.linalg.norm(way)))
+        q, p = np.concatenate([x, x + way]), m * rng.normal(size=2 * d) * size / time
+        rod = replace(rod, length=np.full(d, np.linalg.norm(q[d:] - q[:d])))
+        scene = dumbbell().derived(
+            m=m, q=q, p=p, terms=(rod,), places=np.concatenate([axes, 3 + axes]), step=time, steps=30,
+            every=1 + number % 2,
+        )  # fmt: skip
+        p = np.asarray(rods(scene).projected(q.astype(np.longdouble), p.astype(np.longdouble)), np.float64)
+        turn = float(rng.choice([rng.uniform(0.01, 0.9), 1 - 10 ** rng.uniform(-3, -1)]))
+        step = turn / float(rods(scene).rates(q, p)[0])
+        right = replace(scene, p=p, step=step * (1 if number % 3 else -1))
+        for label in ("own:velocity-verlet", "own:semi-implicit-euler"):
+            verdicts = checks.judge(right, driver.run(right, label))
+            assert [v for v in verdicts if v.passed is False] == [], number

@@ -119,7 +119,7 @@ _ALL = (
     Requirement("symplectic", "a symplectic scheme", _trait(
         "symplectic", "{title} does not claim to be symplectic")),
     Requirement("reversible", "a scheme that undoes its steps", _unless(
-        lambda x: x.scheme.has("reversible") or len(x.scheme.stages) == 2,
+        lambda x: x.scheme.has("reversible") or (len(x.scheme.stages) == 2 and not x.scene.system.rods),
         "{title} is not its own adjoint: only another scheme undoes its steps")),
     Requirement("double", "double precision", _unless(
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.state <= 2.0**-53,

@@ -9,7 +9,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.requires import MAP
 from springcheck.physics.exact.well import PI
-from springcheck.physics.rods import Rods
+from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
@@ -32,6 +32,10 @@ def rod_length(case: Case) -> Finding:
     why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
     if how.lengths:
         why += f", and the tolerance {how.lengths:g} of the engine's solver, which is not its error"
+    lost = ~np.isfinite(case.next_states[0]).all(axis=1)
+    if np.any(lost):
+        step = int(case.steps[int(np.argmax(lost))])
+        why += f"; after step {step} a rod turns by h w of 1 or more, and no push along it keeps its length"
     return Finding(off[worst], bound[worst], "of the length", why)
 
 
@@ -44,7 +48,8 @@ def rod_velocity(case: Case) -> Finding:
         r, m = rods.ways(q), case.judged.m
         off = np.abs(rods.dot(r, rods.apart(p / m)))
         unit = rods.sum_of_sizes(r, case.allowance[1] / m)
-        seen = np.where(off == 0, 0, off / unit)
+        # where a step has no solution nothing is known of its momenta
+        seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
     return Finding(seen[worst], case.roundings, "roundings", why)
@@ -62,6 +67,8 @@ def turn(case: Case) -> Finding | str:
         # a later piece of a long run: from its own first frame on
         steps, (q0, p0) = steps - steps[0], (x[0].astype(np.longdouble) for x in (run.q, run.p))
     w = rods.rates(q0, p0)
+    # what rounding leaves of momenta along a line is no turn
+    w = np.where(w * rods.length > UNTRUE * rods.spans(np.abs(p0) / m), w, 0)
     if not np.any(w > 0):
         return "no rod turns"
     parts = [c for kind, (_, c) in zip(case.scheme.kinds, case.scheme.stages, strict=True) if kind.drifts]
@@ -70,7 +77,7 @@ def turn(case: Case) -> Finding | str:
     steeper = np.sum(np.abs(x)[:, None] / np.sqrt(1 - (x[:, None] * w) ** 2), axis=0)
     r, n = rods.ways(run.q.astype(np.longdouble)), steps[:, None].astype(np.longdouble)
     first, across = rods.ways(q0), rods.apart(p0 / m)
-    angle = np.arctan2(rods.dot(r, across) / w, rods.dot(r, first))
+    angle = np.arctan2(rods.dot(r, across) / np.where(w > 0, w, 1), rods.dot(r, first))
     off = angle - n * each
     off = np.abs(off - 2 * PI * np.round(off / (2 * PI)))[1:]
     with np.errstate(all="ignore"):

@@ -61,7 +61,7 @@ class Seeded:
         )  # fmt: skip
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
-        """What a step from a frame of a run may be off by; `factor` is that of all momenta, if they get one."""
+        """What a step from a frame of a run may be off by; `factor` is that of all momenta, if any."""
         q, p, how = run.q[row], run.p[row], run.arithmetic
         unit = (IN_AND_OUT + PER_ACT * len(self.scheme.acts)) * max(how.state, how.force)
         draws = [np.full(len(q), LARGEST_DRAW)] * self.scheme.draws

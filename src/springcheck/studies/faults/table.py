@@ -13,7 +13,7 @@ import numpy as np
 from springcheck.studies.faults import drives, rigid, seeded, space
 from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
 from springcheck.studies.faults.rigid import Rattle
-from springcheck.studies.faults.seeded import Fault
+from springcheck.studies.faults.seeded import Fault, Make
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
@@ -234,54 +234,53 @@ DRIVES = (
           ("step-defect",), seeded.moving(lambda s, x: drives.other(s, frequency=2 * np.pi)), scene="driven"),
 )  # fmt: skip
 
+
+def _rod(name: str, about: str, by: tuple[str, ...], make: Make, size: float | None = None) -> Fault:
+    return Fault(name, about, ("step-defect", *by), make, size=size, scene="dumbbell")
+
+
+_LENGTH, _ALONG, _TURNED = ("rod-length",), ("rod-velocity",), ("angular-momentum", "turn")
+
 RIGID = (
-    Fault("rod-after-drift", "SHAKE along the rod as it lies after the drift, not before",
-          ("step-defect", "angular-momentum", "turn"), Rattle(way=lambda r, s, older: s).make,
-          scene="dumbbell"),
-    Fault("rod-a-step-late", "SHAKE along the rod as it lay a step before",
-          ("step-defect", "angular-momentum", "turn"), Rattle(way=lambda r, s, older: older).make,
-          scene="dumbbell"),
-    Fault("rod-in-single", "the rod's direction is kept in single precision",
-          ("step-defect", "angular-momentum"),
-          Rattle(way=lambda r, s, older: r.astype(np.float32).astype(np.float64)).make, scene="dumbbell"),
-    Fault("rod-one-iteration", "one iteration of SHAKE instead of a solution",
-          ("step-defect", "rod-length"), Rattle(solve=rigid.iterated(1)).make, scene="dumbbell"),
-    Fault("rod-one-too-few", "two iterations of SHAKE, one too few",
-          ("step-defect", "rod-length"), Rattle(solve=rigid.iterated(2)).make, scene="dumbbell"),
-    Fault("rod-tolerance", "SHAKE ends at a tolerance that it does not declare",
-          ("step-defect", "rod-length"), Rattle(solve=rigid.until).make, size=1e-9, scene="dumbbell"),
-    Fault("rod-not-projected", "velocities along the rod are left as SHAKE leaves them",
-          ("step-defect", "rod-velocity"), Rattle(across=lambda r, s: None).make, scene="dumbbell"),
-    Fault("rod-projected-early", "velocities are projected along the rod as it lay before the drift",
-          ("step-defect", "rod-velocity"), Rattle(across=lambda r, s: r).make, scene="dumbbell"),
-    Fault("rod-no-impulse", "SHAKE moves the ends and leaves their velocities",
-          ("step-defect", "angular-momentum", "turn"), Rattle(impulse=0.0).make, scene="dumbbell"),
-    Fault("rod-impulse", "the impulse of SHAKE is too large",
-          ("step-defect", "angular-momentum", "turn"), Rattle(impulse=None).make, size=1e-10,
-          scene="dumbbell"),
-    Fault("rod-reduced-mass", "the multiplier has the mean of the masses for the reduced one",
-          ("step-defect", "rod-length"), Rattle(reduced=lambda m: float(np.mean(m))).make, scene="dumbbell"),
-    Fault("rod-masses-ignored", "SHAKE moves both ends by as much, whatever their masses",
-          ("step-defect", "momentum", "angular-momentum"),
-          Rattle(ends=lambda push, m: (-push, push), reduced=lambda m: 0.5).make, scene="dumbbell"),
-    Fault("rod-one-end", "the rod pulls at one end alone",
-          ("step-defect", "momentum"),
-          Rattle(ends=lambda push, m: (0 * push, push), reduced=lambda m: 1.0).make, scene="dumbbell"),
-    Fault("rod-leak", "what the rod does to its ends is rounded to single precision, each by itself",
-          ("step-defect", "momentum", "rod-length"), Rattle(ends=rigid.leaking).make, scene="dumbbell"),
-    Fault("rod-length", "the rod is too long",
-          ("step-defect", "rod-length", "turn"), Rattle(longer=True).make, size=1e-6, scene="dumbbell"),
-    Fault("rod-as-spring", "a stiff spring for a rod",
-          ("step-defect", "rod-length", "rod-velocity"), seeded.stepping(rigid.stiff), scene="dumbbell"),
-    Fault("rod-every-other", "the rod holds at every second step alone",
-          ("step-defect", "rod-length", "turn"), seeded.stepping(rigid.every_other), scene="dumbbell"),
-    Fault("rod-half-steps", "momenta are those of SHAKE half a step later",
-          ("step-defect", "rod-velocity"), seeded.reporting(rigid.late_halves), scene="dumbbell"),
-    Fault("rod-restart", "a restart in the middle takes momenta of half a step before for those of the step",
-          ("step-defect", "rod-velocity"), seeded.stepping(rigid.restarted_halves), scene="dumbbell"),
-    Fault("rod-friction", "momenta of a turning rod lose a fraction at every step",
-          ("step-defect", "turn", "angular-momentum"),
-          seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), size=1e-10, scene="dumbbell"),
+    _rod("rod-after-drift", "SHAKE along the rod as it lies after the drift, not before",
+         _TURNED, Rattle(way=lambda r, s, older: s).make),
+    _rod("rod-a-step-late", "SHAKE along the rod as it lay a step before",
+         _TURNED, Rattle(way=lambda r, s, older: older).make),
+    _rod("rod-in-single", "the rod's direction is kept in single precision",
+         ("angular-momentum",), Rattle(way=lambda r, s, older: r.astype(np.float32).astype(np.float64)).make),
+    _rod("rod-one-iteration", "one iteration of SHAKE instead of a solution",
+         _LENGTH, Rattle(solve=rigid.iterated(1)).make),
+    _rod("rod-one-too-few", "two iterations of SHAKE, one too few",
+         _LENGTH, Rattle(solve=rigid.iterated(2)).make),
+    _rod("rod-tolerance", "SHAKE ends at a tolerance that it does not declare",
+         _LENGTH, Rattle(solve=rigid.until).make, 1e-9),
+    _rod("rod-not-projected", "velocities along the rod are left as SHAKE leaves them",
+         _ALONG, Rattle(across=lambda r, s: None).make),
+    _rod("rod-projected-early", "velocities are projected along the rod as it lay before the drift",
+         _ALONG, Rattle(across=lambda r, s: r).make),
+    _rod("rod-no-impulse", "SHAKE moves the ends and leaves their velocities",
+         _TURNED, Rattle(impulse=0.0).make),
+    _rod("rod-impulse", "the impulse of SHAKE is too large", _TURNED, Rattle(impulse=None).make, 1e-10),
+    _rod("rod-reduced-mass", "the multiplier has the mean of the masses for the reduced one",
+         _LENGTH, Rattle(reduced=lambda m: float(np.mean(m))).make),
+    _rod("rod-masses-ignored", "SHAKE moves both ends by as much, whatever their masses",
+         ("momentum", "angular-momentum"),
+         Rattle(ends=lambda push, m: (-push, push), reduced=lambda m: 0.5).make),
+    _rod("rod-one-end", "the rod pulls at one end alone",
+         ("momentum",), Rattle(ends=lambda push, m: (0 * push, push), reduced=lambda m: 1.0).make),
+    _rod("rod-leak", "what the rod does to its ends is rounded to single precision, each by itself",
+         ("momentum", "rod-length"), Rattle(ends=rigid.leaking).make),
+    _rod("rod-length", "the rod is too long", ("rod-length", "turn"), Rattle(longer=True).make, 1e-6),
+    _rod("rod-as-spring", "a stiff spring for a rod",
+         ("rod-length", "rod-velocity"), seeded.stepping(rigid.stiff)),
+    _rod("rod-every-other", "the rod holds at every second step alone",
+         ("rod-length", "turn"), seeded.stepping(rigid.every_other)),
+    _rod("rod-half-steps", "momenta are those of SHAKE half a step later",
+         _ALONG, seeded.reporting(rigid.late_halves)),
+    _rod("rod-restart", "a restart in the middle takes momenta of half a step before for those of the step",
+         _ALONG, seeded.stepping(rigid.restarted_halves)),
+    _rod("rod-friction", "momenta of a turning rod lose a fraction at every step",
+         ("turn", "angular-momentum"), seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), 1e-10),
 )  # fmt: skip
 
 BOX = (
