@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 from pathlib import Path
 
@@ -71,3 +72,22 @@ def test_the_python_of_the_how_tos_runs(tmp_path: Path, monkeypatch: pytest.Monk
     # a function that is identified needs a file to be named in a message
     exec(compile(code.replace("budget=5", "budget=0.3"), "notebook.py", "exec"), {"__name__": "notebook"})
     assert [path.name for path in tmp_path.iterdir()] == ["notebook.py"]
+
+
+def test_every_command_shows_examples_that_it_can_parse(capsys: pytest.CaptureFixture[str]) -> None:
+    from springcheck.cli import _parser
+    from springcheck.cli.commands import COMMANDS
+    from springcheck.cli.examples import EXAMPLES
+    from springcheck.studies import STUDIES
+
+    assert set(EXAMPLES) == {one.name for one in (*STUDIES, *COMMANDS)}
+    for name, examples in EXAMPLES.items():
+        assert examples
+        for example in examples:
+            words = [name, *shlex.split(example)]
+            assert _parser(words).parse_args(words).name == name
+        with pytest.raises(SystemExit):
+            main([name, "--help"])
+        said = capsys.readouterr().out
+        assert f"  springcheck {name} {examples[0]}".rstrip() in said
+        assert max(map(len, said.splitlines())) <= 100

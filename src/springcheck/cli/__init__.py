@@ -20,6 +20,7 @@ import springcheck
 from springcheck import interrupts
 from springcheck.cli import output, slips
 from springcheck.cli.commands import COMMANDS, Command
+from springcheck.cli.examples import EXAMPLES
 from springcheck.errors import SpringcheckError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.arguments import REPORTING, REPORTS, reported
@@ -126,7 +127,15 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
     every: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
     for one in [one for one in every if one.name in words[:1]] or every:
-        parser_of = commands.add_parser(one.name, help=one.about)
+        parser_of = commands.add_parser(
+            one.name,
+            help=one.about,
+            description=one.about[:1].upper() + one.about[1:] + ".",
+            epilog="\n".join(
+                ["examples:", *(f"  springcheck {one.name} {x}".rstrip() for x in EXAMPLES[one.name])]
+            ),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         if one.name in words:
             for names, how in (*one.arguments, *(REPORTS if one.name in REPORTING else ())):
                 parser_of.add_argument(*names, **how)
