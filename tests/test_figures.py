@@ -295,3 +295,13 @@ def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     assert "explicit Euler gains 1 % a step" in title
     assert "implicit Euler loses 0.99 % a step" in title
     assert "semi-implicit" not in title
+
+
+def test_the_title_of_errors_says_who_is_nearest_and_who_is_farthest() -> None:
+    scene = scenefile.load_scene("spring")
+    made = runs(scene, *OWN)
+    figure = trajectories.of_runs(scene, made, made)["error"]
+    title = " ".join(figure.get_suptitle().split())
+    assert re.search(r"exact solution \S+ by own:semi-implicit-euler to 1\.7e\+00 by own:euler$", title), (
+        title
+    )

@@ -152,6 +152,14 @@ def error(runs: Runs, exact: Exact) -> Figure:
     axes.set_xlabel(with_unit("time t", runs.time_unit[1]))
     axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_ylabel("error / initial energy norm")
-    overlay.heading(figure, f"{runs.scene.title}: distance from the exact solution")
+    ends = {run.label: float(np.max(exact.error(run))) for run in runs.every}
+    known = {label: x for label, x in ends.items() if np.isfinite(x)}
+    title = f"{runs.scene.title}: largest distance from the exact solution"
+    if known:
+        small, large = min(known, key=lambda x: known[x]), max(known, key=lambda x: known[x])
+        title += f" {known[small]:.1e} by {small}" + (
+            f" to {known[large]:.1e} by {large}" if len(known) > 1 else ""
+        )
+    overlay.heading(figure, title)
     runs.legend(figure)
     return figure
