@@ -153,7 +153,8 @@ def noise_size(subject: Seeded) -> Finding | str:
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")
-    if not collides and not scheme.rescales:
+    # what a state tells of two new draws is a sum that friction weighs
+    if not collides and not scheme.rescales and scheme.fresh == 1:
         worst = max(worst, _redrawn(subject, one))
     return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, and the same draws, of both runs")
 
@@ -161,7 +162,8 @@ def noise_size(subject: Seeded) -> Finding | str:
 def _redrawn(subject: Seeded, one: Trajectory) -> float:
     """By how much the draws of a step from rest differ from those of the same seed at another friction.
 
-    An engine that takes 1 - c**2 from c loses digits where x = gamma h is small: 1/2x roundings of the noise.
+    An engine that takes 1 - c**2 from c loses digits at small x = gamma h: 1/2x roundings of the noise, and
+    1/x times as many where c is a difference itself, as in LAMMPS' (sqrt(1 + 4x) - 1)/2x.
     """
     bath, scene = subject.scene.bath, subject.at_rest()
     assert bath is not None
@@ -176,7 +178,7 @@ def _redrawn(subject: Seeded, one: Trajectory) -> float:
         for at, run in ((scene, one), (other, subject.run(other, 1)))
     ]  # fmt: skip
     unit = max(one.arithmetic.state, one.arithmetic.force)
-    lost = unit * np.abs(both[0].draws) / min(x, factor * x)
+    lost = unit * np.abs(both[0].draws) / min(1.0, x, factor * x) ** 2
     error = np.sum([y.error for y in both], axis=0).reshape(lost.shape)
     return float(np.max(np.abs(both[0].draws - both[1].draws) / (lost + error)))
 

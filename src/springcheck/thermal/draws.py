@@ -243,9 +243,9 @@ def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:
     shows in the position."""
     found = law_of(scheme, scene)
     # the stiffest particle has all that the others have
-    G = found.G[int(np.argmax(np.abs(found.k) / found.m))].astype(np.float64)
-    size = np.sqrt(scene.thermal / scene.m[0])
-    G = G / np.array([[size * scene.step], [size * scene.m[0]]])
+    j = int(np.argmax(np.abs(found.k) / found.m))
+    m = float(scene.m[j])
+    G = found.G[j].astype(np.float64) / (np.sqrt(scene.thermal / m) * np.array([[scene.step], [m]]))
     _, weights, turned = np.linalg.svd(G, full_matrices=False)
     u = int(np.count_nonzero(weights > 1e-9 * weights[0]))
     if u == scheme.draws:
