@@ -32,7 +32,7 @@ def test_what_is_right_passes_here(name: str) -> None:
 def test_right_thermostats_raise_no_alarm_in_random_baths() -> None:
     """Among these were alarms of coefficients that cancel, of noise below rounding, of rare collisions, of
     draws that were told apart by the mass of another particle."""
-    for seed in (4, 17, 21, 41, 50, 63, 70, 85, 88, 110, 137, 141, 953, 1216, 1344, 2284, 284, 891):
+    for seed in (4, 17, 21, 41, 50, 63, 70, 85, 88, 110, 137, 141, 953, 1216, 1344, 2284, 284, 588, 891):
         found = clean_bath(seed)
         assert found.alarms == ()
         assert found.verdicts >= 4

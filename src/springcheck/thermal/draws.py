@@ -150,6 +150,10 @@ class _Reader:
 
         none = at(0.0)
         slope, target = at(1.0) - none, np.stack(end)
+        if self.scheme.acts[0].kind in ("rescale", "scale"):
+            # without the kicks, which a small momentum loses its digits beside
+            still = np.zeros_like(start[0])
+            slope = np.stack(self.stepper(still, start[1], lambda q, p: 0 * q, [0], 1.0))
         twice = np.sum(slope[1] ** 2 / m, axis=-1, keepdims=True)
         factor = np.sum(slope[1] * (target - none)[1] / m, axis=-1, keepdims=True) / twice
         of = np.stack(self._allowed(start, [0], np.maximum(1, np.abs(factor))))
