@@ -48,3 +48,12 @@ def test_a_campaign_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest
     assert known["cases"] == 5
     assert known["found"]["runs"] == 5
     assert json.loads((tmp_path / "alarms.json").read_text()) == known
+
+
+@pytest.mark.parametrize("part", ["alarms", "files"])
+def test_what_is_stored_has_no_alarm_and_no_wrong_name(part: str) -> None:
+    known = json.loads((campaign.HERE / f"{part}.json").read_text())
+    assert known["cases"] >= 300
+    found = known["found"]
+    assert found.get("alarms", 0) == 0
+    assert [word for word in found if word.endswith(("WRONG NAME", "IN THE LIST"))] == []
