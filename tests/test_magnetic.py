@@ -15,6 +15,7 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Magnetic, Spring, WallSpring
+from springcheck.studies.stability import longest
 
 SCENES = ("magnetic", "foucault")
 
@@ -161,3 +162,7 @@ def test_a_joined_pair_in_a_field_is_judged_to_rounding() -> None:
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, "own:boris"))}
     assert found["step-defect"].passed is True
     assert found["momentum"].passed is None
+
+
+def test_no_longest_step_is_said_in_a_field_whose_part_in_it_is_not_known() -> None:
+    assert longest.linear(scenes.load_scene("foucault"), schemes.SCHEMES["semi-implicit-euler"]) is None

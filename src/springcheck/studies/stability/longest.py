@@ -105,8 +105,11 @@ def fastest(scene: Scene) -> float:
 
 
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
-    """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at."""
+    """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at, and
+    in a magnetic field, which is no stiffness."""
     system = scene.system
+    if "magnetic" in system.acting:
+        return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
             return None

@@ -75,7 +75,7 @@ def _of_scene(study: Stability) -> Lines:
     beyond = [x.method for x in study.limits if study.largest(x) < abs(scene.step)]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
-    elif study.limits:
+    elif any(study.largest(x) >= abs(scene.step) for x in study.limits):
         out.append(plain("  within the limit of every method measured here"))
     if not scene.system.is_linear:
         out.append(
