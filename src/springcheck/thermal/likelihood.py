@@ -107,7 +107,10 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
         if _follows(left[1], moved, z) or (weights[4] > 1e-9 * weights[3] and _follows(rest, moved, z)):
-            return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
+            size, joint = _left_of(z, moved.T)
+            # of joined particles, as of one, what takes no noise leaves none that is white
+            noisy = np.max(size) > NOISE and all(map(_is_white, joint))
+            return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
@@ -139,9 +142,16 @@ def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
 
 def _left(z: Floats) -> Floats:
     """What the best linear map leaves of each frame, of variance 1, (2, f-1)."""
-    known = np.concatenate([z[:, :-1], np.ones((1, z.shape[1] - 1))]).T
-    left = z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]
-    return np.asarray((left / np.maximum(np.std(left, axis=0), 1e-300)).T)
+    return _left_of(z, np.empty((0, z.shape[1] - 1)))[1]
+
+
+def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
+    """What the best linear map of states and of more beside them (k, f-1) leaves: its standard deviations
+    (2,), and what is left over these (2, f-1)."""
+    known = np.concatenate([z[:, :-1], beside, np.ones((1, z.shape[1] - 1))]).T
+    left = (z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]).T
+    size = np.std(left, axis=1)
+    return np.asarray(size), np.asarray(left / np.maximum(size, 1e-300)[:, None])
 
 
 def _is_white(x: Floats) -> bool:
