@@ -229,7 +229,7 @@ def told(document: dict[str, Any], folder: Path) -> dict[str, Any]:
                 f"--command '{method}=./{name} {what} {{scene}} {{out}}'"
             )
         elif engine in files:
-            command += f" --engine validation/engines/{files[engine]}"
+            command = f"PYTHONPATH=validation/engines {command} --engine validation/engines/{files[engine]}"
         entry["note"] = entry["note"] or NOTES.get(method, "")
         entry["command"] = command
     return document

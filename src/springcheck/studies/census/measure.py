@@ -180,7 +180,7 @@ def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
         inside = f"{found.scheme}-{found.stride}"
         if inside in schemes.ATTACHED:
             return inside
-        if found.scheme in schemes.SCHEMES:
+        if found.scheme in schemes.SCHEMES or found.scheme in schemes.ELSEWHERE:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
         return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))

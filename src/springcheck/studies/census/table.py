@@ -98,7 +98,10 @@ def _row(x: Row) -> dict[str, str]:
         "version": x["version"],
         "thermostat": x.get("thermostat") or "none",
         "constraint": x.get("constraint") or "none",
-        "scheme": " or ".join(schemes.title(name) for name in x["found"].split(" or "))
+        "scheme": " or ".join(
+            getattr(schemes.ELSEWHERE.get(name), "title", schemes.title(name))
+            for name in x["found"].split(" or ")
+        )
         if named
         else x["found"],
         "velocity": "-" if offset is None else "synchronised" if offset == 0 else f"{offset:+g} of a step",
