@@ -23,7 +23,11 @@ from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
 
-LABELS = [str(label) for label in engines.match(("*",)) if propagators.has_one_step(label)]
+LABELS = [
+    str(label)
+    for label in engines.match(("*",))
+    if propagators.has_one_step(label) and "rods" not in {x.value for x in engines.method(label).requires}
+]
 SINGLE = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "stiff" / "multiple-time-steps.json"
 Need = Callable[[str], None]

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import inspect
 import math
-import textwrap
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
@@ -198,4 +197,4 @@ def _sum(row: Sequence[Fraction]) -> str:
 
 
 def _line(text: str) -> str:
-    return textwrap.fill(" ".join(text.split()), 80, break_long_words=False, break_on_hyphens=False)
+    return " ".join(text.split())
