@@ -21,7 +21,12 @@ from springcheck.studies.extremes import result as keeping
 from springcheck.studies.extremes.planes import planes
 
 Need = Callable[[str], None]
-METHODS = [str(label) for label in engines.match(("*",)) if "particles" in engines.method(label).kinds]
+METHODS = [
+    str(label)
+    for label in engines.match(("*",))
+    if "particles" in engines.method(label).kinds
+    and "rods" not in {x.value for x in engines.method(label).requires}
+]
 GPU = [
     f"openmm:{method}@OpenCL-{precision}"
     for method in ("verlet", "euler")

@@ -54,7 +54,7 @@ CLAIMS = {
     "stiffness": r"stiffness .*times|stiffer by|another spring|softer by",
     "mass": r"mass is left out|treated as a velocity|divided by the mass",
     "plane": r"span its plane|record more of the motion",
-    "noise": r"^Noise",
+    "noise": r"^Noise|takes noise",
     "time": r"changes in time|alternat",
     "anharmonic": r"anharmonic|not linear in the position|clipped",
     "drag": r"drag|not linear in the velocity|depends on the velocity",

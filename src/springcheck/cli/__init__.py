@@ -132,7 +132,11 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             help=one.about,
             description=one.about[:1].upper() + one.about[1:] + ".",
             epilog="\n".join(
-                ["examples:", *(f"  springcheck {one.name} {x}".rstrip() for x in EXAMPLES[one.name])]
+                # a study of one's own has none
+                [
+                    "examples:",
+                    *(f"  springcheck {one.name} {x}".rstrip() for x in EXAMPLES.get(one.name, [""])),
+                ]
             ),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

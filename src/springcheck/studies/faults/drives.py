@@ -7,6 +7,7 @@ from typing import Any
 
 from springcheck import schemes
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Drive
 from springcheck.studies.faults.steppers import Step, textbook
 
 
@@ -20,11 +21,16 @@ def held(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     return textbook(scene, scheme, clock=lambda i: (i * scene.step, 0.0))
 
 
-def other(scene: Scene, **factors: Any) -> Scene:
+def other(scene: Scene, *, amplitude: Any = 1.0, frequency: float = 1.0, phase: float = 1.0) -> Scene:
     """With columns of every drive multiplied."""
     terms = (
-        replace(term, **{name: getattr(term, name) * x for name, x in factors.items() if hasattr(term, name)})  # type: ignore[type-var]
-        if term.kind == "drive"
+        replace(
+            term,
+            amplitude=term.amplitude * amplitude,
+            frequency=term.frequency * frequency,
+            phase=term.phase * phase,
+        )
+        if isinstance(term, Drive)
         else term
         for term in scene.terms
     )
