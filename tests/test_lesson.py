@@ -5,14 +5,17 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import runpy
 import sys
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 from springcheck.identify import identify_stepper
+from springcheck.thermal import THERMOSTATS, Law
 
 LESSON = Path(__file__).parents[1] / "validation" / "lesson"
 
@@ -147,6 +150,108 @@ def test_what_never_ends_or_cannot_be_read_is_answered_in_a_line(
     (tmp_path / "mine.py").write_text(endless)
     assert grade.main([str(tmp_path / "mine.py")]) == 1
     assert "does a loop in it never end?" in capsys.readouterr().out
+
+
+QUESTIONS = _module("temperature_questions").QUESTIONS
+SLIPS = [(name, said) for name, question in QUESTIONS.items() for said in question.slips]
+
+
+def test_the_functions_of_temperature_are_not_yet_right_and_their_solutions_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    grade = _module("grade")
+    assert grade.main([str(LESSON / "temperature.py")]) == 1
+    out = capsys.readouterr().out
+    assert out.count("not yet") == len(QUESTIONS) == 6
+    assert out.count("nothing is returned") == 5
+    assert "0 of 6" in out
+    assert grade.main([str(LESSON / "temperature.py"), "--hint"]) == 1
+    hints = capsys.readouterr().out
+    assert hints.count("look: ") == 6
+    assert "friction lasts too long" in hints
+    assert "sqrt(m) is missing" in hints
+    assert grade.main([str(LESSON / "temperature.py"), "--answer"]) == 1
+    assert "answer: Each O lasts half a step" in capsys.readouterr().out
+    assert grade.main([str(LESSON / "temperature_solutions.py")]) == 0
+    assert "6 of 6" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("name", "said"), SLIPS)
+def test_a_common_mistake_about_temperature_gets_its_sentence(name: str, said: str) -> None:
+    right, _, look = _module("grade").answered(QUESTIONS[name].slips[said], QUESTIONS[name])
+    assert (right, look) == (False, said)
+
+
+def test_what_the_grader_holds_for_right_is_what_the_laws_of_thermostats_say() -> None:
+    m, k, rate, kT, h = 1.7, 2.9, 0.8, 0.6, 0.4
+    w = (k / m) ** 0.5
+
+    def law(name: str) -> Law:
+        return Law(scheme=THERMOSTATS[name], h=h, m=np.array([m]), k=np.array([k]), rate=rate, thermal=kT)
+
+    for name, draws in (("baoab", 1), ("obabo", 2)):
+        columns = []
+        for unit in np.eye(2 + draws):
+            xi = unit[2] if draws == 1 else unit[2:]
+            columns.append(QUESTIONS[name].right(*unit[:2], h, lambda q: -k * q, m, rate, kT, xi))
+        found = np.array(columns).T
+        assert found == pytest.approx(np.hstack([law(name).A[0], law(name).G[0]]).astype(float), rel=1e-12)
+        S = QUESTIONS["stationary"].right(found[:, :2], found[:, 2:])
+        assert law(name).covariance[0] == pytest.approx(S, rel=1e-12, abs=1e-15)
+    kinetic = [kT * law(name).kinetic[0] for name in ("baoab", "baoa")]
+    assert QUESTIONS["kinetic"].right(h, w, kT) == pytest.approx(kinetic, rel=1e-12)
+    hot = law("obabo").configurational[0]
+    assert QUESTIONS["configurational"].right(h, w) == pytest.approx(hot, rel=1e-12)
+    n, r = 4000, 0.6
+    correlation = r ** (2.0 * np.abs(np.subtract.outer(np.arange(n), np.arange(n))))
+    # the ends have neighbours on one side alone: a share r**2/(n (1 - r**4)) of the whole
+    assert QUESTIONS["error"].right(n, r) == pytest.approx((2 * correlation.mean()) ** 0.5, rel=1 / n)
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        ("def error(n, r):\n    return 1 / 0\n", "it is no answer: ZeroDivisionError"),
+        ("def error(n, r):\n    return n, r\n", "its shape is (2,)"),
+        ("def error(n, r):\n    n, r\n", "nothing is returned"),
+        (
+            "def error(n, r):\n    return (2 / n * (1 + r * r) / (1 - r * r)) ** 0.5 + 1e-13\n",
+            "error           not yet",
+        ),
+    ],
+)
+def test_an_answer_that_is_none_is_told_in_a_line(
+    function: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out = graded(tmp_path, function, capsys)
+    assert status == 1
+    assert said in out
+    assert "mine.py has no function baoab" in out
+    assert out.count("\n") == 7
+
+
+def test_a_grader_without_its_questions_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("grade.py", "temperature.py"):
+        (tmp_path / name).write_text((LESSON / name).read_text())
+    alone = runpy.run_path(str(tmp_path / "grade.py"), run_name="alone")
+    assert alone["main"]([str(tmp_path / "temperature.py")]) == 2
+    assert "need temperature_questions.py beside grade.py" in capsys.readouterr().out
+
+
+def test_an_iteration_that_ends_early_is_told_to_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = """
+import numpy as np
+
+def stationary(A, G):
+    S = G @ G.T
+    for _ in range(%d):
+        S = A @ S @ A.T + G @ G.T
+    return S
+"""
+    assert "right to nine digits, not to rounding" in graded(tmp_path, text % 52, capsys, "--hint")[1]
+    assert "stationary      right" in graded(tmp_path, text % 500, capsys)[1]
 
 
 def test_how_to_cite_names_this_version() -> None:

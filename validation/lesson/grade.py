@@ -5,7 +5,9 @@
     python grade.py FILE.py --answer   and what was wrong, where solutions.py lies beside this file
 
 `springcheck identify` says which scheme the states of each function show, and whether all of them fit it to
-rounding.  What a function prints is kept back; one that takes longer than five seconds is stopped.
+rounding.  Functions of temperature.py are asked what laws answer, and random steps get draws from a script;
+these are judged to rounding too.  What a function prints is kept back; one that takes longer than five
+seconds is stopped.
 """
 
 import signal
@@ -15,6 +17,8 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from springcheck import schemes
 from springcheck.engines import module_of
@@ -113,6 +117,52 @@ def hint(step: Step, aim: str) -> str:
     return f"hold it beside {scheme.title}{f': {stages}' if stages else ''}; try a mass that is not 1"
 
 
+def asked_of(module: Any) -> dict[str, Any]:
+    """What is asked of a file: steppers by the schemes that they are meant to be, or questions."""
+    if hasattr(module, "AIMS"):
+        return {name: AIMS.get(name) or str(aim) for name, aim in dict(module.AIMS).items()}
+    place = Path(__file__).with_name("temperature_questions.py")
+    if any(hasattr(module, name) for name in AIMS) or not place.is_file():
+        return dict(AIMS)
+    asked: dict[str, Any] = module_of(place).QUESTIONS
+    return asked if any(hasattr(module, name) for name in asked) else dict(AIMS)
+
+
+def answered(function: Step, asked: Any) -> tuple[bool, str, str]:
+    """Whether a function answers a question rightly, what it answers, and where to look."""
+    answers = []
+    for case in asked.cases:
+        given = [x.copy() if isinstance(x, np.ndarray) else x for x in case]
+        try:
+            with redirect_stdout(StringIO()), redirect_stderr(StringIO()), limited(SECONDS):
+                answer = function(*given)
+            if answer is None or (isinstance(answer, tuple) and any(x is None for x in answer)):
+                return False, "it is no answer yet: nothing is returned", asked.look
+            answers.append(np.asarray(answer, float))
+        except TooLongError:
+            return False, f"stopped after {SECONDS:g} s: does a loop in it never end?", asked.look
+        except (Exception, SystemExit) as error:
+            return False, f"it is no answer: {type(error).__name__}: {error}", asked.look
+    wanted = [np.shape(asked.right(*case)) for case in asked.cases]
+    for answer, shape in zip(answers, wanted, strict=True):
+        if answer.shape != shape:
+            return (
+                False,
+                f"it is no answer: its shape is {answer.shape}, and {shape} is asked for",
+                asked.look,
+            )
+    said = asked.slip(answers)
+    return said is None, "to rounding" if said is None else asked.told(answers[0]), said or ""
+
+
+def judge(function: Any, asked: Any, *, look: bool) -> tuple[bool, str, str]:
+    """Whether a function is right, what it shows, and where to look, if that is asked for."""
+    if not isinstance(asked, str):
+        return answered(function, asked)
+    right, said = shows(function, asked)
+    return right, said, hint(function, asked) if look and not right else ""
+
+
 def main(arguments: list[str]) -> int:
     """Print a line for each stepper, and what is asked for below it."""
     files = [one for one in arguments if not one.startswith("--")]
@@ -133,33 +183,42 @@ def main(arguments: list[str]) -> int:
         return 2
     finally:
         sys.path.remove(str(path.parent))
-    named = dict(getattr(module, "AIMS", AIMS))
-    aims: dict[str, str] = {name: AIMS.get(name) or str(aim) for name, aim in named.items()}
+    asked = asked_of(module)
+    if not any(hasattr(module, name) for name in asked):
+        beside = Path(__file__).with_name("temperature_questions.py").is_file()
+        more = "" if beside else "; those of temperature need temperature_questions.py beside grade.py"
+        print(f"{path.name} has none of the functions {', '.join(asked)}{more}")
+        return 2
     mended = 0
-    for name, aim in aims.items():
-        step = getattr(module, name, None)
-        right, said = shows(step, aim) if callable(step) else (False, f"{path.name} has no function {name}")
+    for name, question in asked.items():
+        function = getattr(module, name, None)
+        right, said, look = False, f"{path.name} has no function {name}", ""
+        if callable(function):
+            right, said, look = judge(function, question, look=bool(wanted))
         mended += right
         told = right or said.startswith(("it is no", "stopped", path.name)) or wanted
-        print(f"{name:6} {'right' if right else 'not yet'}{f': {said}' if told else ''}")
-        if not right and wanted and callable(step):
-            print(f"       look: {hint(step, aim)}")
+        verdict = f"{'right' if right else 'not yet'}{f': {said}' if told else ''}"
+        print(f"{name:{max(6, *map(len, asked))}} {verdict}")
+        if look and wanted:
+            print(f"       look: {look}")
         if not right and "--answer" in wanted:
             print(f"       answer: {answer(name)}")
-    print(f"{mended} of {len(aims)}{'' if mended == len(aims) or wanted else '; --hint says where to look'}")
-    return 0 if mended == len(aims) else 1
+    more = "" if mended == len(asked) or wanted else "; --hint says where to look"
+    print(f"{mended} of {len(asked)}{more}")
+    return 0 if mended == len(asked) else 1
 
 
 def answer(name: str) -> str:
     """What was wrong, as the solutions say it."""
-    place = Path(__file__).with_name("solutions.py")
-    if not place.is_file():
-        return "your teacher has it"
-    sys.path.insert(0, str(place.parent))
+    places = [Path(__file__).with_name(name) for name in ("solutions.py", "temperature_solutions.py")]
+    sys.path.insert(0, str(places[0].parent))
     try:
-        found = getattr(module_of(place), name, None)
+        known = [module_of(place) for place in places if place.is_file()]
     finally:
-        sys.path.remove(str(place.parent))
+        sys.path.remove(str(places[0].parent))
+    if not known:
+        return "your teacher has it"
+    found = next((getattr(module, name) for module in known if hasattr(module, name)), None)
     return " ".join((found.__doc__ or "").split()) if found else "none is known"
 
 
