@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,15 @@ def pytest_configure() -> None:
     """Shells start a command in the background with SIGINT ignored, and its children inherit that."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def _brings_nothing_to_others() -> Iterator[None]:
+    """What a test has brought, a function or an engine, is gone after it."""
+    before = dict(engines.registry._brought)
+    yield
+    engines.registry._brought.clear()
+    engines.registry._brought.update(before)
 
 
 @pytest.fixture

@@ -269,6 +269,7 @@ def test_too_little_address_space_is_said_in_words(size: int) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
 
 
+@pytest.mark.slow
 def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() -> None:
     odd = {"USER": os.fsdecode(b"J\xf6rg"), "MPLBACKEND": "nonsense"}
     assert limited("run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5", **odd).stderr == ""
@@ -277,6 +278,7 @@ def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() 
     assert limited("check", "s.h5").returncode == 0
 
 
+@pytest.mark.slow
 def test_who_wants_no_colours_gets_none_whatever_else_is_said() -> None:
     words = ("run", "spring", "--method", "own:euler", "--force", "-o", "s.h5")
     assert "\x1b[" in limited(*words, FORCE_COLOR="1").stdout

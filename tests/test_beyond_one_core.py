@@ -22,6 +22,8 @@ from springcheck.studies.team import Processes
 from springcheck.text.wording import count
 from stores import raising
 
+pytestmark = pytest.mark.slow
+
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -27,10 +26,8 @@ OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    yield
-    engines.registry._brought.clear()
 
 
 def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,6 +51,7 @@ def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) 
     assert np.array_equal(restored.entries[0].q, driver.run(load_scene("spring"), OWN[0]).q[:, 0])
 
 
+@pytest.mark.slow
 def test_a_census_by_workers_is_that_of_one_but_for_the_times_which_they_do_not_measure() -> None:
     assert np.isnan(census.entry(engines.parse(OWN[0])).seconds)
     two, one = (census.record(f"{n}.h5", OWN, team=Processes(n)) for n in (2, 1))

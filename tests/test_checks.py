@@ -109,6 +109,7 @@ def test_the_step_defect_s_bound_is_within_a_thousand_times_of_what_is_seen() ->
     assert max(ratios) < 1e4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("precision", "steps"), [("double", 200), ("mixed", 200), ("single", 200)])
 def test_the_arithmetic_of_opencl_is_the_one_it_is_said_to_have(
     precision: str, steps: int, need: Need

@@ -31,6 +31,7 @@ ENGINES = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", ENGINES)
 def test_every_engine_passes_every_experiment_that_applies(label: str, need: Need) -> None:
     need(label)
@@ -132,6 +133,7 @@ def test_an_anharmonic_scene_has_no_matrix_but_turns_back() -> None:
     assert verdicts["reversibility"].passed is True
 
 
+@pytest.mark.slow
 def test_a_free_chain_and_an_inverted_spring_pass_the_experiments() -> None:
     for seed in range(30):
         scene = clean.random_scene(np.random.default_rng([5, seed]))

@@ -127,6 +127,7 @@ def test_inspect_shows_the_store_and_the_numbers_asked_for(capsys: pytest.Captur
 PICTURES = ("phase-portrait", "position", "energy", "error")
 
 
+@pytest.mark.slow
 def test_plot_draws_four_pictures_twice(capsys: pytest.CaptureFixture[str]) -> None:
     main(["run", "spring", *OWN, "--quiet"])
     assert main(["plot", "spring.h5", "-o", "pictures"]) == 0

@@ -6,7 +6,6 @@ import importlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,12 +19,6 @@ from springcheck.physics.scenefile import load_scene
 
 README = Path(springcheck.engines.__file__).parent / "README.md"
 CODE = re.search(r"```python\n(\"\"\"my_engine.*?)```", README.read_text(), re.DOTALL).group(1)  # type: ignore[union-attr]
-
-
-@pytest.fixture(autouse=True)
-def _nothing_left_over() -> Iterator[None]:
-    yield
-    engines.registry._brought.clear()
 
 
 def made(code: str) -> Engine:
@@ -101,6 +94,7 @@ def test_a_wrong_engine_is_told_what_its_states_show() -> None:
     assert "What the states show" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_pytest_shows_the_sentence_and_no_frames_of_ours(tmp_path: Path) -> None:
     code = CODE.replace("self.h * y / m", "self.h * y", 1)
     (tmp_path / "my_engine.py").write_text(code)

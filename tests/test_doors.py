@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from springcheck import doors, driver, engines
+from springcheck import doors, driver
 from springcheck.cli import main
 from springcheck.errors import MethodError
 from springcheck.physics.scenefile import load_scene
@@ -22,10 +21,8 @@ EXAMPLES = Path(__file__).parent / "command-examples"
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    yield
-    engines.registry._brought.clear()
 
 
 VERLET = """
@@ -132,6 +129,7 @@ def test_names_that_would_be_one_are_refused(tmp_path: Path, capsys: pytest.Capt
     assert "two commands have this name" in refused(capsys, *command, *command)
 
 
+@pytest.mark.slow
 def test_workers_run_what_a_call_brings(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(VERLET)
     shutil.copy(Path(__file__).parent / "plugin-example" / "springcheck_pefrl.py", tmp_path / "plug.py")
@@ -207,6 +205,7 @@ def program(tmp_path: Path, body: str) -> str:
 ROWS = "0,0,1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "said"),
     [

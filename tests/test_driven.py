@@ -146,6 +146,7 @@ def multiplier(scene: Scene, label: str, steps: int) -> complex:
     return complex(max(np.linalg.eigvals(np.array(ends)), key=abs))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
 def test_the_floquet_multiplier_is_that_of_mathieus_functions(name: str) -> None:
     """By Taylor series in 30 digits, and by the characteristic exponent of Hill's determinant."""

@@ -223,6 +223,7 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
     assert judged(replace(scene, steps=step - 1), before) == []
 
 
+@pytest.mark.slow
 def test_pocl_turns_every_force_beyond_fixed_point_into_the_lowest_number_and_sums_modulo_2_to_the_64(
     need: Need,
 ) -> None:

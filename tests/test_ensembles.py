@@ -144,6 +144,7 @@ def test_what_cannot_be_varied_is_said_in_one_line(given: list[str], words: str,
     assert not (tmp_path / "e.h5").exists()
 
 
+@pytest.mark.slow
 def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -33,7 +33,10 @@ GPU = [
     for precision in ("single", "mixed", "double")
 ]
 
-pytestmark = pytest.mark.skipif(not WIDE, reason="the study needs a wider range than double's")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not WIDE, reason="the study needs a wider range than double's"),
+]
 
 
 @pytest.mark.parametrize("name", [*METHODS, *GPU])

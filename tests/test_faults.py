@@ -22,6 +22,8 @@ from springcheck.studies.faults.result import Clean, FaultReport, Result
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 
+pytestmark = pytest.mark.slow
+
 Need = Callable[[str], None]
 
 

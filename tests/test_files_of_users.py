@@ -109,6 +109,7 @@ def test_force_replaces_a_store_that_is_damaged(tmp_path: Path) -> None:
         assert store.check(name) == []
 
 
+@pytest.mark.slow
 def test_plot_replaces_no_figure_but_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

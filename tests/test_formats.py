@@ -27,7 +27,7 @@ from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 
-pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here")]
 
 SCENE = load_scene("spring-uneven")
 LINE = np.array([0.6, 0.0, 0.8])

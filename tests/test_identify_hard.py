@@ -478,6 +478,7 @@ def test_a_number_of_substeps_that_digits_do_not_tell_is_a_range(digits: int, wo
     assert_said(found, words)
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_wobbles_is_found_in_a_long_file_in_little_memory() -> None:
     step = verlet(lambda i, q, p: -K * q * (1 + 1e-6 * np.sin(0.037 * i)))
     t, q, p = march(step, 4000)

@@ -37,6 +37,8 @@ from springcheck.studies.run.drawable import drawable
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
 
+pytestmark = pytest.mark.slow
+
 Need = Callable[[str], None]
 
 

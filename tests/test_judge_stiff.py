@@ -86,6 +86,7 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
         assert found.value > 1e3 * found.bound, fault
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("form", WRITTEN)
 def test_every_way_to_write_an_implicit_step_of_a_stiff_pair_passes(name: str, form: str) -> None:

@@ -17,6 +17,8 @@ import pytest
 from springcheck.identify import identify_stepper
 from springcheck.thermal import THERMOSTATS, Law
 
+pytestmark = pytest.mark.slow
+
 LESSON = Path(__file__).parents[1] / "validation" / "lesson"
 
 

@@ -550,6 +550,7 @@ print(sorted({name.partition(".")[0] for name in sys.modules} & {"numba", "llvml
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "imported"), [(200, "[]"), (10**9, "['llvmlite', 'numba']")])
 def test_200_steps_import_no_compiler_and_a_long_run_does(steps: int, imported: str) -> None:
     done = subprocess.run(
@@ -567,6 +568,7 @@ def test_without_numba_a_long_run_is_interpreted(monkeypatch: pytest.MonkeyPatch
         simulation.prepare(spring, "explicit-euler", 0.1, compiled=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [RuntimeError("no locator available"), OSError("disk full")])
 def test_where_compiled_code_cannot_be_saved_it_is_compiled_for_the_process(
     monkeypatch: pytest.MonkeyPatch, error: Exception
@@ -597,6 +599,7 @@ def doubled(factor: float, q: Floats, p: Floats) -> None:
         q[i, 0] = factor * p[i, 0]
 
 
+@pytest.mark.slow
 def test_damaged_compiled_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """numba itself ends in EOFError, UnpicklingError or a killed process: each look is one of its own."""
     numba = pytest.importorskip("numba")

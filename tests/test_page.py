@@ -32,6 +32,8 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
 from springcheck.text.lines import TextTable, plain, table
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = (
     "</title></script><script>document.documentElement.dataset.hurt=1</script><img src=x onerror='1'>\"'&"
 )

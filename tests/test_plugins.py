@@ -18,7 +18,7 @@ from springcheck import engines
 from springcheck.cli import main
 from springcheck.errors import MethodError
 
-pytestmark = pytest.mark.usefixtures("own_folder")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder")]
 
 EXAMPLE = Path(__file__).parent / "plugin-example"
 
@@ -26,7 +26,6 @@ EXAMPLE = Path(__file__).parent / "plugin-example"
 @pytest.fixture(autouse=True)
 def _nothing_left_over() -> Iterator[None]:
     yield
-    engines.registry._brought.clear()
     engines.registry._points.cache_clear()
     engines.registry._loaded.cache_clear()
 

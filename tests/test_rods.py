@@ -336,6 +336,7 @@ def water(half: float = 3 / 64, low: float = 4 / 64) -> Scene:
     return Scene(m=m, q=q, p=m * v.ravel(), places=np.arange(9), terms=(rods,), step=0.05, steps=200)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", ["own:velocity-verlet", "ase:rattle", "openmm:verlet-rods"])
 def test_a_rigid_triangle_turns_about_its_axis_by_the_same_arc_sine(label: str, need: Need) -> None:
     """OpenMM has SETTLE for it, ASE iterates, the own method solves three equations by Newton."""

@@ -23,6 +23,7 @@ def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     schemas.printed(schemas.WAYS["run"][0] + " --force")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_files")
 @pytest.mark.parametrize("command", list(schemas.WAYS))
 def test_every_document_of_a_command_keeps_to_its_schema(command: str) -> None:

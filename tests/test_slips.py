@@ -15,6 +15,8 @@ import springcheck
 from springcheck.cli import main
 from springcheck.physics import scenefile
 
+pytestmark = pytest.mark.slow
+
 SPRING = (scenefile.folder() / "spring.toml").read_text()
 
 STEPPERS = """

@@ -23,6 +23,8 @@ from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
 
+pytestmark = pytest.mark.slow
+
 LABELS = [
     str(label)
     for label in engines.match(("*",))

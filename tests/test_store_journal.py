@@ -21,6 +21,8 @@ from springcheck.store import adopt, files, merge, seal
 from springcheck.store.parts import claim, parts_folder
 from stores import LABELS, assert_same, scene, trajectory, written
 
+pytestmark = pytest.mark.slow
+
 
 class Killed(BaseException):
     """A kill, as seen from the place where it happens."""

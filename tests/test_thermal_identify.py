@@ -17,6 +17,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.thermal.likelihood import identify_thermal
 
+pytestmark = pytest.mark.slow
+
 M, K, RATE, THERMAL = 3.7, 2.9, 0.8, 1.7
 OMEGA = np.sqrt(K / M)
 

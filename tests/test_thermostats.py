@@ -24,6 +24,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.thermal import THERMOSTATS, chance
 
+pytestmark = pytest.mark.slow
+
 LABELS = [
     f"{name}:{method}"
     for name in ("own", "openmm", "ase", "lammps")

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 LINE = "catalogue.SCHEMES['odd-7'] = catalogue.{how}"
 PROGRAM = """
 import sys

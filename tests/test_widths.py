@@ -26,6 +26,8 @@ from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
 from springcheck.text.lines import GAP, Lines, TextTable, table
 
+pytestmark = pytest.mark.slow
+
 WIDTHS = (60, 80, 100, 200)
 
 
