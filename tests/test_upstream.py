@@ -30,7 +30,9 @@ STANDARD_ERRORS = 5
 
 LINE = re.compile(r"measured (\S+) law (\S+) uncertainty (\S+) promised (\S+)\s*$")
 
-SCRIPTS = sorted(x for x in FOLDER.iterdir() if x.suffix in (".py", ".cjs", ".c"))
+LIBRARIES = {"gsl": "gsl gslcblas", "sundials": "sundials_arkode sundials_nvecserial sundials_generic"}
+
+SCRIPTS = sorted(x for x in FOLDER.iterdir() if x.suffix in (".py", ".cjs", ".c", ".R"))
 
 HARMLESS = "**harmless**"
 
@@ -38,11 +40,16 @@ HARMLESS = "**harmless**"
 def command(script: Path, folder: Path) -> list[str]:
     """How to run a reproducer; skips where its engine is not here."""
     if script.suffix == ".c":
-        built, libraries = folder / script.stem, ("arkode", "nvecserial", "generic")
-        cc = ["cc", str(script), "-o", str(built), *(f"-lsundials_{x}" for x in libraries), "-lm"]
+        built, name = folder / script.stem, script.stem.partition("_")[0]
+        cc = ["cc", str(script), "-o", str(built), *(f"-l{x}" for x in LIBRARIES[name].split()), "-lm"]
         if shutil.which("cc") is None or subprocess.run(cc, capture_output=True, check=False).returncode:
-            pytest.skip("no SUNDIALS of ERKStep's time is here")
+            pytest.skip(f"no {name} of the finding's time is here")
         return [str(built)]
+    if script.suffix == ".R":
+        has = ["Rscript", "-e", "library(deSolve)"]
+        if shutil.which(has[0]) is None or subprocess.run(has, capture_output=True, check=False).returncode:
+            pytest.skip("deSolve is not installed for R")
+        return ["Rscript", str(script)]
     needs = NEEDS[script.stem.partition("_")[0]]
     if script.suffix == ".py":
         try:
