@@ -12,7 +12,7 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 5926,
     ("schemes",): 1493,
-    ("thermal",): 1455,
+    ("thermal",): 1468,
     ("engines/own",): 1696,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1157,
     ("engines",): 2434,
@@ -51,3 +51,12 @@ def test_every_room_keeps_its_budget() -> None:
     ]
     assert over == []
     assert set(found) == set(BUDGETS)
+
+
+def test_no_module_is_longer_than_400_lines() -> None:
+    long = {
+        str(path.relative_to(HOME)): lines
+        for path in HOME.rglob("*.py")
+        if (lines := len(path.read_text().splitlines())) > 400
+    }
+    assert long == {}

@@ -15,7 +15,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
-from springcheck.thermal.likelihood import identify_thermal
+from springcheck.thermal.states import identify_thermal
 
 pytestmark = pytest.mark.slow
 

@@ -43,7 +43,7 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.likelihood import identify_thermal
+from springcheck.thermal.states import identify_thermal
 
 H, M, K, RATE, THERMAL = 0.35, 3.7, 2.9, 0.8, 1.7
 FIGURE = Path(__file__).parents[1] / "data" / "figures" / "thermostats.png"

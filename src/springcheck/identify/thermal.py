@@ -9,7 +9,7 @@ import numpy as np
 
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.likelihood import FEWEST, Thermal, identify_thermal
+from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
 """Oscillators that are looked at, each by itself."""

@@ -1,8 +1,6 @@
-"""Which thermostat made the states of an oscillator: by what no noise reaches, and by likelihood.
+"""Thermostats by the Gaussian likelihood of an oscillator's states in (h w)**2, gamma h and kT/m.
 
-Of one draw a step a combination of (x', v', x, v) is free of noise: a null vector of the recorded frames,
-known to rounding at any temperature.  Everything else is a Gaussian likelihood in (h w)**2, gamma h and kT/m,
-of which the second moments of the frames are sufficient.
+The second moments of the frames are sufficient.
 """
 
 from __future__ import annotations
@@ -10,31 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf, nan
+from math import nan
 from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import chance
-from springcheck.thermal.catalogue import GJ, THERMOSTATS
+from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.laws import Law
-
-FEWEST = 200
-"""Frames from which on states are asked for their draws."""
-
-NOISE = 1e-3
-"""Size of the noise of a step over that of the motion, from which on it is noise and not rounding of a file:
-gamma h of 5e-7."""
 
 ODDS = float(np.log(1e6))
 """Nats by which one scheme must beat every other to be named."""
-
-WHITE = 1e-9
-"""Chance below which draws are no draws: deterministic motion that does not close in one frame."""
-
-SPARSE = 0.1
-"""Median of the draws, of variance 1, below which most steps have none: 0.67 for normal ones."""
 
 TWO = ("obabo", "oabao", "boaob", "vanden-eijnden-ciccotti")
 
@@ -56,261 +40,7 @@ class Candidate:
     """By how much its likelihood falls short of the best one's."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Thermal:
-    """What the states of an oscillator in a bath say."""
-
-    candidates: tuple[Candidate, ...]
-    """The best first; none where no scheme that is known fits."""
-    free: tuple[float, ...]
-    """The combination of (x', v', x, v) that noise does not reach, 1 on x'; () where there is none."""
-    misfit: float
-    """How far it is from 0, over the size of the noise."""
-    uniform: bool
-    """Whether the draws are uniform rather than normal."""
-    sparser: tuple[str, int] | None = None
-    """A scheme of which every so many steps would do nearly as well as the best candidate."""
-
-    @property
-    def named(self) -> bool:
-        """Whether one scheme beats every other, and every other of smaller steps."""
-        best = bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
-        return best and self.sparser is None
-
-
-JOINED_FROM = 6.0
-"""Standard deviations of a correlation, from which on particles are joined: 2e-9 of those that are not."""
-
-
-def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = None) -> Thermal | None:
-    """What thermostat made positions q and velocities v (f,) at times t (f,); None where none seems to have.
-
-    Of a particle that follows those `beside` it (f, others) no scheme is told.  Deterministic motion, coupled
-    or not, leaves no noise of which one frame says nothing to the next.
-    """
-    if len(t) < FEWEST or not np.isfinite([q, v]).all():
-        return None
-    h = float((t[-1] - t[0]) / (len(t) - 1))
-    with np.errstate(over="ignore", invalid="ignore"):
-        sizes = np.array([np.std(q), np.std(v)])
-    if not np.all((sizes > 0) & (sizes < np.inf)) or not h > 0:
-        return None
-    x, u = (q - q[0]) / sizes[0], v / sizes[1]
-    # beside the state a constant: the place of rest is not known
-    frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(t) - 1)], axis=1)
-    weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
-    if weights[3] < NOISE * weights[0]:
-        return None
-    z = np.stack([x, u])
-    left = _left(z)
-    rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
-    if beside is not None:
-        moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
-        if _follows(left[1], moved, z) or (weights[4] > 1e-9 * weights[3] and _follows(rest, moved, z)):
-            size, joint = _left_of(z, moved.T)
-            # of joined particles, as of one, what takes no noise leaves none that is white
-            noisy = np.max(size) > NOISE and all(map(_is_white, joint))
-            return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
-    if weights[4] < 1e-3 * weights[3]:
-        free = turned[4][:4] / np.tile(sizes, 2)
-        misfit = weights[4] / weights[3]
-        # what digits leave of it is white but for neighbours, which share a frame
-        digits = misfit < 1e-9 or _is_white(rest[::2])
-        # of one draw the position and the momentum leave the same
-        return _of_one(q, v, h, free / free[0], misfit, left[1]) if free[0] and digits else None
-    jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
-    if np.std(jump) < 1e-6 * sizes[0]:
-        return _of_two_halves(q, h, float(np.std(jump) / sizes[0]))
-    if not all(map(_is_white, left)):
-        return None
-    found = Thermal(
-        candidates=tuple(_likely(TWO, q, v, h)), free=(), misfit=nan, uniform=_is_uniform(left[1])
-    )
-    return replace(found, sparser=_sparser(found.candidates[0], q, v, h)) if found.named else found
-
-
-def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
-    """Whether what a map of its own leaves of a particle depends on where others are."""
-    known = np.concatenate([z[:, :-1], np.ones((1, len(left)))]).T
-    for x in beside.T:
-        rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
-        size = float(np.linalg.norm(rest))
-        if size > 0 and abs(float(rest @ left)) > JOINED_FROM * size:
-            return True
-    return False
-
-
-def _left(z: Floats) -> Floats:
-    """What the best linear map leaves of each frame, of variance 1, (2, f-1)."""
-    return _left_of(z, np.empty((0, z.shape[1] - 1)))[1]
-
-
-def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
-    """What the best linear map of states and of more beside them (k, f-1) leaves: its standard deviations
-    (2,), and what is left over these (2, f-1)."""
-    known = np.concatenate([z[:, :-1], beside, np.ones((1, z.shape[1] - 1))]).T
-    left = (z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]).T
-    size = np.std(left, axis=1)
-    return np.asarray(size), np.asarray(left / np.maximum(size, 1e-300)[:, None])
-
-
-def _is_white(x: Floats) -> bool:
-    return min(chance.neighbours(x[:, None]), chance.repeats(x[:, None])) > WHITE
-
-
-def _is_uniform(x: Floats) -> bool:
-    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x) < WHITE)
-
-
-def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats) -> Thermal | None:
-    """Of a single draw a step: the schemes of whose null vector this is one."""
-    _, b, c, d = free
-    close = max(1e-9, 100 * misfit)
-
-    def near(value: float, wanted: float) -> bool:
-        return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
-
-    found: list[Candidate] = []
-    if near(b, d) and near(c, -1):
-        half = near(b, -h / 2)
-        if half:
-            found = _likely(("aboba", "aoboa"), q, v, h)
-        if -b > h / 2 and not half:
-            found = _likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
-        if not half or close > 1e-6:
-            # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-            found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h, len(q)))]
-    elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
-        found = _likely(("baoa",), q, v, h, turn=2 * (1 + c))
-    elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
-        found = _likely(("euler-maruyama",), q, v, h)
-    elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
-        # what a collision has left of the momentum, the rest of the step takes on without noise
-        w = float(np.sqrt(2 * (1 + 1 / c)) / h)
-        known = {"omega": w, "omega_error": 0.0}
-        found = [Candidate(scheme=name, **known) for name in ("andersen", "andersen-after-kick")]
-        left = np.empty(0)
-    elif near(c, -1) and abs(d) <= close * h:
-        if near(b, -h):
-            found = [Candidate(scheme=name) for name in _of_no_memory(q, v, close)]
-        elif -b < h and _is_correlated(left):
-            roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
-            rates = {n: _rate(root, -b / h) for n, root in roots.items()}
-            found = [
-                Candidate(scheme=f"gj-{n}-half", friction=x / h, friction_error=0.0)
-                for n, x in rates.items()
-                if x
-            ]
-            left = np.empty(0)
-    if len(left) and not _is_white(left):
-        return None
-    if not found and float(np.median(np.abs(left))) < SPARSE:
-        # few steps are off, and all others are not
-        return None
-    uniform = bool(len(left)) and _is_uniform(left)
-    return Thermal(candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit, uniform=uniform)
-
-
-def _is_correlated(x: Floats) -> bool:
-    """Whether neighbours share something, and others nothing, as draws that act in two steps."""
-    far = [abs(float(np.mean(x[lag:] * x[:-lag]))) for lag in range(3, 30)]
-    return max(far) < 0.3
-
-
-def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
-    """The x = gamma h at which a function that falls is `wanted`, by halving."""
-    low, high = 1e-9, 1.9
-    if not of(np.asarray(high)) < wanted < of(np.asarray(low)):
-        return None
-    for _ in range(200):
-        x = (low + high) / 2
-        low, high = (x, high) if of(np.asarray(x)) > wanted else (low, x)
-    return x
-
-
-def _decay(q: Floats, v: Floats) -> float:
-    """The determinant of the best linear map, that of the decay of momenta."""
-    z = np.stack([q - np.mean(q), v - np.mean(v)])
-    return float(np.linalg.det(np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0]))
-
-
-def _as_gj(number: str, decay: float, t: float, h: float, n: int) -> Candidate | None:
-    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay known from n frames."""
-    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n))
-    for of_decay in (decay, decay - error, decay + error):
-        x = _rate(GJ[number], of_decay)
-        if not x:
-            continue
-        stretch = float(np.sqrt(2 * (1 - of_decay) / ((1 + of_decay) * x)))
-        a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
-        if a > 0:
-            # GJ-I does not stretch, and knows its spring whatever its friction
-            known = 0.0 if number == "i" else nan
-            return Candidate(
-                scheme=f"gj-{number}", omega=float(np.sqrt(a) / h), omega_error=known, friction=x / h
-            )
-    return None
-
-
-def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
-    """Of positions that follow their velocities, v = (x' - x)/h: those that a bath draws anew at every step,
-    or at some, between which leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
-    with np.errstate(all="ignore"):
-        slopes = np.sort((v[2:] - 2 * v[1:-1] + v[:-2]) / (q[1:-1] - q[:-2]))
-        together = slopes[4:] - slopes[:-4]
-        if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
-            return ("andersen-leapfrog",)
-    known = np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1)
-    left, inverse = (
-        v[1:] - known @ np.linalg.lstsq(known, v[1:], rcond=None)[0],
-        np.linalg.inv(known.T @ known),
-    )
-    memory = np.linalg.lstsq(known, v[1:], rcond=None)[0][0] / np.sqrt(np.var(left) * inverse[0, 0])
-    if abs(memory) > 5:
-        # digits may hide that five steps of leapfrog have one slope
-        return () if close < 1e-6 else ("andersen-leapfrog",)
-    return ("brownian",) if close < 1e-6 else ("brownian", "andersen-leapfrog")
-
-
-def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
-    """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
-    half = np.diff(q) / h
-    known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
-    entries = np.linalg.lstsq(known, half[1:], rcond=None)[0]
-    c, kick = float(entries[0]), float(entries[1])
-    left = half[1:] - known @ entries
-    noise = float(np.std(left))
-    if noise == 0 or not _is_white(left / noise):
-        return None
-    of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
-    uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise)
-    found = []
-    for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
-        # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
-        over = 1 + x / 2 if name == "bbk" else 1.0
-        a = -kick * h * over
-        if a <= 0 or x <= 0:
-            continue
-        w, thermal = float(np.sqrt(a) / h), float((noise * over) ** 2 / (2 * x))
-        found.append(
-            Candidate(
-                scheme=name,
-                omega=w,
-                omega_error=float(of_kick * over / (2 * w)),
-                friction=float(x / h),
-                friction_error=float(of_c * slope / h),
-                thermal=thermal,
-                thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
-                # each draws as its library does, where that shows: uniform draws end at 1.73
-                nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
-            )
-        )
-    return Thermal(
-        candidates=tuple(sorted(found, key=lambda y: y.nats)), free=(), misfit=misfit, uniform=uniform
-    )
-
-
-def _likely(
+def likely(
     names: tuple[str, ...], q: Floats, v: Floats, h: float, *, turn: float | None = None
 ) -> list[Candidate]:
     """Schemes by the likelihood of their innovations; `turn` is (h w)**2 where it is known.
@@ -377,7 +107,7 @@ def _likely(
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
 
-def _sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
+def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
     """The first scheme of which every few steps fall short of the best candidate by less than `ODDS`.
 
     What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them.
