@@ -20,7 +20,7 @@ BUDGETS = {
     ("checks",): 4006,
     ("identify",): 7663,
     ("formats", "store"): 4937,
-    ("studies",): 1601,
+    ("studies",): 1602,
     ("studies/*",): 10035,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5686,
 }

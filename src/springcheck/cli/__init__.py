@@ -24,7 +24,7 @@ from springcheck.cli.examples import EXAMPLES
 from springcheck.errors import SpringcheckError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.arguments import REPORTING, REPORTS, reported
-from springcheck.studies.study import Study
+from springcheck.studies.study import Study, study_of
 
 INTERRUPTED = interrupts.STATUS
 
@@ -172,7 +172,7 @@ def _study(study: Study, options: argparse.Namespace) -> int:
 
             ci.report(options, document, status)
     if options.json:
-        output.document(study.name, document)
+        output.document(study_of(found).name, document)
     elif not options.quiet:
         output.show(study.lines(found, options))
     elif found.status == 2 and not getattr(found, "broke", {}):

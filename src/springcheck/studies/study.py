@@ -50,12 +50,12 @@ class Shown:
     def __str__(self) -> str:
         from springcheck.text.lines import as_text
 
-        return as_text(_study_of(self).lines(self))  # type: ignore[arg-type]
+        return as_text(study_of(self).lines(self))  # type: ignore[arg-type]
 
     def _repr_html_(self) -> str:
         from springcheck.text.lines import as_html
 
-        return as_html(_study_of(self).lines(self))  # type: ignore[arg-type]
+        return as_html(study_of(self).lines(self))  # type: ignore[arg-type]
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of its table as plain data; numbers that are not known are None."""
@@ -73,10 +73,11 @@ class Shown:
         from springcheck.figures.style import style
 
         with style():
-            return _study_of(self).pictures(self)  # type: ignore[arg-type]
+            return study_of(self).pictures(self)  # type: ignore[arg-type]
 
 
-def _study_of(found: object) -> Study:
+def study_of(found: object) -> Study:
+    """The study that has found this: of `run --vary` it is the ensemble."""
     study: Study = import_module(type(found).__module__.rpartition(".")[0]).STUDY
     return study
 
