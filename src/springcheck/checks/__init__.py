@@ -22,7 +22,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.checks import check, driven, experiments, laws, thermal
+from springcheck.checks import check, experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import shared
@@ -144,6 +144,9 @@ def explained(
     if first is None:
         return list(verdicts)
     case = Case(trajectory=run, scene=scene)
+    # what failed alone asks where the time was taken
+    from springcheck.checks import driven
+
     said = driven.found(case) or shown(scene, run, first_off(case) or 0)
     why = f"{first.why}. What the states show: {said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]

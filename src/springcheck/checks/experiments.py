@@ -257,7 +257,7 @@ def orientation(bench: Bench) -> Finding | str:
     steps = len(alone.t) - 1
     if steps < 1:
         return ENDED
-    places = 3 * np.arange(scene.n) if scene.places is None else scene.places
+    places = scene.all_places
     base = replace(scene, steps=steps, every=1)
     turned = [
         bench.run(

@@ -157,7 +157,7 @@ class _Run:
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
         mass, x = self._array("rmass"), self._array("x")
         mass[n:] = 1.0
-        mass[np.arange(n) if scene.places is None else scene.places // 3] = scene.m
+        mass[:n] = scene.masses
         x[n:] = np.reshape(anchors, (-1, 3))
         if scene.box is not None:
             x[n:] %= scene.box
@@ -215,7 +215,7 @@ class _Run:
 
 def _drives(scene: Scene, h: float) -> Iterator[str]:
     """Driving forces as `fix addforce` by a variable of the number of the step, row by row."""
-    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    places = scene.all_places
     for term in scene.terms:
         for row, (i, amplitude, w, phase) in enumerate(term.rows() if term.key == "drive" else ()):
             particle, axis = divmod(int(places[i]), 3)

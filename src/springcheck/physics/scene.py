@@ -103,6 +103,18 @@ class Scene:
         return ("x",) if self.places is None else tuple("xyz"[i] for i in np.unique(self.places % 3))
 
     @property
+    def all_places(self) -> Integers:
+        """Where each coordinate stands (n,), as `places`, also where these are left out."""
+        return 3 * np.arange(self.n) if self.places is None else self.places
+
+    @property
+    def masses(self) -> Floats:
+        """The mass of each particle (particles,) [M]."""
+        found = np.empty(self.particles)
+        found[self.all_places // 3] = self.m
+        return found
+
+    @property
     def where(self) -> slice | Integers:
         """The coordinates among x, y and z of all particles, as an index of an array (3 particles,)."""
         return slice(0, 3 * self.n, 3) if self.places is None else self.places
@@ -119,7 +131,7 @@ class Scene:
         """The length of the box along the axis of each coordinate, 0 without a box (n,) [L]."""
         if self.box is None:
             return np.zeros(self.n)
-        return np.broadcast_to(np.array(self.box)[0 if self.places is None else self.places % 3], self.n)
+        return np.array(self.box)[self.all_places % 3]
 
     @property
     def frames(self) -> int:

@@ -231,7 +231,6 @@ def _particles(
     unit = units(scene)
     group = file.create_group(f"particles/{label}")
     write_box(group, scene.box)
-    places = 3 * np.arange(scene.n) if scene.places is None else scene.places
     for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
         if source not in found:
             continue
@@ -239,14 +238,12 @@ def _particles(
         shape = found[source].shape
         view = h5py.VirtualLayout((shape[0], scene.particles, 3), "<f8")
         numbers = h5py.VirtualSource(".", found[source].path, shape, "<f8")
-        for columns_, particles, axis in space.lines(places):
+        for columns_, particles, axis in space.lines(scene.all_places):
             view[:, particles, axis] = numbers[:, columns_]
         made = element.create_virtual_dataset("value", view, fillvalue=0.0)
         write_unit(made, unit["q"] if name == "position" else unit["velocity"])
         _link(element, time, step)
-    mass = np.empty(scene.particles)
-    mass[places // 3] = scene.m
-    write_unit(group.create_dataset("mass", data=mass.astype("<f8")), unit["mass"])
+    write_unit(group.create_dataset("mass", data=scene.masses.astype("<f8")), unit["mass"])
 
 
 def write_unit(dataset: Any, unit: str, name: str = "") -> None:

@@ -111,16 +111,15 @@ class _Dynamics:
         rods = list(scene.system.rods.joints()) if scene.system.rods else []
         # a fixed end is an atom so heavy that nothing moves it
         fixed = [point for _, _, point in rods if point is not None]
-        positions, momenta, masses = np.zeros((3, scene.particles + len(fixed), 3))
+        positions, momenta = np.zeros((2, scene.particles + len(fixed), 3))
         positions.reshape(-1)[scene.where] = scene.q * length
         momenta.reshape(-1)[scene.where] = scene.p * (length / time)
-        masses.reshape(-1)[scene.where] = scene.m
         if fixed:
-            positions[scene.particles :], masses[scene.particles :] = np.array(fixed) * length, ANCHOR_MASS
+            positions[scene.particles :] = np.array(fixed) * length
         self._atoms = Atoms(
             numbers=np.zeros(len(positions), dtype=int),
             positions=positions,
-            masses=np.max(masses, axis=1),
+            masses=[*scene.masses, *[ANCHOR_MASS] * len(fixed)],
             momenta=momenta,
         )
         if rods:

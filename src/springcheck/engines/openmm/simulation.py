@@ -81,10 +81,9 @@ def convention(method: Method) -> str:
 def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     """Particles, then one fixed anchor for each rest point of a term; positions (N, 3)."""
     system = mm.System()
-    start, masses = np.zeros((2, scene.particles, 3))
+    start = np.zeros((scene.particles, 3))
     start.reshape(-1)[scene.where] = scene.q - origins - bonds.cells(scene, origins) * scene.periods
-    masses.reshape(-1)[scene.where] = scene.m
-    for m in np.max(masses, axis=1).tolist():
+    for m in scene.masses.tolist():
         system.addParticle(m)
     fixed: list[Any] = []
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
@@ -148,7 +147,7 @@ def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
     first, last = term.particles[0], term.particles[-1]
     origin = getattr(term, term.origin) - (origins[last] - (origins[first] if term.bodies == 2 else 0))
     columns = np.transpose([*(getattr(term, name) for name in names[:-1]), origin])
-    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    places = scene.all_places
     ends = np.transpose([places[index] // 3 for index in term.particles])
     along = places[term.particles[0]] % 3
     for axis in np.unique(along).tolist():
@@ -169,7 +168,7 @@ def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
 def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
     """A drive, or a modulated spring, row by row, as energies of a particle and of the time."""
     energy, names = DRIVEN_ENERGY[term.key]
-    places = np.arange(scene.n) * 3 if scene.places is None else scene.places
+    places = scene.all_places
     for i, *numbers in term.rows():
         given = dict(zip((column.field for column in term.columns), numbers, strict=True))
         particle, axis = divmod(int(places[i]), 3)

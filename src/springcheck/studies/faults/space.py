@@ -19,8 +19,7 @@ from springcheck.studies.faults.steppers import State, Step, textbook
 
 def _on(scene: Scene, axis: str) -> NDArray[np.bool_]:
     """Which coordinates of a scene lie along an axis (n,)."""
-    places = np.zeros(scene.n, np.int64) if scene.places is None else scene.places
-    return np.asarray(places % 3 == "xyz".index(axis))
+    return np.asarray(scene.all_places % 3 == "xyz".index(axis))
 
 
 def stiffer(axis: str) -> Callable[[Scene, float], Scene]:
