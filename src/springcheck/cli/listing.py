@@ -80,7 +80,8 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
 
 
 def _entry(name: str, width: int, words: str) -> list[str]:
-    """A name and what it is, in lines of 80 columns."""
+    """A name and what it is, in lines of 80 columns; a path stays in one piece, to be copied."""
     return textwrap.wrap(
-        f"{name:{width}}  {words}".rstrip(), 80, initial_indent="  ", subsequent_indent=" " * (width + 4)
-    )
+        f"{name:{width}}  {words}".rstrip(), 80, initial_indent="  ", subsequent_indent=" " * (width + 4),
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
