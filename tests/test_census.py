@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from springcheck.cli import main
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import measure as census
-from springcheck.studies.census import table
+from springcheck.studies.census import rigid, table
 from springcheck.studies.census.limit import _of_states, first_limit
 from springcheck.studies.census.result import Entry
 from springcheck.studies.team import Processes
@@ -255,3 +256,38 @@ def test_the_temperatures_of_a_row_are_shown_with_their_errors() -> None:
     }]  # fmt: skip
     (row,) = table.rows(document)
     assert (row["thermostat"], row["configurational"]) == ("Andersen", "1.1088 +- 0.0004")
+
+
+RIGID = {
+    "own:velocity-verlet": "asin(h w)",
+    "own:position-verlet": "2 asin(h w/2)",
+    "ase:rattle": "asin(h w)",
+}
+
+
+def test_what_holds_rods_says_by_its_states_how_it_turns_them() -> None:
+    for label, turn in (("own:velocity-verlet", "asin(h w)"), ("own:position-verlet", "2 asin(h w/2)")):
+        said = rigid.constraint(engines.parse(label))
+        assert said == f"rod: turns by {turn} a step to rounding, length to rounding"
+    assert rigid.constraint(engines.parse("own:euler")) == ""
+
+
+def test_a_method_for_rods_is_named_with_its_mass_in_two_parts(need: Callable[[str], None]) -> None:
+    need("openmm:verlet-rods-as-it-is")
+    one = census.entry(engines.parse("openmm:verlet-rods-as-it-is"))
+    # one whose solver ends at 1e-5
+    said = "rod: turns by asin(h w) a step to 1e-07, length to 1e-07"
+    assert (one.found, one.constraint, one.agrees) == ("velocity-verlet", said, True)
+    assert one.limit == pytest.approx(2, abs=1e-4)
+
+
+def test_states_of_no_known_turn_and_of_no_scheme_are_said_to_be_such() -> None:
+    dumbbell, uneven = load_scene("dumbbell"), load_scene("spring-uneven")
+    run = driver.run(dumbbell, "own:velocity-verlet")
+    assert dumbbell.system.rods is not None
+    slow = replace(run, q=run.q[::3])
+    assert rigid._turn(slow, dumbbell.system.rods, dumbbell) == "turns by 3.0114 h w a step"
+    grown = driver.run(uneven, "own:velocity-verlet")
+    assert rigid.name(uneven, grown) == "velocity-verlet"
+    growth = 1.001 ** np.arange(len(grown.q))[:, None]
+    assert rigid.name(uneven, replace(grown, q=grown.q * growth, p=grown.p * growth)) == rigid.NO_SCHEME

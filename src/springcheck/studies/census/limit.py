@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck import driver
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.census import rigid
 
 LEAST, MOST, APART = 0.05, 4.0, 0.05
 """h omega that are tried, the first of them and the last; of no engine is a limit below 0.05 looked for."""
@@ -48,7 +48,7 @@ def first_limit(scene: Scene, label: Label) -> float:
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
 
     def growth(h_omega: float) -> tuple[float, float]:
-        return _growth(driver.run(replace(small, step=h_omega / omega), label))
+        return _growth(rigid.run(replace(small, step=h_omega / omega), label))
 
     try:
         low, hidden = 0.0, 0.0

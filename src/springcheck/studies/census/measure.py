@@ -12,7 +12,7 @@ from typing import Unpack
 
 import numpy as np
 
-from springcheck import driver, engines, schemes
+from springcheck import engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify
@@ -22,7 +22,7 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.census import table
+from springcheck.studies.census import rigid, table
 from springcheck.studies.census.limit import first_limit
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
@@ -47,7 +47,7 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     scenes = load_scene(BLOG), load_scene(UNEVEN)
 
     def why(label: Label) -> str | None:
-        reasons = [engines.refusal(scene, label) for scene in scenes]
+        reasons = [rigid.refusal(scene, label) for scene in scenes]
         return next(filter(None, reasons), None) or _absence(label)
 
     broken = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
@@ -66,7 +66,7 @@ def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
     """The entry with its seconds a step: a short run is timed by its fastest repetition."""
     if not np.isnan(one.seconds):
         return one
-    runs = [driver.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
+    runs = [rigid.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
     timed = replace(one, seconds=min(run.timing.run for run in runs) / max(runs[0].outcome.step, 1))
     kept.keep(ENTRIES, str(label), timed)
     return timed
@@ -123,11 +123,12 @@ def stored(kept: keeper.Kept) -> Census:
 def entry(label: Label) -> Entry:
     """What one method is, by its states; its time is measured separately."""
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
-    orbit, run = driver.run(blog, label), driver.run(uneven, label)
+    orbit, run = rigid.run(blog, label), rigid.run(uneven, label)
     method = engines.method(label)
-    found = None if method.adaptive else _identified(uneven, run)
+    held = rigid.is_rigid(label)
+    found = None if method.adaptive or held else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)
-    name = "adaptive" if method.adaptive else _name(uneven, run, found)
+    name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, run, found)
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
     return Entry(
@@ -145,6 +146,7 @@ def entry(label: Label) -> Entry:
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
         bounded=bool(np.isinf(limit)),
+        constraint=rigid.constraint(label),
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
         force_calls=run.force_calls / steps,
         seconds=np.nan,
@@ -184,7 +186,7 @@ def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
         return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))
-    return _held(scene, found) or "none that is known"
+    return _held(scene, found) or rigid.NO_SCHEME
 
 
 def _held(scene: Scene, found: Identification | None) -> str:

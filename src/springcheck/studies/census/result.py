@@ -48,7 +48,7 @@ class Entry:
     thermostat: str = ""
     """The heat bath that is on, as its scheme's title; "" where none is."""
     constraint: str = ""
-    """What is held rigid, and by which algorithm; "" where nothing is."""
+    """What is held rigid, how far a step turns it and how well its length is kept; "" where nothing is."""
     configurational: float = nan
     """k <x**2>/kT where a thermostat is on."""
     configurational_error: float = nan

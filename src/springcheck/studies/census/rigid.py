@@ -1,0 +1,125 @@
+"""Constraints in the census: what a method holds rigid, by its states alone.
+
+A method that is for scenes with rods moves the census' springs with each mass in two parts on a rod along
+the line: they are one mass, whose map is read.  Length and turn are those of the scene `dumbbell`, for every
+method that can serve it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from springcheck import driver, engines, schemes
+from springcheck.engines.contract import Label, Need
+from springcheck.physics.arrays import Floats
+from springcheck.physics.rods import Rods
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import load_scene
+from springcheck.physics.terms import Rod
+from springcheck.physics.trajectory import Trajectory
+
+LENGTH, PART = 0.75, 0.375
+"""Of the rod [L], and of the mass at its near end: unlike, and sums of few powers of 2."""
+
+TURNS: Mapping[str, Callable[[Floats], Floats]] = {
+    "asin(h w)": np.arcsin,
+    "2 asin(h w/2)": lambda x: 2 * np.arcsin(x / 2),
+    "atan(h w)": np.arctan,
+    "2 atan(h w/2)": lambda x: 2 * np.arctan(x / 2),
+    "h w": lambda x: x,
+}
+"""By what a free rod turns in a step: of SHAKE and RATTLE; the same in two drifts of half a step; a length
+that is put right along the way after the drift; Cayley's rotation; a rotation by the angle itself."""
+
+WORSE = 4
+"""Times what the best linear map leaves over of the states that the map of their scheme may leave."""
+
+NO_SCHEME = "none that is known"
+
+ROUNDED = 1e-13
+"""What is called rounding: 400 steps of 2**-52."""
+
+UNLIKE = 1e-4
+"""Relative misfit from which a turn is none of these: at h w = 0.15 they differ by 1.9e-3 or more."""
+
+
+def split(scene: Scene) -> Scene:
+    """A scene of one mass with that mass in two parts, joined by a rod."""
+    near = PART * scene.m
+    m = np.concatenate([near, scene.m - near])
+    rod = Rod(a=np.array([0]), b=np.array([1]), length=np.array([LENGTH]))
+    return scene.derived(
+        m=m, q=np.append(scene.q, scene.q + LENGTH), p=m * (scene.p / scene.m), terms=(*scene.terms, rod)
+    )
+
+
+def is_rigid(label: Label) -> bool:
+    """Whether a method is for scenes with rods alone."""
+    return Need.RODS in engines.method(label).requires
+
+
+def refusal(scene: Scene, label: Label) -> str | None:
+    """Why a method cannot move this spring, as `engines.refusal`."""
+    return engines.refusal(split(scene) if is_rigid(label) else scene, label)
+
+
+def run(scene: Scene, label: Label) -> Trajectory:
+    """A run of one mass; of a method for rods that of the two parts, as the one mass that they are."""
+    if not is_rigid(label):
+        return driver.run(scene, label)
+    both = driver.run(split(scene), label)
+    return replace(both, q=both.q[:, :1], p=np.sum(both.p, axis=1, keepdims=True), energy=None)
+
+
+def name(scene: Scene, found: Trajectory) -> str:
+    """The schemes whose map of this spring the states follow as well as any linear map.
+
+    What is left over is the solver's, of no arithmetic that `identify` could know.
+    """
+    z = np.stack([found.q[:, 0], found.p[:, 0]])
+    z = z / np.max(np.abs(z), axis=1, keepdims=True)
+    scale = np.max(np.abs(found.q)) / np.max(np.abs(found.p))
+    best = z[:, 1:] @ np.linalg.pinv(z[:, :-1])
+    m, k = scene.m, scene.system.hessian_diagonal(scene.q)
+    unlike: list[tuple[str, Floats]] = []
+    for one in schemes.SCHEMES.values():
+        if one.has("one-step"):
+            matrix = schemes.matrix(one, h=scene.step, m=m, k=k)[0] * [[1, 1 / scale], [scale, 1]]
+            if not any(np.allclose(matrix, other, rtol=1e-14, atol=1e-14) for _, other in unlike):
+                unlike.append((one.name, matrix))
+
+    def left(matrix: Floats) -> float:
+        return float(np.max(np.abs(z[:, 1:] - matrix @ z[:, :-1])))
+
+    fit = (one for one, matrix in unlike if left(matrix) <= WORSE * left(best))
+    return " or ".join(fit) or NO_SCHEME
+
+
+def constraint(label: Label) -> str:
+    """What a method holds rigid, as the states of `dumbbell` show it; "" where it serves no such scene."""
+    scene = load_scene("dumbbell")
+    if engines.refusal(scene, label):
+        return ""
+    found, rods = driver.run(scene, label), scene.system.rods
+    assert rods is not None
+    return f"rod: {_turn(found, rods, scene)}, length {_to(np.max(np.abs(rods.strain(found.q))))}"
+
+
+def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
+    r = rods.ways(found.q.astype(np.longdouble))
+    sine = r[:-1, 0] * r[1:, 1] - r[:-1, 1] * r[1:, 0]
+    each = np.abs(np.arctan2(sine, rods.dot(r[:-1], r[1:])[:, 0]))
+    h_w = np.asarray(scene.step * rods.rates(scene.q, scene.p), np.float64)
+    off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in TURNS.items()}
+    name = min(off, key=lambda one: off[one])
+    if not off[name] < UNLIKE:
+        return f"turns by {float(np.mean(each) / h_w[0]):.4f} h w a step"
+    return f"turns by {name} a step {_to(off[name])}"
+
+
+def _to(off: float) -> str:
+    """How near, to the next power of ten: a column that is compared is not to change with a rounding."""
+    return "to rounding" if off < ROUNDED else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"
