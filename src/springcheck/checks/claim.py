@@ -10,8 +10,8 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.physics.arrays import Extended, Floats, Force, Reals
+from springcheck.physics.exact.solution import SolvedSystem
 from springcheck.physics.scene import Scene
-from springcheck.physics.system import System
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes import Law
@@ -43,7 +43,7 @@ class Claim:
         return scene.system.scaled(1 + arithmetic.excess) if arithmetic.excess else scene
 
     @property
-    def system(self) -> System:
+    def system(self) -> SolvedSystem[Scene]:
         """What follows from that scene."""
         return self.judged.system
 

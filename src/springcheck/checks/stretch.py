@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
 from springcheck.physics.arrays import Extended, Force, Reals
+from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
@@ -208,7 +209,7 @@ def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
     return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in (q, p)], axis=-2)
 
 
-def variational(system: System) -> Callable[[Iterable[Term]], Force]:
+def variational(system: System[Scene]) -> Callable[[Iterable[Term]], Force]:
     """What makes forces on states (1 + d, ..., n): the first is a motion, the others are changes of it."""
 
     def of(terms: Iterable[Term]) -> Force:

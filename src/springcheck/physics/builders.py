@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import SceneError
-from springcheck.physics import memory
+from springcheck.physics import graph, memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
@@ -77,7 +77,7 @@ def chain(
     words = {"name": "chain", "title": f"Chain of {masses:,} masses between two walls", **rest}
     return Scene(
         m=m,
-        q=q + standing(masses, waves),
+        q=q + graph.standing(masses, waves),
         p=p,
         terms=(walls, links),
         step=step,
@@ -98,16 +98,6 @@ def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
         raise SceneError(f"k has the shape {k.shape}: a chain of {masses} masses has {masses + 1} springs")
     walls = WallSpring(i=np.array([0, masses - 1]), k=k[[0, -1]], at=np.zeros(2))
     return Spring(a=row, b=row + 1, k=k[1:-1], rest=none), walls
-
-
-def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
-    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses."""
-    q = np.zeros(masses)
-    for mode, amplitude in waves:
-        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
-        phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
-        q += amplitude * np.sin(np.pi * phase / (masses + 1))
-    return q
 
 
 def _together(**given: ArrayLike) -> list[Floats]:

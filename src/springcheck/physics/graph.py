@@ -132,3 +132,13 @@ def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integer
             if rows[0] == rows[1]:
                 found.append((one, other))
     return tuple(found)
+
+
+def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
+    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses."""
+    q = np.zeros(masses)
+    for mode, amplitude in waves:
+        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
+        phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
+        q += amplitude * np.sin(np.pi * phase / (masses + 1))
+    return q

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,14 @@ from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.driven import with_clock
-from springcheck.physics.exact.normal import Modes, normal_modes
-from springcheck.physics.exact.solution import Solution, solution
+from springcheck.physics.fields import SceneFields
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.rods import Rods, rods_of
 from springcheck.physics.term import Term, in_pieces
 from springcheck.physics.terms import Damping
 
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
+Fields = TypeVar("Fields", bound=SceneFields)
 
 MOST_JOINED = 256
 """Joined particles up to which normal modes are computed: their cost in extended precision grows with the
@@ -36,12 +34,13 @@ MOST_DENSE = 1024
 """Joined particles up to which second derivatives are kept as n x n numbers."""
 
 
-class System:
-    """The facts of one scene.  m, q, p (n,) and terms are the scene's own."""
+class System(Generic[Fields]):
+    """The facts of one scene but for its motion.  m, q, p (n,) and terms are the scene's own."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Fields) -> None:
         self.scene = scene
         self.n, self.m, self.terms = scene.n, scene.m, scene.terms
+        self.q, self.p = scene.q, scene.p
         self.duration = abs(scene.step) * scene.steps
 
     # what kind of system it is
@@ -62,7 +61,7 @@ class System:
         return not (self.is_damped or self.is_driven)
 
     @cached_property
-    def clocked(self) -> Scene:
+    def clocked(self) -> Fields:
         """The scene with a clock beside its particles (see `driven`); itself where no force needs one."""
         return with_clock(self.scene) if self.is_driven else self.scene
 
@@ -308,12 +307,12 @@ class System:
     @cached_property
     def initial_energy(self) -> float:
         """Initial total energy [M L2/T2]."""
-        return float(self.energy(self.scene.q, self.scene.p))
+        return float(self.energy(self.q, self.p))
 
     @cached_property
     def norm(self) -> Norm:
         """The measure of errors of this scene (see `Norm`)."""
-        q, p = self.scene.q.astype(np.longdouble), self.scene.p.astype(np.longdouble)
+        q, p = self.q.astype(np.longdouble), self.p.astype(np.longdouble)
         with np.errstate(all="ignore"):
             unit = self.kinetic_energy(p)
             for term in self.terms:
@@ -333,8 +332,8 @@ class System:
 
     @property
     def _is_away_from_rest(self) -> bool:
-        stretched = (np.any(x.elongation(self.scene.q) != 0) for x in self.terms)
-        return bool(np.any(self.scene.p != 0)) or any(stretched)
+        stretched = (np.any(x.elongation(self.q) != 0) for x in self.terms)
+        return bool(np.any(self.p != 0)) or any(stretched)
 
     @cached_property
     def amplitudes(self) -> tuple[Floats, Floats]:
@@ -345,52 +344,50 @@ class System:
         unit = float(self.norm.unit)
         k = np.zeros(self.n)
         for term in self.terms:
-            term.scatter(np.maximum(np.abs(term.curvature(self.scene.q)), term.rigidity), k)
+            term.scatter(np.maximum(np.abs(term.curvature(self.q)), term.rigidity), k)
         held = k > 0
         with np.errstate(over="ignore"):
             p = np.sqrt(2.0) * np.sqrt(self.m) * unit
             q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / self.m * self.duration)
         return q, p
 
-    @cached_property
-    def modes(self) -> Modes:
-        """Normal modes.  ValueError where there are none (see `has_modes`)."""
-        return normal_modes(self)
+    # other scenes made of this one, and what follows from them
+
+    def beside(self, scene: Fields) -> Self:
+        """The facts of a scene that is made of this one."""
+        return type(self)(scene)
+
+    def without(self, key: str) -> Self:
+        """The facts of the scene without its terms of one kind."""
+        return self.beside(self.scene.derived(terms=tuple(term for term in self.terms if term.key != key)))
 
     @cached_property
-    def solution(self) -> Solution | None:
-        """The exact (analytic) solution, None where no closed form is known, or where a bath acts."""
-        return None if self.scene.bath else solution(self)
-
-    # other scenes made of this one
-
-    @cached_property
-    def in_single(self) -> Scene:
+    def in_single(self) -> Fields:
         """The scene as an engine keeps it that holds the parameters of its potential in single precision."""
         return self.scene.derived(terms=tuple(term.in_single() for term in self.terms))
 
-    def scaled(self, factor: float) -> Scene:
+    def scaled(self, factor: float) -> Fields:
         """The scene with every force of its potential multiplied by a factor."""
         return self.scene.derived(terms=tuple(term.scaled(factor) for term in self.terms))
 
-    def tiled(self, copies: int) -> Scene:
+    def tiled(self, copies: int) -> Fields:
         """So many copies of the scene side by side, which do not act on each other."""
-        m, q, p = (np.tile(x, copies) for x in (self.m, self.scene.q, self.scene.p))
+        m, q, p = (np.tile(x, copies) for x in (self.m, self.q, self.p))
         terms = tuple(term.tiled(copies, self.n) for term in self.terms)
         places = self.scene.places
         if places is not None:
             places = (places + 3 * self.scene.particles * np.arange(copies)[:, None]).ravel()
         return self.scene.derived(m=m, q=q, p=p, places=places, terms=terms)
 
-    def from_states(self, q: Floats, p: Floats) -> Scene:
+    def from_states(self, q: Floats, p: Floats) -> Fields:
         """Copies of the scene side by side, one from each of these states (c, n), and one step of them."""
         return self.tiled(len(q)).derived(q=q.ravel(), p=p.ravel(), steps=1, every=1)
 
-    def part(self, chosen: Integers) -> Scene:
+    def part(self, chosen: Integers) -> Fields:
         """These particles (s,) alone, renumbered, with the rows of terms that act on nothing else."""
         number = np.full(self.n, -1)
         number[chosen] = np.arange(len(chosen))
-        m, q, p = (x[chosen] for x in (self.m, self.scene.q, self.scene.p))
+        m, q, p = (x[chosen] for x in (self.m, self.q, self.p))
         terms = (term.restricted(number) for term in self.terms)
         places = self.scene.places
         if places is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic, Floats
-from springcheck.physics.scene import Kind, Units
+from springcheck.physics.fields import Kind, Units
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 from springcheck.store.access import Scalar
 

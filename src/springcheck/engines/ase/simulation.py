@@ -44,7 +44,7 @@ class Springs(Calculator):  # type: ignore[misc]
 
     implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
 
-    def __init__(self, system: System, length: float, time: float) -> None:
+    def __init__(self, system: System[Scene], length: float, time: float) -> None:
         super().__init__()
         self.force_calls = 0
         self._system = system

@@ -70,9 +70,10 @@ def uncertainty(scene: Scene, duration: float) -> float:
     with np.errstate(all="ignore"):
         # the elongation of a spring is off by what both of its ends are
         square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
-        if system.has_modes and (whole := energy_of_doubt(scene, np.longdouble(duration))) is not None:
+        known = energy_of_doubt(system, system.modes, np.longdouble(duration)) if system.has_modes else None
+        if known is not None:
             # errors of all particles together, which are not all as large as each of them may be
-            square = whole
+            square = known
         for group in system.free_groups:
             square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration) if duration else 0
         if square == 0 or system.norm.unit == 0:

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
 from springcheck.physics.exact.well import CANCELS, LAST, States, Well, one_each, wide
+from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
 
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
 
-
-def _bonds(scene: Scene) -> tuple[Morse, _Bond] | None:
+def _bonds(system: System[Any]) -> tuple[Morse, _Bond] | None:
     """One bond each that pulls together."""
-    (term,) = (term for term in scene.terms if isinstance(term, Morse))
-    if not one_each(scene) or not np.all((term.depth > 0) & (term.steepness != 0)):
+    (term,) = (term for term in system.terms if isinstance(term, Morse))
+    if not one_each(system) or not np.all((term.depth > 0) & (term.steepness != 0)):
         return None
-    return term, _bond(scene, term)
+    return term, _bond(system, term)
 
 
 MOST = np.log(np.finfo(np.longdouble).max) - 64
@@ -58,9 +56,9 @@ def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
     return q[1] - q[0] - rest, m[0] * p[1] - m[1] * p[0]
 
 
-def _bond(scene: Scene, term: Morse) -> _Bond:
+def _bond(system: System[Any], term: Morse) -> _Bond:
     ends = term.a, term.b
-    m, q, p = ([wide(x[end]) for end in ends] for x in (scene.m, scene.q, scene.p))
+    m, q, p = ([wide(x[end]) for end in ends] for x in (system.m, system.q, system.p))
     total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
     mass = m[0] * m[1] / total
     u, pull = _relative(m, q, p, term.rest)
@@ -74,7 +72,7 @@ def _bond(scene: Scene, term: Morse) -> _Bond:
     if np.any(near):
         j = np.flatnonzero(near)
         u[j], pull[j], excess[j] = _of_bonds(
-            *([exactly(x[end[j]]) for end in ends] for x in (scene.m, scene.q, scene.p)),
+            *([exactly(x[end[j]]) for end in ends] for x in (system.m, system.q, system.p)),
             *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
         )
     y = np.minimum(a * u, MOST)
@@ -106,19 +104,19 @@ def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Ex
         return extended(u), extended(pull), extended(excess)
 
 
-def _morse(scene: Scene, bonds: tuple[Morse, _Bond], t: Extended) -> States:
+def _morse(system: System[Any], bonds: tuple[Morse, _Bond], t: Extended) -> States:
     """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
 
     w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass goes straight on.
     """
-    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
     term, bond = bonds
     stretch, speed = _stretched(bond, wide(term.steepness), t)
     u, pull = stretch / term.steepness, bond.mass * speed / term.steepness
-    ma, mb = wide(scene.m[term.a]), wide(scene.m[term.b])
-    total = wide(scene.p[term.a]) + scene.p[term.b]
+    ma, mb = wide(system.m[term.a]), wide(system.m[term.b])
+    total = wide(system.p[term.a]) + system.p[term.b]
     share = bond.share
-    qa, qb = wide(scene.q[term.a]), wide(scene.q[term.b])
+    qa, qb = wide(system.q[term.a]), wide(system.q[term.b])
     centre = share * qa + (1 - share) * qb + total / (ma + mb) * t
     length = term.rest + u
     q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
@@ -157,8 +155,8 @@ def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
     )
 
 
-def _morse_doubt(scene: Scene, bonds: tuple[Morse, _Bond], t: np.longdouble) -> States:
-    q, p = np.empty((2, scene.n), dtype=np.longdouble)
+def _morse_doubt(system: System[Any], bonds: tuple[Morse, _Bond], t: np.longdouble) -> States:
+    q, p = np.empty((2, system.n), dtype=np.longdouble)
     term, bond = bonds
     a = np.abs(wide(term.steepness))
     root = np.sqrt(bond.energy)
@@ -170,9 +168,9 @@ def _morse_doubt(scene: Scene, bonds: tuple[Morse, _Bond], t: np.longdouble) -> 
     )
     force = 2 * term.depth * a * (1 + root) * root
     ends = term.a, term.b
-    pushed = sum(np.abs(wide(scene.p[end])) for end in ends)
-    far = sum(np.abs(wide(scene.q[end])) for end in ends) + np.abs(term.rest)
-    far = far + pushed / (scene.m[term.a] + scene.m[term.b]) * np.abs(t)
+    pushed = sum(np.abs(wide(system.p[end])) for end in ends)
+    far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
+    far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
     for end in ends:
         q[end] = LAST * (far + np.abs(bond.u) + reach + speed * time)
         p[end] = LAST * (pushed + bond.mass * speed + force * time)

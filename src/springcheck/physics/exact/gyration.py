@@ -6,17 +6,16 @@ sum of two exponentials (Fock-Darwin, or Foucault's pendulum, where w2 > 0).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.exact.normal import normal_modes
 from springcheck.physics.exact.response import first_difference
 from springcheck.physics.exact.well import LAST, States, Well
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 
 
 class _Planes(NamedTuple):
@@ -31,43 +30,42 @@ class _Planes(NamedTuple):
     centre: NDArray[Any]
 
 
-def prepare(scene: Scene) -> _Planes | None:
+def prepare(system: System[Any]) -> _Planes | None:
     """None where something else acts, or acts unlike on both coordinates of a plane, or beside them."""
-    planes = [term for term in scene.terms if term.key == "magnetic"]
-    if len(planes) != 1 or {term.key for term in scene.terms} - {"magnetic", "wall-spring", "damping"}:
+    planes = [term for term in system.terms if term.key == "magnetic"]
+    if len(planes) != 1 or {term.key for term in system.terms} - {"magnetic", "wall-spring", "damping"}:
         return None
     a, b = planes[0].particles
-    if len(np.unique(np.append(a, b))) != scene.n or len(a) * 2 != scene.n:
+    if len(np.unique(np.append(a, b))) != system.n or len(a) * 2 != system.n:
         return None
-    alone = scene.derived(terms=tuple(term for term in scene.terms if term.key != "magnetic")).system
-    modes = alone.modes
+    modes = normal_modes(system.without("magnetic"))
     if np.any(modes.w2[a] != modes.w2[b]) or np.any(modes.rate[a] != modes.rate[b]):
         return None
-    turn = np.zeros(scene.n, np.longdouble)
-    turn[a] = planes[0].parameters[0] / scene.m[a].astype(np.longdouble)
+    turn = np.zeros(system.n, np.longdouble)
+    turn[a] = planes[0].parameters[0] / system.m[a].astype(np.longdouble)
     half = (modes.rate[a] + 1j * turn[a]) / 2
     root = np.sqrt(half * half - modes.w2[a])
     # the larger root without cancellation, the other by their product
     far = -half - np.where((half.conjugate() * root).real < 0, -root, root)
     near = np.where(far == 0, 0, modes.w2[a] / np.where(far == 0, 1, far))
     rest = np.asarray(modes.rest, np.longdouble)
-    q, v = scene.q - rest, scene.p / scene.m.astype(np.longdouble)
+    q, v = system.q - rest, system.p / system.m.astype(np.longdouble)
     return _Planes(a, b, near, far, q[a] + 1j * q[b], v[a] + 1j * v[b], rest)
 
 
-def motion(scene: Scene, found: _Planes, t: Extended) -> States:
+def motion(system: System[Any], found: _Planes, t: Extended) -> States:
     """Exact q and p (f, n) at times t (f, 1) [T]."""
     part = first_difference(found.one, found.other, t)
     slope = np.exp(found.one * t) + found.other * part
     z = found.z * (np.exp(found.one * t) - found.one * part) + found.v * part
     v = -found.z * found.one * found.other * part + found.v * slope
-    q, p = np.empty((2, len(t), scene.n), np.longdouble)
+    q, p = np.empty((2, len(t), system.n), np.longdouble)
     q[:, found.a], q[:, found.b] = z.real, z.imag
     p[:, found.a], p[:, found.b] = v.real, v.imag
-    return q + found.centre, p * scene.m
+    return q + found.centre, p * system.m
 
 
-def doubt(scene: Scene, found: _Planes, t: np.longdouble) -> States:
+def doubt(system: System[Any], found: _Planes, t: np.longdouble) -> States:
     """Bounds (n,) of the errors of `motion`: roundings of its angles, times the largest state."""
     grown = np.exp(np.maximum(np.maximum((found.one * t).real, (found.other * t).real), 0))
     rate = np.maximum(np.abs(found.one), np.abs(found.other))
@@ -78,10 +76,10 @@ def doubt(scene: Scene, found: _Planes, t: np.longdouble) -> States:
     fast = np.abs(found.z * found.one * found.other) * hold + np.abs(found.v) * (
         1 + np.abs(found.other) * hold
     )
-    q, p = np.empty((2, scene.n), np.longdouble)
+    q, p = np.empty((2, system.n), np.longdouble)
     q[found.a] = q[found.b] = LAST * (1 + rate * np.abs(t)) * grown * far
     p[found.a] = p[found.b] = LAST * (1 + rate * np.abs(t)) * grown * fast
-    return q + LAST * np.abs(found.centre), p * scene.m
+    return q + LAST * np.abs(found.centre), p * system.m
 
 
 GYRATION = Well(key="magnetic", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)

@@ -4,25 +4,23 @@ w2 < 0, a parabola for w2 = 0; with friction the same, decaying.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.elliptic import EPS
-from springcheck.physics.exact.normal import Modes
+from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import Well
+from springcheck.physics.system import System
 
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
 SMALLEST = np.finfo(np.longdouble).tiny
 ROUNDINGS = 32
 """Roundings of a motion in extended precision, of each of its summands and of its phase."""
 
 
-def motion(scene: Scene, _: Any, t: Extended) -> tuple[Extended, Extended]:
+def motion(system: System[Any], found: Modes, t: Extended) -> tuple[Extended, Extended]:
     """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
-    found = scene.system.modes
     start, centre = found.start, found.centre()
     u0 = start.u
     y = np.empty((len(t), len(u0)), dtype=np.longdouble)
@@ -122,24 +120,23 @@ def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended
     return u + v * gone + law.pull * t * t * fallen, v * np.exp(-x) + law.pull * gone
 
 
-def doubt(scene: Scene, _: Any, t: np.longdouble) -> tuple[Extended, Extended]:
+def doubt(system: System[Any], found: Modes, t: np.longdouble) -> tuple[Extended, Extended]:
     """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
 
     A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken from.
     What is not known of the equations themselves, y'' = -A y - r y' + g, is a force, and a force f moves y by
     |t f| min(t, 1/w) at most (variation of constants).
     """
-    system, found = scene.system, scene.system.modes
     reach, speed, phase, hold = reaches(found, t)
     if found.waves:
-        return _of_waves(scene, t)[:2]
+        return _of_waves(system, found, t)[:2]
     joined = found.vectors is not None
-    last, duration = (ROUNDINGS + (scene.n if joined else 0)) * EPS, np.abs(t)
+    last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
     y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
     # friction is taken for one rate where it is one but for rounding
     force = found.doubt * reach + (np.ptp(found.rate) * speed if joined else 0)
     if np.any(found.doubt):
-        zero = np.zeros(scene.n, dtype=np.longdouble)
+        zero = np.zeros(system.n, dtype=np.longdouble)
         force = force + last * system.magnitude()(zero, zero) / found.root_m
     if not joined:
         y, v = y + duration * hold * force, v + duration * force
@@ -150,25 +147,26 @@ def doubt(scene: Scene, _: Any, t: np.longdouble) -> tuple[Extended, Extended]:
     return np.asarray(y / found.root_m), np.asarray(v * found.root_m)
 
 
-def energy_of_doubt(scene: Scene, t: np.longdouble) -> np.longdouble | None:
+def energy_of_doubt(system: System[Any], found: Modes, t: np.longdouble) -> np.longdouble | None:
     """Bound of the energy of the error at time t [M L2/T2]; None where `doubt` says all that is known."""
-    return _of_waves(scene, t)[2] if scene.system.modes.waves else None
+    return _of_waves(system, found, t)[2] if found.waves else None
 
 
-def _of_waves(scene: Scene, t: np.longdouble) -> tuple[Extended, Extended, np.longdouble]:
+def _of_waves(
+    system: System[Any], found: Modes, t: np.longdouble
+) -> tuple[Extended, Extended, np.longdouble]:
     """The same of a uniform chain: bounds (n,) in q and p, and that of the energy of both.
 
     A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of the
     length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that
     where n + 1 has large factors (Bluestein); the exact motion passes the error of the start on as it is.
     """
-    found = scene.system.modes
     reach, speed, phase, hold = reaches(found, t)
-    last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (scene.n + 1)) * EPS
+    last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (system.n + 1)) * EPS
     y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
     # friction is taken for one rate where it is one but for rounding
     v = v + np.abs(t) * np.ptp(found.rate) * speed
-    whole_y, whole_v = (_length(x) for x in found.into(scene.q, scene.p))
+    whole_y, whole_v = (_length(x) for x in found.into(system.q, system.p))
     w, driven = np.sqrt(np.max(found.w2)), np.exp(np.maximum(-t, 0) * np.max(found.rate))
     of_y = transform * (
         driven * (whole_y + np.max(hold) * whole_v) + _length(found.centre()) + _length(reach)
@@ -213,8 +211,8 @@ def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extende
 LINEAR = Well(
     key="",
     terms=frozenset(),
-    prepare=lambda scene: scene.system.has_modes or None,
+    prepare=lambda system: normal_modes(system) if system.has_modes else None,
     motion=motion,
     doubt=doubt,
 )
-"""Whatever has normal modes, which the system keeps."""
+"""Whatever has normal modes."""

@@ -6,16 +6,14 @@ node of a grid is a product of Taylor series in time, whose step turns by less t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 
 TAYLOR_ORDER = 22
 """Of the series: the next term is (1/2)**23/23!, 5e-30 of the first."""
@@ -43,14 +41,14 @@ class _Mode(NamedTuple):
         return float(np.maximum(np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth))), np.abs(self.turn)))
 
 
-def prepare(scene: Scene) -> tuple[_Mode, ...] | None:
+def prepare(system: System[Any]) -> tuple[_Mode, ...] | None:
     """None where anything else acts, or where a period is too long."""
-    term = scene.terms[0]
-    if not isinstance(term, ModulatedSpring) or len(scene.terms) > 1 or not one_each(scene):
+    term = system.terms[0]
+    if not isinstance(term, ModulatedSpring) or len(system.terms) > 1 or not one_each(system):
         return None
     found = []
     for i, k, depth, frequency, phase, at in term.rows():
-        m, q, p = (np.longdouble(x[i]) for x in (scene.m, scene.q, scene.p))
+        m, q, p = (np.longdouble(x[i]) for x in (system.m, system.q, system.p))
         start = np.array([q - np.longdouble(at), p / m])
         deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
         none = np.empty(0, np.longdouble)
@@ -105,12 +103,12 @@ def _powers(matrix: Extended, n: np.ndarray) -> Extended:
     return out
 
 
-def motion(scene: Scene, found: tuple[_Mode, ...], t: Extended) -> States:
+def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States:
     """Exact q and p (f, n) at times t (f, 1) [T]."""
-    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
-    term = scene.terms[0]
+    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
+    term = system.terms[0]
     assert isinstance(term, ModulatedSpring)
-    at = np.zeros(scene.n)
+    at = np.zeros(system.n)
     at[term.i] = term.at
     for i, mode in enumerate(found):
         period = 2 * PI / np.abs(mode.turn)
@@ -120,17 +118,17 @@ def motion(scene: Scene, found: tuple[_Mode, ...], t: Extended) -> States:
         last = _series(mode, mode.node * j, rest - mode.node * j)
         whole = last @ mode.nodes[j] @ _powers(mode.nodes[-1], n)
         q[:, i], v = (whole @ mode.start).T
-        p[:, i] = v * scene.m[i]
+        p[:, i] = v * system.m[i]
     return q + at, p
 
 
-def doubt(scene: Scene, found: tuple[_Mode, ...], t: np.longdouble) -> States:
+def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> States:
     """Bounds (n,) of the errors of `motion`: roundings of the angle turned through, times the largest state.
 
     In the coordinates (rate u, v) no power of the matrix of a period is larger than the condition number of
     its eigenvectors times that of its spectral radius.
     """
-    u, v = np.empty((2, scene.n), dtype=np.longdouble)
+    u, v = np.empty((2, system.n), dtype=np.longdouble)
     for i, mode in enumerate(found):
         scale = np.array([mode.rate, 1.0])
         scaled = (mode.nodes * scale[:, None] / scale).astype(np.float64)
@@ -140,7 +138,7 @@ def doubt(scene: Scene, found: tuple[_Mode, ...], t: np.longdouble) -> States:
         grown = within * np.linalg.cond(vectors) * max(float(np.max(np.abs(values))), 1.0) ** periods
         size = grown * np.hypot(*(mode.start * scale)) * LAST * (1 + mode.rate * np.abs(t))
         u[i], v[i] = size / mode.rate, size
-    return u, v * scene.m
+    return u, v * system.m
 
 
 MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)

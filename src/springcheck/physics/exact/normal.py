@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers, Reals
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
 from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
-
-if TYPE_CHECKING:
-    from springcheck.physics.system import System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,7 +119,7 @@ GRADED = 2.0**10
 """Ratio of squared frequencies from which it is needed."""
 
 
-def normal_modes(system: System) -> Modes:
+def normal_modes(system: System[Any]) -> Modes:
     """Normal modes of a linear system.
 
     w2 and vectors are right to their last digits where no particle is joined to another, for a uniform
@@ -160,7 +158,7 @@ def normal_modes(system: System) -> Modes:
     return _modes(system, w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors, doubt=doubt)
 
 
-def _modes(system: System, *, start: Start | None = None, **parts: Any) -> Modes:
+def _modes(system: System[Any], *, start: Start | None = None, **parts: Any) -> Modes:
     """Modes as they are found; their start is taken from that of the scene where it is not given."""
     nothing = np.zeros_like(parts["w2"])
     blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
@@ -168,9 +166,9 @@ def _modes(system: System, *, start: Start | None = None, **parts: Any) -> Modes
     return found if start else replace(found, start=_start(system, found))
 
 
-def _start(system: System, modes: Modes) -> Start:
+def _start(system: System[Any], modes: Modes) -> Start:
     """In extended precision; alone on the way to the top of a barrier in more digits."""
-    y, v = modes.into(system.scene.q, system.scene.p)
+    y, v = modes.into(system.q, system.p)
     centre = modes.centre()
     u = y - centre
     slow, fast, size = _split(u, v, modes.w2, modes.rate)
@@ -185,9 +183,9 @@ def _start(system: System, modes: Modes) -> Start:
     if system.is_separate and np.any(lost):
         chosen = np.flatnonzero(lost)
         with digits():
-            part = system.part(chosen).system
+            part = system.beside(system.part(chosen))
             k, pull, rate = _sums(part, np.diagonal)
-            m, q, p = (exactly(x) for x in (part.m, part.scene.q, part.scene.p))
+            m, q, p = (exactly(x) for x in (part.m, part.q, part.p))
             root = np.sqrt(m)
             for out, like, x in zip(
                 (slow, fast), sizes[2:], _split(root * (q - pull / k), p / root, k / m, rate), strict=False
@@ -201,7 +199,7 @@ def _zeros(*shape: int) -> Any:
     return exactly(np.zeros(shape))
 
 
-def _sums(system: System, of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
+def _sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
     """Stiffness, the part of its matrix `of` which is wanted; force at 0 (n,) and rates of friction (n,)."""
     zero = np.zeros(system.n, dtype=np.longdouble)
     k, force, friction = (_zeros(*shape) for shape in ((system.n, system.n), (system.n,), (system.n,)))
@@ -216,7 +214,7 @@ def _sums(system: System, of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]
     return of(k), force, friction / exactly(system.m)
 
 
-def _precise(system: System) -> Modes:
+def _precise(system: System[Any]) -> Modes:
     """Modes in so many digits that stiff and soft ones of a small system keep all of theirs."""
     with digits():
         # sums of the terms as they stand: exact
@@ -224,7 +222,7 @@ def _precise(system: System) -> Modes:
     count = _digits_for(system, k)
     left = Decimal(10) ** (12 - count)
     with digits(count):
-        m, q, p = (exactly(x) for x in (system.m, system.scene.q, system.scene.p))
+        m, q, p = (exactly(x) for x in (system.m, system.q, system.p))
         root = np.sqrt(m)
         w2, vectors = eigen(k / root[:, None] / root, count)
         pull = vectors.T @ (force / root)
@@ -244,7 +242,7 @@ def _precise(system: System) -> Modes:
     return _modes(system, start=start, **found)
 
 
-def _digits_for(system: System, k: Wide) -> int:
+def _digits_for(system: System[Any], k: Wide) -> int:
     """Digits that keep those of the slowest mode, as many decades as masses and stiffnesses differ by."""
     masses, springs = system.m, np.abs(k[k != 0])
     decades = Decimal(0)
@@ -253,7 +251,7 @@ def _digits_for(system: System, k: Wide) -> int:
     return max(ENOUGH, 40 + int(decades))
 
 
-def _drag(system: System, force: Extended) -> Extended:
+def _drag(system: System[Any], force: Extended) -> Extended:
     """The part of a force (n,) that moves free groups as a whole, and all of it elsewhere, per root of mass.
 
     Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
@@ -269,7 +267,7 @@ def _drag(system: System, force: Extended) -> Extended:
 PI = 4 * np.arctan(np.longdouble(1))
 
 
-def _wave_frequencies(system: System) -> Extended:
+def _wave_frequencies(system: System[Any]) -> Extended:
     """Squared frequencies of a uniform chain between walls, slowest first (Lagrange 1788)."""
     k = next(term.k[0] for term in system.terms if isinstance(term, Spring))
     half = np.sin(PI * np.arange(1, system.n + 1) / (2 * (system.n + 1)))

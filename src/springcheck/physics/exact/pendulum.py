@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +12,13 @@ from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide
 from springcheck.physics.rods import Rods
+from springcheck.physics.system import System
 from springcheck.physics.terms import Cosine, Weight
 
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
 
-
-def _swings(scene: Scene) -> tuple[Cosine, _Swing] | None:
-    (term,) = (term for term in scene.terms if isinstance(term, Cosine))
-    return None if np.any(term.depth == 0) or not one_each(scene) else (term, _swing(scene, term))
+def _swings(system: System[Any]) -> tuple[Cosine, _Swing] | None:
+    (term,) = (term for term in system.terms if isinstance(term, Cosine))
+    return None if np.any(term.depth == 0) or not one_each(system) else (term, _swing(system, term))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,20 +37,20 @@ class _Swing:
     m1: Extended
 
 
-def _swing(scene: Scene, term: Cosine) -> _Swing:
+def _swing(system: System[Any], term: Cosine) -> _Swing:
     i, wave, depth = term.i, wide(term.wave), np.abs(wide(term.depth))
-    mass, p = wide(scene.m[i]), wide(scene.p[i])
+    mass, p = wide(system.m[i]), wide(system.p[i])
     # upside down, the pendulum hangs from the other side
     turned = np.where(term.depth < 0, PI / 2, 0)
-    angle = wave * (wide(scene.q[i]) - term.at) / 2 + turned
+    angle = wave * (wide(system.q[i]) - term.at) / 2 + turned
     half = angle - PI * np.round(angle / PI)
     rate = p / (2 * np.sqrt(mass * depth))
     sine, cosine = np.sin(half), np.cos(half)
     m1 = (cosine - rate) * (cosine + rate)
-    size = wave * (np.abs(wide(scene.q[i])) + np.abs(term.at)) / 2 + turned
+    size = wave * (np.abs(wide(system.q[i])) + np.abs(term.at)) / 2 + turned
     near = (size > CANCELS * np.minimum(cosine, np.abs(half))) | (cosine**2 + rate**2 > CANCELS * np.abs(m1))
     for j in np.flatnonzero(near):
-        one = scene.m[i[j]], scene.q[i[j]], scene.p[i[j]], term.depth[j], term.wave[j], term.at[j]
+        one = system.m[i[j]], system.q[i[j]], system.p[i[j]], term.depth[j], term.wave[j], term.at[j]
         half[j], sine[j], cosine[j], m1[j] = _of_swing(*(exactly(x)[()] for x in one))
     return _Swing(
         length=1 / wave, mass=mass, w=np.sqrt(depth / mass) * wave, half=half, sine=sine, cosine=cosine,
@@ -70,28 +68,28 @@ def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extende
         return extended(np.array([half, sine, cosine, m1], dtype=object))
 
 
-def _pendulum(scene: Scene, swings: tuple[Cosine, _Swing], t: Extended) -> States:
+def _pendulum(system: System[Any], swings: tuple[Cosine, _Swing], t: Extended) -> States:
     """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
 
     R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
     """
-    q, p = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
     term, found = swings
     a, r = _swung(found, t)
-    q[:, term.i] = scene.q[term.i] + found.length * (2 * (a - found.half))
+    q[:, term.i] = system.q[term.i] + found.length * (2 * (a - found.half))
     p[:, term.i] = found.mass * found.length * 2 * found.w * r
     return q, p
 
 
-def _pendulum_doubt(scene: Scene, swings: tuple[Cosine, _Swing], t: np.longdouble) -> States:
-    q, p = np.empty((2, scene.n), dtype=np.longdouble)
+def _pendulum_doubt(system: System[Any], swings: tuple[Cosine, _Swing], t: np.longdouble) -> States:
+    q, p = np.empty((2, system.n), dtype=np.longdouble)
     term, found = swings
     root = np.sqrt(found.m)
     size = 2 * found.length * np.minimum(root, PI / 2)
     speed = 2 * found.length * found.w * root
     time = np.abs(t) + latency(found.m1 / np.maximum(found.m, 1)) / found.w
     force = found.mass * found.w**2 * np.minimum(size, found.length)
-    q[term.i] = LAST * (np.abs(scene.q[term.i]) + size + speed * time)
+    q[term.i] = LAST * (np.abs(system.q[term.i]) + size + speed * time)
     p[term.i] = LAST * (found.mass * speed + force * time)
     return q, p
 
@@ -131,19 +129,19 @@ class _Turning:
     """Velocity of the centre of mass, of each coordinate."""
 
 
-def _turning(scene: Scene) -> _Turning | None:
+def _turning(system: System[Any]) -> _Turning | None:
     """Rods of which no two share a particle."""
-    rods = scene.system.rods
+    rods = system.rods
     if rods is None or rods.share:
         return None
-    q = wide(scene.q)
-    p = rods.projected(q, wide(scene.p))
-    r, v = rods.ways(q), rods.apart(p / scene.m)
-    drift = (p - rods.spread(v / rods.each(rods.inverse_mass))) / scene.m
+    q = wide(system.q)
+    p = rods.projected(q, wide(system.p))
+    r, v = rods.ways(q), rods.apart(p / system.m)
+    drift = (p - rods.spread(v / rods.each(rods.inverse_mass))) / system.m
     return _Turning(rods=rods, r=wide(r), v=wide(v), w=wide(rods.rates(q, p)), drift=wide(drift))
 
 
-def _turned(scene: Scene, found: _Turning, t: Extended) -> States:
+def _turned(system: System[Any], found: _Turning, t: Extended) -> States:
     """r(t) = r cos(w t) + v sin(w t)/w about a centre of mass that goes straight on."""
     rods, w = found.rods, found.w
     mass = rods.each(1 / wide(rods.inverse_mass))
@@ -152,19 +150,19 @@ def _turned(scene: Scene, found: _Turning, t: Extended) -> States:
     rate = rods.each(w)
     r = found.r * (cosine - 1) + found.v * np.where(rate > 0, sine / np.where(rate > 0, rate, 1), 0)
     v = found.v * cosine - found.r * rate * sine
-    m = wide(scene.m)
-    q = scene.q + found.drift * t + rods.spread(mass * r) / m
+    m = wide(system.m)
+    q = system.q + found.drift * t + rods.spread(mass * r) / m
     return wide(q), wide(m * found.drift + rods.spread(mass * v))
 
 
-def _turning_doubt(scene: Scene, found: _Turning, t: np.longdouble) -> States:
-    rods, m, time = found.rods, wide(scene.m), np.abs(t)
+def _turning_doubt(system: System[Any], found: _Turning, t: np.longdouble) -> States:
+    rods, m, time = found.rods, wide(system.m), np.abs(t)
     mass = rods.each(1 / wide(rods.inverse_mass))
     reach, rate = rods.each(wide(rods.length)), rods.each(found.w)
     turned = rods.spread(mass * reach * (2 + rate * time), size=True)
     rated = rods.spread(mass * reach * rate * (2 + rate * time), size=True)
     speed = np.abs(found.drift)
-    return wide(LAST * (np.abs(scene.q) + speed * time + turned / m)), wide(LAST * (m * speed + rated))
+    return wide(LAST * (np.abs(system.q) + speed * time + turned / m)), wide(LAST * (m * speed + rated))
 
 
 ROD, WALL_ROD = (
@@ -184,15 +182,18 @@ class _Hung:
     swing: _Swing
 
 
-def _hung(scene: Scene) -> _Hung | None:
-    rods, weight = scene.system.rods, np.zeros(scene.n, np.longdouble)
-    for term in scene.terms:
+def _hung(system: System[Any]) -> _Hung | None:
+    rods, weight = system.rods, np.zeros(system.n, np.longdouble)
+    for term in system.terms:
         if isinstance(term, Weight):
             np.add.at(weight, term.i, term.force)
-    if rods is None or rods.share or any(len(ends) > 1 for ends in rods.ends) or scene.n != 2 * len(rods):
+    if rods is None or rods.share or any(len(ends) > 1 for ends in rods.ends) or system.n != 2 * len(rods):
         return None
-    q, shape = wide(scene.q), (len(rods), 2)
-    r, v = rods.ways(q).reshape(shape), rods.apart(rods.projected(q, wide(scene.p)) / scene.m).reshape(shape)
+    q, shape = wide(system.q), (len(rods), 2)
+    r, v = (
+        rods.ways(q).reshape(shape),
+        rods.apart(rods.projected(q, wide(system.p)) / system.m).reshape(shape),
+    )
     f = rods.apart(weight).reshape(shape)
     size, length = np.hypot(*f.T), np.hypot(*r.T)
     if np.any(size == 0):
@@ -212,7 +213,7 @@ def _hung(scene: Scene) -> _Hung | None:
     return _Hung(rods=rods, start=wide(r.ravel()), down=wide(down), across=wide(across), swing=swing)
 
 
-def _hanging(scene: Scene, found: _Hung, t: Extended) -> States:
+def _hanging(system: System[Any], found: _Hung, t: Extended) -> States:
     """The angle from the weight swings as that of any pendulum: w**2 = force / (mass length)."""
     rods, swing = found.rods, found.swing
     half, rate = _swung(swing, t)
@@ -221,17 +222,17 @@ def _hanging(scene: Scene, found: _Hung, t: Extended) -> States:
     r = swing.length[:, None] * (cosine * found.down + sine * found.across)
     v = speed * (cosine * found.across - sine * found.down)
     rows = (*t.shape[:-1], -1)
-    q = scene.q + rods.spread(r.reshape(rows) - found.start)
+    q = system.q + rods.spread(r.reshape(rows) - found.start)
     return wide(q), wide(rods.spread((swing.mass[:, None] * v).reshape(rows)))
 
 
-def _hanging_doubt(scene: Scene, found: _Hung, t: np.longdouble) -> States:
+def _hanging_doubt(system: System[Any], found: _Hung, t: np.longdouble) -> States:
     rods, swing = found.rods, found.swing
     speed = 2 * swing.length * swing.w * np.sqrt(swing.m)
     time = np.abs(t) + latency(swing.m1 / np.maximum(swing.m, 1)) / swing.w
     q = rods.spread(rods.each(swing.length + speed * time))
     p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
-    return wide(LAST * (np.abs(scene.q) + q)), wide(LAST * p)
+    return wide(LAST * (np.abs(system.q) + q)), wide(LAST * p)
 
 
 RIGID = Well(

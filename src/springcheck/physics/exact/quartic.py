@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,8 @@ from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.elliptic import argument, jacobi
 from springcheck.physics.exact.well import CANCELS, LAST, States, Well, latency, wide
+from springcheck.physics.system import System
 from springcheck.physics.terms import Quartic, WallSpring
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,16 +44,16 @@ class _Duffing:
         return _Duffing(**{name: getattr(self, name)[which] for name in self.__slots__})
 
 
-def _gathered(scene: Scene, of: Callable[[Any], Any]) -> tuple[Any, ...]:
+def _gathered(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
     """m, k, b, q, at, p of each particle (n,), in numbers made by `of`."""
-    k, b, at = (of(np.zeros(scene.n)) for _ in range(3))
-    for term in scene.terms:
+    k, b, at = (of(np.zeros(system.n)) for _ in range(3))
+    for term in system.terms:
         if isinstance(term, Quartic):
             term.scatter(of(term.b), b)
             at[term.i] = of(term.at)
         elif isinstance(term, WallSpring):
             term.scatter(of(term.k), k)
-    return of(scene.m), k, b, of(scene.q), at, of(scene.p)
+    return of(system.m), k, b, of(system.q), at, of(system.p)
 
 
 def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
@@ -64,21 +62,21 @@ def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
     return x, m * x * x + 2 * b * p * p, 2 * p * p + m * (2 * k + b * u * u) * u * u
 
 
-def _duffing(scene: Scene) -> tuple[_Duffing, Extended] | None:
+def _duffing(system: System[Any]) -> tuple[_Duffing, Extended] | None:
     """The wells and their centres, or None where one has several centres, or no turning point."""
-    m, k, b, q, at, p = _gathered(scene, wide)
-    for term in scene.terms:
+    m, k, b, q, at, p = _gathered(system, wide)
+    for term in system.terms:
         if isinstance(term, Quartic | WallSpring) and np.any(term.at != at[term.i]):
             return None
     u = q - at
     sums = _sums(m, k, b, u, p)
-    m_, k_, b_, q_, at_, p_ = _gathered(scene, lambda x: np.abs(wide(x)))
+    m_, k_, b_, q_, at_, p_ = _gathered(system, lambda x: np.abs(wide(x)))
     sizes = _sums(m_, k_, b_, q_ + at_, p_)
     near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
     if np.any(near):
         chosen = np.flatnonzero(near)
         with digits():
-            m_, k_, b_, q_, at_, p_ = _gathered(scene.system.part(chosen), exactly)
+            m_, k_, b_, q_, at_, p_ = _gathered(system.beside(system.part(chosen)), exactly)
             for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
                 out[chosen] = extended(x)
     x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2
@@ -115,20 +113,20 @@ def _orbit(
     return {"amplitude": amplitude, "w": w, "m": m, "m1": m1}
 
 
-def _stiffening(scene: Scene, found: tuple[_Duffing, Extended], t: Extended) -> States:
+def _stiffening(system: System[Any], found: tuple[_Duffing, Extended], t: Extended) -> States:
     """cn, dn or sn, by what holds the particle."""
     well, at = found
-    u, v = np.empty((2, len(t), scene.n), dtype=np.longdouble)
+    u, v = np.empty((2, len(t), system.n), dtype=np.longdouble)
     softening = well.b <= 0
     # the sign of the energy: beside |k| it may be lost in the root
     caught = ~softening & (well.plus < 0)
     for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
         if np.any(which):
             u[:, which], v[:, which] = law(well[which], t)
-    return u + at, v * scene.m
+    return u + at, v * system.m
 
 
-def _stiffening_doubt(scene: Scene, found: tuple[_Duffing, Extended], t: np.longdouble) -> States:
+def _stiffening_doubt(system: System[Any], found: tuple[_Duffing, Extended], t: np.longdouble) -> States:
     well, at = found
     # at the bottom of the potential
     fastest = np.where(
@@ -138,7 +136,7 @@ def _stiffening_doubt(scene: Scene, found: tuple[_Duffing, Extended], t: np.long
     time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
     q = LAST * (np.abs(at) + a + speed * time)
     p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
-    return np.asarray(q), np.asarray(p * scene.m)
+    return np.asarray(q), np.asarray(p * system.m)
 
 
 def _cn(well: _Duffing, t: Extended) -> States:

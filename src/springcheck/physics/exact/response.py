@@ -8,7 +8,7 @@ free particle alike, where points coincide (de Boor, Surveys in Approximation Th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact import linear
 from springcheck.physics.exact.elliptic import EPS
-from springcheck.physics.exact.normal import Modes
+from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import States, Well
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 
 _Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -29,22 +27,22 @@ SERIES_TERMS = 26
 
 
 class _Found(NamedTuple):
-    """The scene without its drives, its modes, and of each drive frequency, phase and force on each mode."""
+    """The system without its drives, its modes, and of each drive frequency, phase and force on each mode."""
 
-    alone: Scene
+    alone: System[Any]
     modes: Modes
     drives: tuple[tuple[np.longdouble, np.longdouble, Extended], ...]
 
 
-def prepare(scene: Scene) -> _Found | None:
+def prepare(system: System[Any]) -> _Found | None:
     """None where something else than linear springs, friction with modes, and drives acts."""
-    alone = scene.derived(terms=tuple(term for term in scene.terms if term.key != "drive"))
-    if not alone.system.has_modes:
+    alone = system.without("drive")
+    if not alone.has_modes:
         return None
-    drives, modes = [], alone.system.modes
-    for term in scene.terms:
+    drives, modes = [], normal_modes(alone)
+    for term in system.terms:
         for i, amplitude, frequency, phase in term.rows() if term.key == "drive" else ():
-            push = np.zeros(scene.n)
+            push = np.zeros(system.n)
             push[i] = amplitude
             drives.append((np.longdouble(frequency), np.longdouble(phase), modes.into(push * 0, push)[1]))
     return _Found(alone, modes, tuple(drives))
@@ -93,9 +91,9 @@ def second_difference(a: _Complex, b: _Complex, c: _Complex, t: Extended) -> _Co
     )
 
 
-def motion(scene: Scene, found: _Found, t: Extended) -> States:
+def motion(system: System[Any], found: _Found, t: Extended) -> States:
     """Exact q and p (f, n) at times t (f, 1) [T]."""
-    q, p = linear.motion(found.alone, None, t)
+    q, p = linear.motion(found.alone, found.modes, t)
     slow, fast = roots(found.modes)
     for frequency, phase, force in found.drives:
         turn = np.full_like(slow, 1j * frequency)
@@ -108,13 +106,13 @@ def motion(scene: Scene, found: _Found, t: Extended) -> States:
     return q, p
 
 
-def doubt(scene: Scene, found: _Found, t: np.longdouble) -> States:
+def doubt(system: System[Any], found: _Found, t: np.longdouble) -> States:
     """Bounds (n,) of the errors of `motion` in q and p, from the start to time t.
 
     Those of the motion without a drive, and roundings of the angles and of what the force moves: g moves a
     mode by |t g| min(t, 1/w) at most (variation of constants).
     """
-    q, p = linear.doubt(found.alone, None, t)
+    q, p = linear.doubt(found.alone, found.modes, t)
     modes, duration = found.modes, np.abs(t)
     _, _, phase, hold = linear.reaches(modes, t)
     grown = np.exp(np.maximum(np.max([x.real * t for x in roots(modes)], axis=0), 0))

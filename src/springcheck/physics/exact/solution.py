@@ -10,25 +10,24 @@ its time, near a barrier as elsewhere.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact import linear
+from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import Well
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
-    from springcheck.physics.system import System
+from springcheck.physics.system import Fields, System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """Particles (s,) of a scene, the scene of these alone, and the closed form of their motion."""
+    """Particles (s,) of a system, the system of these alone, and the closed form of their motion."""
 
     particles: Integers
-    scene: Scene
+    system: System[Any]
     found: Any
     """What was worked out once (see `Well.prepare`)."""
     law: Well
@@ -47,7 +46,7 @@ class Solution:
         q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
-                q[:, group.particles], p[:, group.particles] = group.law.motion(group.scene, group.found, t)
+                q[:, group.particles], p[:, group.particles] = group.law.motion(group.system, group.found, t)
         return q, p
 
     def doubt(self, duration: float) -> tuple[Extended, Extended]:
@@ -56,31 +55,39 @@ class Solution:
         with np.errstate(all="ignore"):
             for group in self.groups:
                 q[group.particles], p[group.particles] = group.law.doubt(
-                    group.scene, group.found, np.longdouble(duration)
+                    group.system, group.found, np.longdouble(duration)
                 )
         # infinite where the motion itself is; never no number
         return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
 
 
-def solution(system: System) -> Solution | None:
-    """The exact motion of a system, None where some particles have no closed form here."""
-    if system.has_modes:
-        whole = _Group(particles=np.arange(system.n), scene=system.scene, found=True, law=linear.LINEAR)
-        return Solution(n=system.n, groups=(whole,))
-    if "magnetic" in system.acting:
-        from springcheck.physics.exact.gyration import GYRATION
+class SolvedSystem(System[Fields]):
+    """The facts of one scene, its normal modes and its exact motion among them."""
 
-        ready = GYRATION.prepare(system.scene)
-        here = _Group(particles=np.arange(system.n), scene=system.scene, found=ready, law=GYRATION)
-        return Solution(n=system.n, groups=(here,)) if ready else None
-    if system.is_driven:
+    @cached_property
+    def modes(self) -> Modes:
+        """Normal modes.  ValueError where there are none (see `has_modes`)."""
+        return normal_modes(self)
+
+    @cached_property
+    def solution(self) -> Solution | None:
+        """The exact (analytic) solution, None where no closed form is known, or where a bath acts."""
+        return None if self.scene.bath else _solution(self)
+
+
+def _solution(system: SolvedSystem[Any]) -> Solution | None:
+    """None where some particles have no closed form here."""
+    everything = partial(_Group, particles=np.arange(system.n), system=system)
+    if system.has_modes:
+        return Solution(n=system.n, groups=(everything(found=system.modes, law=linear.LINEAR),))
+    if system.is_driven or "magnetic" in system.acting:
+        from springcheck.physics.exact.gyration import GYRATION
         from springcheck.physics.exact.mathieu import MATHIEU
         from springcheck.physics.exact.response import RESPONSE
 
-        for law in (RESPONSE, MATHIEU):
-            if ready := law.prepare(system.scene):
-                here = _Group(particles=np.arange(system.n), scene=system.scene, found=ready, law=law)
-                return Solution(n=system.n, groups=(here,))
+        for law in (GYRATION,) if "magnetic" in system.acting else (RESPONSE, MATHIEU):
+            if ready := law.prepare(system):
+                return Solution(n=system.n, groups=(everything(found=ready, law=law),))
         return None
     from springcheck.physics.exact.bond import MORSE
     from springcheck.physics.exact.pendulum import COSINE, RIGID, ROD, WALL_ROD
@@ -100,10 +107,10 @@ def solution(system: System) -> Solution | None:
             mine = left if law is linear.LINEAR else acting.get(law.key, nothing) & ~other
             chosen = np.flatnonzero(mine)
             if len(chosen):
-                part = system.part(chosen)
+                part = system.beside(system.part(chosen))
                 ready = law.prepare(part)
                 if ready is None:
                     return None
-                found.append(_Group(particles=chosen, scene=part, found=ready, law=law))
+                found.append(_Group(particles=chosen, system=part, found=ready, law=law))
                 left[chosen] = False
     return Solution(n=system.n, groups=tuple(found))

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.elliptic import EPS
-
-if TYPE_CHECKING:
-    from springcheck.physics.scene import Scene
+from springcheck.physics.system import System
 
 States: TypeAlias = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
@@ -31,11 +29,11 @@ class Well:
 
     key: str
     terms: frozenset[str]
-    prepare: Callable[[Scene], Any]
+    prepare: Callable[[System[Any]], Any]
     """What is worked out once for all times: constants of the motion; None where it is not known."""
-    motion: Callable[[Scene, Any, Extended], States]
+    motion: Callable[[System[Any], Any, Extended], States]
     """A scene, what was worked out of it, and times t (f, 1) [T] -> q and p (f, n)."""
-    doubt: Callable[[Scene, Any, np.longdouble], States]
+    doubt: Callable[[System[Any], Any, np.longdouble], States]
     """The same and one time -> bounds (n,) of the errors of q and p from the start to then."""
 
 
@@ -44,9 +42,9 @@ def wide(x: Any) -> Extended:
     return np.asarray(x, np.longdouble)
 
 
-def one_each(scene: Scene) -> bool:
+def one_each(system: System[Any]) -> bool:
     """Whether one term alone acts on each particle."""
-    return bool(np.all(scene.system.pulls() == 1))
+    return bool(np.all(system.pulls() == 1))
 
 
 def latency(m1: Extended) -> Extended:

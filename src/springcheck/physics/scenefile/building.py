@@ -12,7 +12,8 @@ from springcheck.errors import SceneError
 from springcheck.physics import builders
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.bath import Bath
-from springcheck.physics.scene import Scene, Units
+from springcheck.physics.fields import Units
+from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
 from springcheck.physics.terms import Column, Damping, Magnetic, Rod, Spring, Term, WallRod, WallSpring
 

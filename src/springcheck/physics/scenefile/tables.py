@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple, cast, get_args
 import msgspec
 
 from springcheck.physics import terms
-from springcheck.physics.scene import Kind, Quantity, Units
+from springcheck.physics.fields import Kind, Quantity, Units
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.physics.builders import standing
-from springcheck.physics.scene import Scene
+from springcheck.physics.fields import SceneFields
+from springcheck.physics.graph import standing
+from springcheck.physics.rods import rods_of
 from springcheck.physics.scenefile.tables import BODIES
+from springcheck.physics.system import System
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Magnetic, Rod, Spring, WallRod, WallSpring
 
@@ -20,15 +22,16 @@ MOST_WAVES = 64
 """Standing waves up to which the start of a chain is written as such."""
 
 
-def text(scene: Scene) -> str:
-    """The scene file of a scene."""
+def text(system: System[Any]) -> str:
+    """The scene file of a system's scene."""
+    scene: SceneFields = system.scene
     head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
     lines = [_assigned(head)]
     is_chain = (
         scene.places is None
         and scene.kind == "particles"
         and scene.n > 1
-        and scene.system.is_uniform_chain
+        and system.is_uniform_chain
         and _rests_at_0(scene)
     )
     if is_chain:
@@ -52,7 +55,7 @@ def text(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _bodies(scene: Scene, names: Sequence[str]) -> Iterator[Iterable[tuple[str, Any]]]:
+def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple[str, Any]]]:
     """The rows of what moves: one number for each column, or for each of its axes."""
     rows = list(zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True))
     if scene.places is None:
@@ -66,13 +69,13 @@ def _bodies(scene: Scene, names: Sequence[str]) -> Iterator[Iterable[tuple[str, 
         yield zip((*names, "axes"), (m[0], list(q), list(p), along), strict=True)
 
 
-def _rests_at_0(scene: Scene) -> bool:
+def _rests_at_0(scene: SceneFields) -> bool:
     """Whether the springs of a chain have the rests that [chain] stands for."""
     springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
     return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
 
 
-def _chain(scene: Scene) -> Iterator[str]:
+def _chain(scene: SceneFields) -> Iterator[str]:
     k = next(term.k for term in scene.terms if isinstance(term, Spring))
     known: dict[str, Any] = {"masses": scene.n, "mass": scene.m[0], "stiffness": k[0]}
     waves = None if np.any(scene.p) else _waves(scene.q)
@@ -104,7 +107,7 @@ def _waves(q: Floats) -> list[tuple[int, float]] | None:
     return None
 
 
-def _rows(scene: Scene, term: Term) -> Iterator[str]:
+def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
     if isinstance(term, Damping) and scene.kind == "circuit":
         for loop, resistance in term.rows():
             yield _table("[[resistor]]", [("loop", loop), ("resistance", resistance)])
@@ -125,7 +128,7 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
             row = {"particle": particle, "strength": sign * strength, "axis": "xyz"[3 - one - other]}
             yield _table("[[magnetic]]", row.items())
     elif isinstance(term, Rod | WallRod):
-        rods = scene.derived(terms=(term,)).system.rods
+        rods = rods_of(scene.m, scene.places, (term,))
         assert rods is not None
         for ends, length, point in rods.joints():
             places = scene.places
@@ -136,7 +139,7 @@ def _rows(scene: Scene, term: Term) -> Iterator[str]:
         yield from _by_columns(scene, term)
 
 
-def _ends(scene: Scene, coordinates: Sequence[int]) -> tuple[list[int], dict[str, str]]:
+def _ends(scene: SceneFields, coordinates: Sequence[int]) -> tuple[list[int], dict[str, str]]:
     """The particles of these coordinates, and their axis where that is not x for all."""
     if scene.places is None:
         return list(coordinates), {}
@@ -153,7 +156,14 @@ def _are_capacitors(term: WallSpring | Spring) -> bool:
 
 
 def _spring(
-    scene: Scene, walls: Sequence[str], at: Sequence[int], k: float, rest: float, wall: float, *, fast: bool
+    scene: SceneFields,
+    walls: Sequence[str],
+    at: Sequence[int],
+    k: float,
+    rest: float,
+    wall: float,
+    *,
+    fast: bool,
 ) -> str:
     ends, axis = _ends(scene, at)
     row: dict[str, Any] = {"ends": [*walls, *ends], "stiffness": k, **axis}
@@ -162,7 +172,7 @@ def _spring(
     return _table("[[spring]]", (row | ({"fast": True} if fast else {})).items())
 
 
-def _by_columns(scene: Scene, term: Term) -> Iterator[str]:
+def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
     for j, at in enumerate(zip(*(index.tolist() for index in term.particles), strict=True)):
         ends, axis = _ends(scene, at)
         row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": ends}

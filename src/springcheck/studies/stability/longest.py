@@ -75,7 +75,7 @@ def stiffest(scene: Scene) -> Floats:
     return np.asarray(here[int(np.argmax([_largest(system, at) for at in here]))])
 
 
-def _largest(system: System, q: Floats) -> float:
+def _largest(system: System[Scene], q: Floats) -> float:
     """The largest eigenvalue of M**-1/2 K M**-1/2 at q (n,), or its bound of Gershgorin [1/T2]."""
     if system.is_separate:
         return float(np.max(system.hessian_diagonal(q) / system.m))
@@ -85,7 +85,7 @@ def _largest(system: System, q: Floats) -> float:
     return float(np.linalg.eigvalsh(found)[-1]) if np.isfinite(found).all() else np.inf
 
 
-def _scaled(system: System, q: Reals) -> Extended:
+def _scaled(system: System[Scene], q: Reals) -> Extended:
     root = np.sqrt(system.m.astype(np.longdouble))
     return np.asarray(system.hessian(q) / root[:, None] / root)
 

@@ -1,0 +1,134 @@
+"""The fields of a scene, and what can be counted of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.bath import Bath
+from springcheck.physics.term import Term, refrozen
+
+Kind: TypeAlias = Literal["particles", "circuit", "rotor"]
+Units: TypeAlias = Literal["reduced", "md", "si"]
+Quantity: TypeAlias = Literal["q", "p", "energy"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SceneFields:
+    """The fields of a `Scene`, as they are: only a `Scene` checks them and knows what follows from them."""
+
+    m: Floats
+    """Masses, > 0 (n,) [M]."""
+    q: Floats
+    """Positions at the start (n,) [L]."""
+    p: Floats
+    """Momenta at the start (n,) [M L/T]."""
+    places: Integers | None = None
+    """Where each coordinate stands among x, y and z of all particles (n,): 3 particle + axis.  Arrays (n,)
+    hold a number for each coordinate.  None where each particle has one, along x."""
+    terms: tuple[Term, ...] = ()
+    """One of each kind, in the order of `terms.known`; terms of one kind are joined."""
+    step: float
+    """Step [T], < 0 for a run backwards in time."""
+    steps: int
+    every: int = 1
+    """Every how many steps a frame is recorded; it divides `steps`."""
+    box: tuple[float, float, float] | None = None
+    """Lengths of a periodic box along x, y and z [L], where every spring is that of the nearest images of its
+    ends; None without one.  Positions are counted on across its borders, so that no motion changes."""
+    bath: Bath | None = None
+    """The heat bath, which only random methods have; None where the motion is deterministic."""
+    tolerance: float = 1e-12
+    """Relative tolerance per step of adaptive solvers."""
+    units: Units = "reduced"
+    kind: Kind = "particles"
+    include: tuple[str, ...] = ("*",)
+    """Labels or globs of the methods to run."""
+    quantities: tuple[str, ...] = ("q", "p", "energy")
+    """What is recorded: q and p, and the energy unless it is left out."""
+    name: str = "scene"
+    title: str = ""
+    source: str = ""
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates: of particles, where each moves along one axis."""
+        return len(self.m)
+
+    @property
+    def particles(self) -> int:
+        """Number of particles."""
+        return self.n if self.places is None else int(np.max(self.places)) // 3 + 1
+
+    @property
+    def size(self) -> str:
+        """How many particles there are, and along which axes they move where that is not x, in words."""
+        particles = f"{self.particles} particle{'s' if self.particles != 1 else ''}"
+        along = ", ".join(self.axes[:-1]) + " and " * (len(self.axes) > 1) + self.axes[-1]
+        return particles if self.places is None else f"{particles} along {along}"
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes along which something moves, of x, y and z."""
+        return ("x",) if self.places is None else tuple("xyz"[i] for i in np.unique(self.places % 3))
+
+    @property
+    def all_places(self) -> Integers:
+        """Where each coordinate stands (n,), as `places`, also where these are left out."""
+        return 3 * np.arange(self.n) if self.places is None else self.places
+
+    @property
+    def masses(self) -> Floats:
+        """The mass of each particle (particles,) [M]."""
+        found = np.empty(self.particles)
+        found[self.all_places // 3] = self.m
+        return found
+
+    @property
+    def where(self) -> slice | Integers:
+        """The coordinates among x, y and z of all particles, as an index of an array (3 particles,)."""
+        return slice(0, 3 * self.n, 3) if self.places is None else self.places
+
+    @cached_property
+    def elsewhere(self) -> NDArray[np.bool_]:
+        """Which of x, y and z of all particles (3 particles,) are no coordinates of the scene."""
+        left = np.ones(3 * self.particles, dtype=bool)
+        left[self.where] = False
+        return left
+
+    @property
+    def periods(self) -> Floats:
+        """The length of the box along the axis of each coordinate, 0 without a box (n,) [L]."""
+        if self.box is None:
+            return np.zeros(self.n)
+        return np.array(self.box)[self.all_places % 3]
+
+    @property
+    def frames(self) -> int:
+        """Number of recorded states, the start among them."""
+        return self.steps // self.every + 1
+
+    @property
+    def thermal(self) -> float:
+        """The thermal energy kT of the bath [M L2/T2]; 0 without one."""
+        return self.bath.thermal(self.units) if self.bath else 0.0
+
+    def derived(self, **changes: Any) -> Self:
+        """Like `replace`, for numbers that follow from a scene's own and are not checked again.
+
+        They may be inf, where an engine of single precision would keep them so.
+        """
+        twin = object.__new__(type(self))
+        twin.__dict__.update(self.__getstate__(), **changes)
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        refrozen(self, state)
