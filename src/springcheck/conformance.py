@@ -36,9 +36,6 @@ __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "une
 
 SEED = 20260101
 
-SHOWN = ". What the states show: "
-"""Before the sentence of `identify` in the reason of a verdict."""
-
 __tracebackhide__ = True
 """pytest leaves our frames out, and shows those of the engine and of its test."""
 
@@ -85,10 +82,12 @@ def assert_right(scene: Scene, run: Trajectory) -> None:
     verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
     wrong = [verdict for verdict in verdicts if verdict.passed is False]
     if wrong:
-        _, _, shown = next((v.why for v in wrong if SHOWN in v.why), "").partition(SHOWN)
+        _, _, shown = next((v.why for v in wrong if checks.STATES_SHOW in v.why), "").partition(
+            checks.STATES_SHOW
+        )
         lines = [
             f"  {verdict.check}: {verdict.value:.3g} where {verdict.bound:.3g} {verdict.unit} is allowed; "
-            f"{verdict.why.partition(SHOWN)[0]}"
+            f"{verdict.why.partition(checks.STATES_SHOW)[0]}"
             for verdict in wrong
         ]
         said = f": {shown}" if shown else ""

@@ -26,8 +26,10 @@ if [ -n "${JUDGE_COMMAND:-}" ] && ! bash -c "$JUDGE_COMMAND"; then
 fi
 status=0
 if [ -n "${JUDGE_TRAJECTORY:-}" ]; then
-  springcheck identify "$JUDGE_TRAJECTORY" ${scheme[@]+"${scheme[@]}"} ${options[@]+"${options[@]}"} \
-    "${reports[@]}" || status=$?
+  # of a scene that is stated the judge knows what rods and a bath must do
+  verb=(identify "$JUDGE_TRAJECTORY")
+  [ -z "${JUDGE_SCENE:-}" ] || verb=(judge "$JUDGE_TRAJECTORY" --scene "$JUDGE_SCENE")
+  springcheck "${verb[@]}" ${scheme[@]+"${scheme[@]}"} ${options[@]+"${options[@]}"} "${reports[@]}" || status=$?
   springcheck plot "$JUDGE_TRAJECTORY" -o "$out" --quiet || true
 else
   store="$out/run.h5"

@@ -35,10 +35,11 @@ from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
+from springcheck.text.wording import STATES_SHOW
 
 __all__ = [
-    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "TELLING", "THOROUGH", "Bench", "Case", "Check",
-    "Experiment",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH", "Bench", "Case",
+    "Check", "Experiment",
     "Run", "angular_momentum", "arithmetic", "bridges", "closed_form", "energies", "first_off", "frequency",
     "judge", "judge_seeds", "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "shared", "start",
     "status", "step_defect", "summary", "tolerance", "tolerance_bound", "worst",
@@ -144,11 +145,11 @@ def explained(
     if first is None:
         return list(verdicts)
     case = Case(trajectory=run, scene=scene)
-    # what failed alone asks where the time was taken
-    from springcheck.checks import driven
+    # what failed alone asks where the time was taken, and what rods and baths did
+    from springcheck.checks import causes, driven
 
-    said = driven.found(case) or shown(scene, run, first_off(case) or 0)
-    why = f"{first.why}. What the states show: {said}" if said else first.why
+    said = driven.found(case) or causes.found(case) or shown(scene, run, first_off(case) or 0)
+    why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError, plain
 from springcheck.studies.arguments import REPORT_FORMS
-from springcheck.text.wording import count
+from springcheck.text.wording import STATES_SHOW, count
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
 OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
@@ -124,8 +124,10 @@ def _identified(found: dict[str, Any], file: str) -> Iterator[Case]:
 def _reason(verdict: dict[str, Any]) -> str:
     if verdict["passed"] is None:
         return str(verdict["why"])
+    why, _, shown = str(verdict["why"]).partition(STATES_SHOW)
     size = f"{_number(verdict['value'])} of {_number(verdict['bound'])} {verdict['unit']}".strip()
-    return f"{size}; {verdict['why']}"
+    # the cause is the first sentence
+    return f"{shown}. {size}; {why}" if shown else f"{size}; {why}"
 
 
 def _number(x: float | None) -> str:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+STATES_SHOW = ". What the states show: "
+"""Between the reason of a verdict that failed and its cause."""
+
 
 def ordinal(n: int) -> str:
     """A number's place in a row: 1st, 2nd, 3rd, 11th, 41st."""

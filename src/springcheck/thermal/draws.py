@@ -6,7 +6,7 @@ acts in two steps, they over-determine it: what is left over is rounding, at eve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,8 @@ class Reading:
     """What rounding may leave of each draw, (f-1, n), or of two a step (2, f-1, n)."""
     hits: NDArray[np.bool_] | None = None
     """Where collisions took place, (f-1, n)."""
+    rescaled: Floats | None = None
+    """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
 
     @property
     def known(self) -> bool:
@@ -170,7 +172,11 @@ class _Reader:
         # of a normal number of the same variance
         spread = np.sqrt(2 * (n + 2 * before)) / (2 * np.abs(factor) * about)
         # the series of the distribution ends where the motion is that much above the noise
-        return self._reading(draws, np.max(across, axis=0), np.where(before < HOTTEST, unit / spread, np.inf))
+        found = self._reading(
+            draws, np.max(across, axis=0), np.where(before < HOTTEST, unit / spread, np.inf)
+        )
+        kinetic = np.concatenate([twice, factor**2 * twice], axis=-1).T / self.scene.thermal
+        return replace(found, rescaled=np.asarray(kinetic, np.float64))
 
     def _force(self, q: Reals, p: Reals) -> Reals:
         return self.scene.system.potential_force(q, p)

@@ -23,6 +23,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import Damage, Summary
+from springcheck.text.wording import STATES_SHOW
 
 NUMBERS = 15_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
@@ -50,7 +51,7 @@ class Passed:
         first = next((v for v in self.verdicts if v.passed is False), None)
         if first is None:
             return ""
-        why, _, shown = first.why.partition(". What the states show: ")
+        why, _, shown = first.why.partition(STATES_SHOW)
         return (
             f"{self.method}: {shown}. {first.check}: {why}"
             if shown

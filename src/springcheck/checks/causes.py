@@ -1,0 +1,129 @@
+"""What the states of a scene with rods, or in a bath, show where they are not those of the scheme.
+
+A push along a rod is what a step has done beyond the same step without rods: its direction is read off
+the positions.  What a bath did is in the draws that the states must have taken: whose, and of which size.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.checks.case import Case
+from springcheck.checks.requires import MAP, missing
+from springcheck.checks.thermal import reading
+from springcheck.physics.arrays import Floats, Reals
+from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import ENERGY_LEFT
+
+PUSH_ROUNDINGS = 64
+"""Of the positions that a push is the difference of: a free step, its rounding and that of the frame."""
+
+STANDARD_ERRORS = 6.0
+"""Standard errors from which a size is another: a chance of 2e-9 of normal numbers."""
+
+FEWEST_DRAWS = 50
+"""Draws from which sizes are said: their standard error is a tenth."""
+
+FIT_ROUNDS = 20
+"""Of a fit whose weights are its own variances."""
+
+SAME_DRAWS = 1e-6
+"""Part of their size that draws may differ by which are the same numbers."""
+
+
+def found(case: Case) -> str:
+    """In one sentence, or "" where nothing here is what happened."""
+    if case.trajectory.scheme in THERMOSTATS:
+        return _of_bath(case) if case.trajectory.every == 1 else ""
+    return _of_rods(case)
+
+
+def _of_rods(case: Case) -> str:
+    """Along which way the ends of rods are pushed, where it is not that before the drift."""
+    rods, run = case.system.rods, case.trajectory
+    if rods is None or rods.share or missing(case, MAP) or run.every > 1 or len(run.t) < 3:
+        return ""
+    drifts = [kind for kind in case.scheme.kinds if kind.drifts]
+    if len(drifts) != 1:
+        return ""
+    scene = case.judged
+    free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
+    q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
+    with np.errstate(all="ignore"):
+        loose = Case(trajectory=run, scene=free).step(q, p)[0]
+        push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
+        moved = rods.apart(push)
+        allowed = PUSH_ROUNDINGS * rods.spans(noise)
+
+        def along(way: Reals) -> bool:
+            part = rods.each(rods.dot(moved, way) / rods.dot(way, way)) * way
+            off = np.sqrt(rods.dot(moved - part, moved - part))
+            return bool(np.all(off[1:] <= allowed[1:]))
+
+        ways = rods.ways(q)
+        if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed) or along(ways):
+            return ""
+        title = case.scheme.title
+        if along(rods.ways(loose)):
+            return (
+                "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
+                f"{title} takes it as it lay before"
+            )
+        if along(np.concatenate([ways[:1], ways[:-1]])):
+            return "SHAKE pushes the ends of a rod along it as it lay a step before"
+    return ""
+
+
+def _of_bath(case: Case) -> str:
+    """Whose the draws are, and their size."""
+    seen = reading(case)
+    if seen.rescaled is not None:
+        return _rescaled(case, seen.rescaled)
+    x = seen.draws
+    if not seen.known or x.size < FEWEST_DRAWS or not np.all(np.isfinite(x)):
+        return ""
+    size = np.sqrt(np.mean(x * x))
+    for i in range(x.shape[1]):
+        for j in range(i):
+            for words, sign in (("the same as", 1), ("the opposite of", -1)):
+                if np.all(np.abs(x[:, i] - sign * x[:, j]) <= SAME_DRAWS * size):
+                    return f"the random numbers of coordinate {i} are {words} those of coordinate {j}"
+    of = x * x
+    error = np.std(of) / np.sqrt(of.size)
+    if abs(np.mean(of) - 1) > STANDARD_ERRORS * error:
+        return (
+            f"the noise is {size:.4g} +- {error / (2 * size):.1g} times as large as the temperature, the "
+            "masses and the friction ask"
+        )
+    return ""
+
+
+def _rescaled(case: Case, kinetic: Floats) -> str:
+    """What one factor for all momenta leaves of the kinetic energy, and what it adds; weighted least squares.
+
+    After it twice the kinetic energy over kT has the mean c K + n b and the variance 2 n b**2 + 4 c K b,
+    where b = 1 - c in equation (A7) of Bussi, Donadio & Parrinello.
+    """
+    bath, n = case.judged.bath, case.scene.n
+    before, after = kinetic
+    if bath is None or len(before) < FEWEST_DRAWS or not np.all(np.isfinite(kinetic)):
+        return ""
+    x = np.float64(bath.friction * case.trajectory.step)
+    asked, lost = float(ENERGY_LEFT(x)), float(ENERGY_LEFT.lost(x))
+    design = np.stack([before, np.full_like(before, n)], axis=1)
+    found = np.array([asked, lost])
+    for _ in range(FIT_ROUNDS):
+        c, b = np.maximum(found, lost * SAME_DRAWS)
+        weight = 1 / (2 * n * b * b + 4 * c * before * b)
+        covariance = np.linalg.inv((design * weight[:, None]).T @ design)
+        found = covariance @ (design.T @ (weight * after))
+    (c, b), (of_c, of_b) = found, np.sqrt(np.diag(covariance))
+    kept = f"a step leaves {c:.5g} +- {of_c:.1g} of the kinetic energy"
+    if abs(c - asked) > STANDARD_ERRORS * of_c:
+        return f"{kept} where the friction asks for {asked:.5g}"
+    if abs(b - lost) > STANDARD_ERRORS * of_b:
+        return (
+            f"{kept}, as the friction asks, and adds {b / lost:.4g} +- {of_b / lost:.1g} times the noise "
+            "that goes with it: the coupling acts on one of both alone"
+        )
+    return ""
