@@ -12,7 +12,7 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 5960,
     ("schemes",): 1493,
-    ("thermal",): 1474,
+    ("thermal",): 1481,
     ("engines/own",): 1696,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1157,
     ("engines",): 2434,
@@ -21,7 +21,7 @@ BUDGETS = {
     ("identify",): 7663,
     ("formats", "store"): 4937,
     ("studies",): 1602,
-    ("studies/*",): 10161,
+    ("studies/*",): 10294,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5693,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -15,13 +15,15 @@ import pytest
 import census as by_hand
 from springcheck import driver, engines
 from springcheck.cli import main
+from springcheck.engines.own import thermal
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.census import baths, rigid, table
 from springcheck.studies.census import measure as census
-from springcheck.studies.census import rigid, table
 from springcheck.studies.census.limit import _of_states, first_limit
 from springcheck.studies.census.result import Entry
 from springcheck.studies.team import Processes
+from springcheck.thermal import THERMOSTATS
 
 OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 
@@ -291,3 +293,30 @@ def test_states_of_no_known_turn_and_of_no_scheme_are_said_to_be_such() -> None:
     assert rigid.name(uneven, grown) == "velocity-verlet"
     growth = 1.001 ** np.arange(len(grown.q))[:, None]
     assert rigid.name(uneven, replace(grown, q=grown.q * growth, p=grown.p * growth)) == rigid.NO_SCHEME
+
+
+def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.CaptureFixture[str]) -> None:
+    found = ["census", "--thermostats", "--method", "own:baoa*", "--method", OWN[0], "-o", "c.h5"]
+    assert main([*found, "--csv", "t.csv", "--json"]) == 0
+    entries = {x["method"]: x for x in json.loads(capsys.readouterr().out)["entries"]}
+    assert set(entries) == {"own:baoab", "own:baoa", OWN[0]}
+    one = entries["own:baoa"]
+    assert one["found"] == "baoa"
+    assert one["velocity_offset"] == -0.5
+    # BAOAB's own velocities are too cold by a/4, those of BAOA are right, positions of both
+    for x, kinetic in ((entries["own:baoab"], 1 - 0.25 / 4), (one, 1.0)):
+        assert abs(x["kinetic"] - kinetic) < 5 * x["kinetic_error"] < 0.02
+        assert abs(x["configurational"] - 1) < 5 * x["configurational_error"] < 0.02
+    rows = {row["method"]: row for row in csv.DictReader(Path("t.csv").read_text().splitlines())}
+    assert rows["own:baoa"]["thermostat"].startswith("BAOA")
+    assert rows["own:baoa"]["amplitude"] == "-"
+    assert rows[OWN[0]]["thermostat"] == "none"
+    assert main(["inspect", "c.h5"]) == 0
+    assert "Temperatures over that of the bath" in capsys.readouterr().out
+
+
+def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert baths.entry(engines.parse("own:aboba")).agrees
+    monkeypatch.setattr(thermal, "THERMOSTATS", {**THERMOSTATS, "aboba": THERMOSTATS["baoa"]})
+    found = baths.entry(engines.parse("own:aboba"))
+    assert (found.claimed, found.found, found.agrees) == ("aboba", "baoa", False)

@@ -131,3 +131,12 @@ def test_the_public_function_and_the_command_say_it(
 def test_an_engine_that_is_no_thermostat_keeps_its_words() -> None:
     made = driver.run(replace(scenefile.load_scene("spring"), steps=400), "own:velocity-verlet")
     assert springcheck.identify(made.t, made.q, made.p, mass=1.0).scheme == "velocity-verlet"
+
+
+@pytest.mark.parametrize("scheme", ["bussi", "bussi-unsigned", "bussi-after"])
+def test_one_spring_whose_momentum_is_rescaled_lists_it(scheme: str) -> None:
+    t, q, v = run(scheme, 1000)
+    found = identify_thermal(t, q, v)
+    assert found is not None
+    assert scheme in [one.scheme for one in found.candidates]
+    assert found.candidates[0].omega == pytest.approx(OMEGA, rel=1e-9)

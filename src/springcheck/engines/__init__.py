@@ -193,22 +193,23 @@ def method(label: Label) -> Method:
     return found.methods.get(label.method) or found.thermostats[label.method]
 
 
-def _methods_meant(name: str, glob: str, bath: bool) -> list[str]:
+def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
     """The methods of an engine that a glob may name: where it says nothing of methods, the default ones."""
-    methods = engine(name).thermostats if bath else engine(name).methods
+    found = engine(name)
+    methods = {**({} if bath else found.methods), **(found.thermostats if bath is not False else {})}
     default = [m for m, declared in methods.items() if declared.default]
     all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
     return list(methods) if all_of_them else default
 
 
-def match(patterns: tuple[str, ...], *, bath: bool = False) -> tuple[Label, ...]:
+def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Label, ...]:
     """Labels that glob patterns name, each once, in the order of the engines.
 
     A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before
     `@` is the glob and the platform is carried over to every engine that has it.  With a `bath` it names
-    thermostats, and else none of them.  `*` alone names the
-    methods that are declared as default, and so does `engine:*` of an engine that has such; every other
-    glob names all that it fits.
+    thermostats, without one none of them, and both where that is None.  `*` alone names the methods that are
+    declared as default, and so does `engine:*` of an engine that has such; every other glob names all that it
+    fits.
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:

@@ -161,8 +161,15 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
         # what a collision has left of the momentum, the rest of the step takes on without noise
         w = float(np.sqrt(2 * (1 + 1 / c)) / h)
         known = {"omega": w, "omega_error": 0.0}
-        found = [Candidate(scheme=name, **known) for name in ("andersen", "andersen-after-kick")]
+        # some steps have no collision, unless these are many; a factor acts in every step
+        still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
+        often = float(np.quantile(still, 0.05)) > 1e-3 * float(np.std(v))
+        names = ("andersen", "andersen-after-kick", *(("bussi", "bussi-unsigned") if often else ()))
+        found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
+    elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
+        known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
+        found, left = [Candidate(scheme="bussi-after", **known)], np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         if near(b, -h):
             found = [Candidate(scheme=name) for name in _of_no_memory(q, v, close)]

@@ -12,6 +12,7 @@ STUDY = Study(
     arguments=(
         *team.arguments(),
         *store_arguments("census.h5"),
+        argument("--thermostats", action="store_true", help="thermostats too, on springs in a bath"),
         argument("--page", metavar="FILE.html", help="write the table of engines as one page"),
         argument("--csv", metavar="FILE.csv", help="write it as CSV"),
         argument("--against", metavar="OLD.json", help="what changed since an earlier census --json"),

@@ -22,7 +22,7 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.census import rigid, table
+from springcheck.studies.census import baths, rigid, table
 from springcheck.studies.census.limit import first_limit
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
@@ -39,19 +39,20 @@ MOST_SUBSTEPS = 64
 """A force held over more substeps is a force held for good."""
 
 
-def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Census:
+def measure(methods: Sequence[str] = (), *, thermostats: bool = False, kept: Keeper | None = None) -> Census:
     """Run and name every method that these labels or globs name, all that are here when none is given.
 
-    Raises MethodError where none of them can be run.
+    With `thermostats` globs name those too.  Raises MethodError where none of them can be run.
     """
     scenes = load_scene(BLOG), load_scene(UNEVEN)
 
     def why(label: Label) -> str | None:
-        reasons = [rigid.refusal(scene, label) for scene in scenes]
+        of = (baths.springs(1, 1),) if engines.method(label).generator else scenes
+        reasons = [rigid.refusal(scene, label) for scene in of]
         return next(filter(None, reasons), None) or _absence(label)
 
     broken = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
-    usable, left = sorted_out(engines.match(tuple(methods) or (EVERY,)), why)
+    usable, left = sorted_out(_labels(methods, thermostats), why)
     left = [*broken, *left]
     if not usable:
         raise MethodError(f"none of these methods moves a spring: {left[0].method}: {left[0].reason}")
@@ -60,6 +61,10 @@ def measure(methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Censu
     # workers have ended: nothing of ours runs beside what is timed
     entries = [_timed(label, one, kept) for label, one in zip(usable, found, strict=True)]
     return Census(entries=tuple(entries), left_out=tuple(left), resumed=kept.resumed, path=kept.path)
+
+
+def _labels(methods: Sequence[str], thermostats: bool) -> tuple[Label, ...]:
+    return engines.match(tuple(methods) or (EVERY,), bath=None if thermostats else False)
 
 
 def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
@@ -81,11 +86,13 @@ def _absence(label: Label) -> str | None:
     return None
 
 
-def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Census:
+def record(
+    path: str | Path | None, methods: Sequence[str] = (), *, thermostats: bool = False, **how: Unpack[How]
+) -> Census:
     """Like `measure`, kept in a store; an unfinished census of the same command is resumed."""
-    labels = engines.match(tuple(methods) or (EVERY,))
+    labels = _labels(methods, thermostats)
     with keeper.kept(path, keeper.command("census", labels), **how) as kept:
-        census = measure(methods, kept=kept)
+        census = measure(methods, thermostats=thermostats, kept=kept)
         kept.commit("census", census.document())
     return census
 
@@ -97,7 +104,8 @@ def perform(options: Namespace, progress: Progress | None) -> Census:
             table.free(path, beginning)
     old = table.load(options.against) if options.against is not None else None
     added = [table.load(path) for path in options.add]
-    found = record(options.output or "census.h5", options.method, **keeper.how(options, progress))
+    how = keeper.how(options, progress)
+    found = record(options.output or "census.h5", options.method, thermostats=options.thermostats, **how)
     documents = [found.document(), *added]
     rows = table.rows(*documents)
     if options.page:
@@ -122,6 +130,8 @@ def stored(kept: keeper.Kept) -> Census:
 
 def entry(label: Label) -> Entry:
     """What one method is, by its states; its time is measured separately."""
+    if engines.method(label).generator:
+        return baths.entry(label)
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
     orbit, run = rigid.run(blog, label), rigid.run(uneven, label)
     method = engines.method(label)

@@ -16,7 +16,7 @@ def banks(census: Census) -> list[Bank]:
     curves, on = [], []
     for scheme, members in census.grouped.items():
         same: dict[str, list[Entry]] = {}
-        for x in members:
+        for x in (one for one in members if len(one.q)):
             same.setdefault(x.digest, []).append(x)
         for i, equal in enumerate(same.values()):
             names = [x.method for x in equal]

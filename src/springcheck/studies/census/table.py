@@ -110,7 +110,7 @@ def _row(x: Row) -> dict[str, str]:
         "det": _number(x["area"], 1e-6 if x["precision"] == "single" else 1e-12),
         "precision": x["precision"],
         "limit": limit,
-        "amplitude": f"{x['amplitude']:.4f}",
+        "amplitude": "-" if x["amplitude"] is None else f"{x['amplitude']:.4f}",
         "configurational": _share(x, "configurational"),
         "kinetic": _share(x, "kinetic"),
         "forces": f"{x['force_calls']:.3g}",
@@ -164,7 +164,8 @@ def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, An
 <style>{STYLE}</style></head><body>
 <h1>Which integrator does it really run?</h1>
 <p>{len(found)} ways to move a mass on a spring by {len(engines)} engines.  No cell is an engine's word: each
-but the note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9).
+but the note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9);
+of thermostats from those of springs at h omega = 0.5 and friction times step 0.4.
 {links}</p>
 <p><input placeholder="filter: rapier, implicit, single ..." aria-label="filter"></p>
 <table><thead><tr>{head}</tr></thead><tbody>

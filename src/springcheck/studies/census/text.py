@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,6 +18,8 @@ TITLES = (
     "same bits as"
 )  # fmt: skip
 
+HEATED = ("method", "configurational", "kinetic", "velocity", "arithmetic", "forces", "time")
+
 
 def lines(census: Census, options: Namespace | None = None) -> Lines:
     """The whole report."""
@@ -26,12 +29,17 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
         *resumed(census.resumed, "method"),
         plain(),
     ]
-    rows: list[Row] = []
     partners = census.partners
-    for name, members in census.grouped.items():
-        rows.append(plain(title(name), "italic"))
-        rows += [_row(x, partners[x.method]) for x in members]
-    out.append(table(TITLES, rows, left=("method", "arithmetic"), prose=TITLES[-1]))
+    cold = _under(census, False, lambda x: _row(x, partners[x.method]))
+    hot = _under(census, True, _heated)
+    if cold:
+        out.append(table(TITLES, cold, left=("method", "arithmetic"), prose=TITLES[-1]))
+    if hot:
+        out += [
+            *([plain()] if cold else []),
+            plain("Temperatures over that of the bath, by springs of h omega = 0.5 and gamma h = 0.4:"),
+            table(HEATED, hot, left=("method", "arithmetic")),
+        ]
     out += [
         plain(f"{x.method} is declared as {title(x.claimed)}; its states show {title(x.found)}")
         for x in census.entries
@@ -52,10 +60,33 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
     return out
 
 
+def _under(census: Census, thermostats: bool, row: Callable[[Entry], Row]) -> list[Row]:
+    """The rows of those with or without a thermostat, under the scheme that was found."""
+    rows: list[Row] = []
+    for name, members in census.grouped.items():
+        some = [row(x) for x in members if bool(x.thermostat) is thermostats]
+        several = name.split(" or ")
+        called = few(several, 3, " or ") if len(several) > 1 else title(name)
+        rows += [plain(called, "italic"), *some] if some else []
+    return rows
+
+
+def _heated(x: Entry) -> Row:
+    return [
+        plain("  " + x.method, "" if x.agrees else "bold red"),
+        f"{x.configurational:.4f} +- {x.configurational_error:.1g}",
+        f"{x.kinetic:.4f} +- {x.kinetic_error:.1g}",
+        "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
+        x.precision,
+        f"{x.force_calls:.3g}",
+        seconds(x.seconds),
+    ]
+
+
 def _row(x: Entry, partners: tuple[str, ...]) -> Row:
     return [
         plain("  " + x.method, "" if x.agrees else "bold red"),
-        f"{x.amplitude:.4f}",
+        "-" if np.isnan(x.amplitude) else f"{x.amplitude:.4f}",
         _number(x.area, 1e-13),
         "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
         _number(x.friction, 1e-9),
