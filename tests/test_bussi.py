@@ -14,6 +14,7 @@ import pytest
 
 from springcheck import checks, driver, engines
 from springcheck.studies.faults import baths
+from springcheck.studies.faults.measure import clean_bath
 from springcheck.studies.faults.seeded import Fault
 from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.draws import read
@@ -69,3 +70,8 @@ def test_momenta_of_zero_are_refused_and_all_else_passes(label: str) -> None:
     }
     with pytest.raises(engines.MethodError, match="those of the start are all 0"):
         driver.run(replace(scene, p=np.zeros(3)), label, seed=4)
+
+
+def test_what_a_factor_is_of_may_have_lost_digits_before_it() -> None:
+    """A random bath of 10,000 whose kicks all but cancel the momenta that the factor is then of."""
+    assert clean_bath(3402).alarms == ()
