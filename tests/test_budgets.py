@@ -10,18 +10,18 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 5960,
+    ("physics",): 6092,
     ("schemes",): 1493,
     ("thermal",): 1481,
     ("engines/own",): 1696,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1157,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1159,
     ("engines",): 2434,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 4145,
     ("identify",): 7663,
     ("formats", "store"): 4937,
     ("studies",): 1602,
-    ("studies/*",): 10294,
+    ("studies/*",): 10423,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5693,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

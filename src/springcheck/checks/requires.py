@@ -82,9 +82,9 @@ _ALL = (
         "walls, fixed potentials and fields take up momentum")),
     Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods")),
     Requirement("turning", "rods on which nothing acts", _unless(
-        lambda x: x.scheme.stages and not x.scene.system.rods.share
-        and all(term.kind == "constraint" for term in x.scene.terms),
-        "forces, or other rods, act on the ends of the rods")),
+        lambda x: x.scheme.stages and all(term.kind == "constraint" for term in x.scene.terms)
+        and exact.has_true_motion(x.scene),
+        "forces act on the ends of the rods, or they are no flat body that turns about an axis across it")),
     Requirement("alike", "two axes along which the same springs act", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(

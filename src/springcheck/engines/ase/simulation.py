@@ -20,7 +20,7 @@ from ase.constraints import FixBondLengths
 from ase.md.verlet import VelocityVerlet
 
 from springcheck.engines.bonds import ANCHOR_MASS, off_axis
-from springcheck.engines.contract import Label, Method
+from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
@@ -148,7 +148,11 @@ class _Dynamics:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             for row in range(len(q)):
-                run(every)
+                try:
+                    run(every)
+                except RuntimeError as error:
+                    # lengths of constraints that its iterations do not find
+                    raise Stopped(row, str(error)) from error
                 q[row] = atoms.arrays["positions"].reshape(-1)[self._where]
                 p[row] = atoms.arrays["momenta"].reshape(-1)[self._where]
             if self._length != 1.0:

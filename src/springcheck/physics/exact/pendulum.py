@@ -1,4 +1,4 @@
-"""Pendulums, swinging and rotating, by Jacobi's elliptic functions, and rods that turn freely."""
+"""Pendulums, swinging and rotating, by Jacobi's elliptic functions; on a rod, too."""
 
 from __future__ import annotations
 
@@ -114,60 +114,6 @@ def _swung(found: _Swing, t: Extended) -> States:
 
 COSINE = Well(
     key="cosine", terms=frozenset({"cosine"}), prepare=_swings, motion=_pendulum, doubt=_pendulum_doubt
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Turning:
-    """Ways between the ends of rods and their rates (s,), angular velocities (c,), and what drifts (n,)."""
-
-    rods: Rods
-    r: Extended
-    v: Extended
-    w: Extended
-    drift: Extended
-    """Velocity of the centre of mass, of each coordinate."""
-
-
-def _turning(system: System[Any]) -> _Turning | None:
-    """Rods of which no two share a particle."""
-    rods = system.rods
-    if rods is None or rods.share:
-        return None
-    q = wide(system.q)
-    p = rods.projected(q, wide(system.p))
-    r, v = rods.ways(q), rods.apart(p / system.m)
-    drift = (p - rods.spread(v / rods.each(rods.inverse_mass))) / system.m
-    return _Turning(rods=rods, r=wide(r), v=wide(v), w=wide(rods.rates(q, p)), drift=wide(drift))
-
-
-def _turned(system: System[Any], found: _Turning, t: Extended) -> States:
-    """r(t) = r cos(w t) + v sin(w t)/w about a centre of mass that goes straight on."""
-    rods, w = found.rods, found.w
-    mass = rods.each(1 / wide(rods.inverse_mass))
-    turn = w * t
-    sine, cosine = rods.each(np.sin(turn)), rods.each(np.cos(turn))
-    rate = rods.each(w)
-    r = found.r * (cosine - 1) + found.v * np.where(rate > 0, sine / np.where(rate > 0, rate, 1), 0)
-    v = found.v * cosine - found.r * rate * sine
-    m = wide(system.m)
-    q = system.q + found.drift * t + rods.spread(mass * r) / m
-    return wide(q), wide(m * found.drift + rods.spread(mass * v))
-
-
-def _turning_doubt(system: System[Any], found: _Turning, t: np.longdouble) -> States:
-    rods, m, time = found.rods, wide(system.m), np.abs(t)
-    mass = rods.each(1 / wide(rods.inverse_mass))
-    reach, rate = rods.each(wide(rods.length)), rods.each(found.w)
-    turned = rods.spread(mass * reach * (2 + rate * time), size=True)
-    rated = rods.spread(mass * reach * rate * (2 + rate * time), size=True)
-    speed = np.abs(found.drift)
-    return wide(LAST * (np.abs(system.q) + speed * time + turned / m)), wide(LAST * (m * speed + rated))
-
-
-ROD, WALL_ROD = (
-    Well(key=key, terms=frozenset({key}), prepare=_turning, motion=_turned, doubt=_turning_doubt)
-    for key in ("rod", "wall-rod")
 )
 
 

@@ -42,7 +42,10 @@ class Solution:
 
     def __call__(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
         """q and p (f, n) after these numbers of steps of h: see `exact.true_motion`."""
-        t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
+        return self.at(np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h))
+
+    def at(self, t: Extended) -> tuple[Extended, Extended]:
+        """The same at times t (f, 1) [T]."""
         q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for group in self.groups:
@@ -90,9 +93,15 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
                 return Solution(n=system.n, groups=(everything(found=ready, law=law),))
         return None
     from springcheck.physics.exact.bond import MORSE
-    from springcheck.physics.exact.pendulum import COSINE, RIGID, ROD, WALL_ROD
+    from springcheck.physics.exact.pendulum import COSINE, RIGID
     from springcheck.physics.exact.quartic import QUARTIC
+    from springcheck.physics.exact.turning import ROD, WALL_ROD
 
+    if system.rods and system.scene.places is None:
+        from springcheck.physics.exact.lumped import LUMPED
+
+        if ready := LUMPED.prepare(system):
+            return Solution(n=system.n, groups=(everything(found=ready, law=LUMPED),))
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
     acting = system.acting

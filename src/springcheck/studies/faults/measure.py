@@ -17,7 +17,8 @@ from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Drive, Rod, Spring
+from springcheck.physics.scenefile import load_scene
+from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
@@ -28,6 +29,9 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import How, Keeper, Piece
 from springcheck.studies.tables import Documents
 from springcheck.thermal import THERMOSTATS
+
+SHIPPED = {"dumbbell": ("dumbbell", 200), "triangle": ("rigid-triangle", 40), "field": ("foucault", 200)}
+"""Scenes of the faults that are shipped ones, of so many steps."""
 
 
 @cache
@@ -59,17 +63,9 @@ def scene(where: Where) -> Scene:
         return space.pair_in_a_box(name=where)
     if where in ("bath", "wide bath"):
         return baths.springs({"bath": 40, "wide bath": 250}[where], name=where)
-    if where == "dumbbell":
-        return Scene(
-            m=np.array([1.3, 1.3, 3.7, 3.7]),
-            places=np.array([0, 1, 3, 4]),
-            terms=(Rod(a=np.array([0, 1]), b=np.array([2, 3]), length=np.array([0.6, 0.6])),),
-            q=np.array([0.35, -0.2, 0.83, -0.56]),
-            p=np.array([-0.25948, -0.82264, 1.25948, 0.32264]),
-            step=0.1,
-            steps=200,
-            name=where,
-        )
+    if where in SHIPPED:
+        name, steps = SHIPPED[where]
+        return replace(load_scene(name), steps=steps, name=where)
     steps = 2100 if where == "long spring" else 200
     return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
 

@@ -1,16 +1,19 @@
-"""What is wrong with engines that keep lengths: SHAKE and RATTLE of one dumbbell in a plane, written out."""
+"""What is wrong with engines that keep lengths: SHAKE and RATTLE of one dumbbell in a plane, written out, and
+the rods of a triangle solved wrongly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from springcheck import schemes
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import Make, stepping
 from springcheck.studies.faults.steppers import State, Step, textbook
@@ -148,3 +151,30 @@ def late_halves(scene: Scene, size: float, run: Trajectory) -> Trajectory:
     if scene.system.rods:
         p[1:-1] = scene.m * np.diff(run.q, axis=0)[1:] / scene.step
     return replace(run, p=p)
+
+
+class OneByOne(Rods):
+    """Every rod is solved by itself, as if its ends had no other."""
+
+    def __init__(self, m: Floats, places: Integers | None, terms: Sequence[Term]) -> None:
+        super().__init__(m, places, terms)
+        self.share = False
+
+
+class Once(Rods):
+    """One iteration of Newton's for all."""
+
+    def multiplier(self, r: Reals, s: Reals) -> Reals:
+        gap = (self.dot(s, s) - self.length**2) / 2
+        return -self.solve(s, r, gap)
+
+
+def solved(kind: type[Rods], masses: Callable[[Floats], Floats] = lambda m: m) -> Make:
+    """RATTLE with rods of this kind, which take these masses of coordinates for the scene's."""
+
+    def step(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+        if not scene.system.rods:
+            return textbook(scene, scheme)
+        return textbook(scene, scheme, hold=kind(masses(scene.m), scene.places, scene.terms))
+
+    return stepping(step)

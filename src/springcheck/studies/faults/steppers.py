@@ -12,6 +12,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
+from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory, of_scene
 from springcheck.schemes.stepping import Slope
@@ -26,9 +27,15 @@ Clock: TypeAlias = Callable[[int], tuple[float, float]]
 
 
 def textbook(
-    scene: Scene, scheme: schemes.Scheme, *, force: Force | None = None, clock: Clock | None = None
+    scene: Scene,
+    scheme: schemes.Scheme,
+    *,
+    force: Force | None = None,
+    clock: Clock | None = None,
+    hold: Rods | None = None,
 ) -> Step:
-    """The scheme's own step in double precision, with the scene's force or another; a clock for a drive."""
+    """The scheme's own step in double precision, with the scene's force or another; a clock for a drive, and
+    other rods than the scene's."""
     n, scene = scene.n, scene.system.clocked
     pull = force or scene.system.force
     m, h = scene.m, scene.step
@@ -46,7 +53,7 @@ def textbook(
             q, p = np.append(q, time), np.append(p, pace * scene.p[n])
         a, b = schemes.step(
             scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate,
-            hold=scene.system.rods,
+            hold=hold or scene.system.rods,
         )  # fmt: skip
         return np.asarray(a[:n], np.float64), np.asarray(b[:n], np.float64)
 

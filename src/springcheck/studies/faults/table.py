@@ -10,7 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck.physics.rods import Rods
 from springcheck.studies.faults import drives, rigid, seeded, space
+from springcheck.studies.faults.fields import FIELDS
 from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.seeded import Fault, Make
@@ -235,8 +237,11 @@ DRIVES = (
 )  # fmt: skip
 
 
-def _rod(name: str, about: str, by: tuple[str, ...], make: Make, size: float | None = None) -> Fault:
-    return Fault(name, about, ("step-defect", *by), make, size=size, scene="dumbbell")
+def _rod(
+    name: str, about: str, by: tuple[str, ...], make: Make, size: float | None = None,
+    scene: seeded.Where = "dumbbell",
+) -> Fault:  # fmt: skip
+    return Fault(name, about, ("step-defect", *by), make, size=size, scene=scene)
 
 
 _LENGTH, _ALONG, _TURNED = ("rod-length",), ("rod-velocity",), ("angular-momentum", "turn")
@@ -279,6 +284,15 @@ RIGID = (
          _ALONG, seeded.reporting(rigid.late_halves)),
     _rod("rod-restart", "a restart in the middle takes momenta of half a step before for those of the step",
          _ALONG, seeded.stepping(rigid.restarted_halves)),
+    _rod("triangle-one-by-one", "each rod of a triangle is solved by itself, as if it had no company",
+         ("rod-length", "rod-velocity"), rigid.solved(rigid.OneByOne), scene="triangle"),
+    _rod("triangle-one-iteration", "one iteration of Newton's for the rods of a triangle",
+         _LENGTH, rigid.solved(rigid.Once), scene="triangle"),
+    _rod("triangle-masses-alike", "the rods of a triangle take its masses for equal",
+         _ALONG, rigid.solved(Rods, lambda m: np.full_like(m, np.mean(m))), scene="triangle"),
+    _rod("triangle-friction", "momenta of a turning triangle lose a fraction at every step",
+         ("turn", "angular-momentum"), seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), 1e-10,
+         scene="triangle"),
     _rod("rod-friction", "momenta of a turning rod lose a fraction at every step",
          ("turn", "angular-momentum"), seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), 1e-10),
 )  # fmt: skip
@@ -316,6 +330,7 @@ FAULTS: tuple[Fault, ...] = (
     + BOX
     + DRIVES
     + RIGID
+    + FIELDS
     + ADAPTIVE
     + OF_NOISE
     + THERMAL_STEPS
