@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2434,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 4145,
-    ("identify",): 7663,
+    ("identify",): 7708,
     ("formats", "store"): 4937,
     ("studies",): 1602,
     ("studies/*",): 10423,

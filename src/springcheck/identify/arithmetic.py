@@ -12,7 +12,7 @@ from springcheck.identify import coarse, quantised
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Match
+from springcheck.identify.hypothesis import SURE, Match
 from springcheck.identify.maps import MapTable, power, powers, table, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
@@ -64,30 +64,48 @@ def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extende
     return np.asarray(out)
 
 
-def _retimed(record: Record, found: Map, matches: list[Match], signed: Floats) -> Floats:
-    """What is missing (c, f - 1, 2) but for what the rounding of the times does to the interval.
+FREE = 1e6
+"""Times what is missing by which an equilibrium may be elsewhere, as far as this says."""
 
-    Velocities count in positions an interval: where that is long by a share of itself, M12 is small by the
-    share, and M21 large.  Times that began at 0 are rounded no more than a step.
+
+def _refitted(
+    record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats, *, numbers: bool = False
+) -> Floats:
+    """What is missing (c, f - 1, 2), counted in `unit`, but for what is uncertain: the interval, by the
+    rounding of the times; the equilibrium, of which each scheme has its own; and with `numbers` h w and the
+    friction of each match.
+
+    A map is read with the rounding of whole states, and so its numbers may miss more of a small component
+    than that is rounded by.
     """
-    if record.jitter <= 2.0**-50:
-        return signed
     b = _predicted(matches).astype(np.float64)
     z = found.z[:-1].astype(np.float64)
-    change = np.stack([b[:, 0, 1, None] * z[:, 1], -b[:, 1, 0, None] * z[:, 0]], axis=2)
-    share = np.sum(signed * change, axis=(1, 2)) / np.sum(change**2, axis=(1, 2))
-    return np.asarray(signed - np.clip(share, -record.jitter, record.jitter)[:, None, None] * change)
-
-
-def _recentred(found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
-    """What is missing (c, f - 1, 2) beside the equilibrium that suits each match best, whose misses count by
-    their `unit`: it is as uncertain as the map that it was found with, and each scheme has its own."""
-    if not np.any(found.centre != 0):
+    columns = []
+    if record.jitter > 2.0**-50:
+        # velocities count in positions an interval: where that is long M12 is small, and M21 large; times
+        # that began at 0 are rounded no more than a step
+        change = np.stack([b[:, 0, 1, None] * z[:, 1], -b[:, 1, 0, None] * z[:, 0]], axis=2)
+        columns.append(record.jitter * change)
+    if np.any(found.centre != 0):
+        away = np.eye(2)[:, 0] - b[:, None, :, 0]
+        largest = np.max(np.abs(away), axis=(1, 2), keepdims=True)
+        columns.append(FREE * np.max(np.abs(signed)) * (away / largest + 0 * signed))
+    for name in ("a", "g") if numbers else ():
+        errors = np.array([getattr(match, f"{name}_error") for match in matches])
+        moved = 1e-7 * np.array([abs(match.a) if name == "a" else 1.0 for match in matches])
+        up, down = (_slipped(matches, found, 0.0, more={name: x}) for x in (moved, -moved))
+        share = SURE * errors / (2 * moved)
+        slope = share[:, None, None] * (up - down).astype(np.float64)
+        columns.append(z @ np.swapaxes(slope, 1, 2))
+    if not columns:
         return signed
-    away = np.eye(2)[:, 0] - _predicted(matches).astype(np.float64)[:, None, :, 0]
-    weight = away / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
-    shift = np.sum(weight * signed, axis=(1, 2)) / np.sum(weight * away, axis=(1, 2))
-    return np.asarray(signed - shift[:, None, None] * away)
+    weight = 1 / np.maximum(unit, 1e-30 * np.max(unit))
+    rows = np.stack(columns, axis=-1)
+    flat = (rows * weight[..., None]).reshape(len(matches), -1, len(columns))
+    square = np.swapaxes(flat, 1, 2) @ flat + np.eye(len(columns))
+    wanted = np.swapaxes(flat, 1, 2) @ (signed * weight).reshape(len(matches), -1, 1)
+    shift = np.clip(np.linalg.solve(square, wanted), -1, 1)
+    return np.asarray(signed - (rows @ shift[:, None])[..., 0])
 
 
 def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
@@ -99,11 +117,17 @@ def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers,
 
 
 def _slipped(
-    matches: list[Match], found: Map, slip: np.longdouble | float, *, between: bool = True
+    matches: list[Match],
+    found: Map,
+    slip: np.longdouble | float,
+    *,
+    between: bool = True,
+    more: dict[str, Floats] | None = None,
 ) -> Extended:
     """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps longer by the
-    share `slip`."""
+    share `slip`, and for `more` of a or g."""
     every, which, (a, g, log_mass, stride) = _numbers(matches, np.longdouble)
+    a, g = (x + (more or {}).get(name, 0.0) for name, x in (("a", a), ("g", g)))
     held = every.held[which]
     out = every.frame(
         which,
@@ -227,7 +251,7 @@ def _defects(
 
     def missed(slips: Extended | None) -> Floats:
         signed = _misses(matches, found, slips).astype(np.float64)
-        return _recentred(found, matches, _retimed(record, found, matches, signed), size)
+        return _refitted(record, found, matches, signed, 2.0**-52 * size)
 
     signed = missed(found.slips)
     missing = np.abs(signed)
@@ -253,11 +277,14 @@ def _defects(
         unlike = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
         rounded = np.where(stride > 1, unlike, rounded)
     plain = rounded <= most_ulp
+    if record.fine and not np.all(plain):
+        again = _refitted(record, found, matches, signed, 2.0**-52 * size, numbers=True)
+        plain |= _largest(np.abs(again), 2.0**-52 * size) <= most_ulp
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)
         half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-        signed = _recentred(found, matches, signed, half)
+        signed = _refitted(record, found, matches, signed, half)
         missing = np.abs(signed)
         # roundings of many steps are random
         most = np.minimum(path, usual)[:, None, None]

@@ -32,10 +32,11 @@ LONG = 50_000
 Complexes: TypeAlias = NDArray[np.complex128]
 
 
-def frequency(q: Floats, v: Floats, missing: Floats, weight: Floats, carrier: Floats) -> float:
-    """Of the sine and cosine in frames by which a carrier explains most of what is missing (f, 2)."""
-    n, frames, pull = np.arange(len(q)), len(q), weight * carrier
-    across = np.linalg.qr(np.stack([q, v], axis=1) * weight[:, None])[0]
+def frequency(linear: list[Floats], missing: Floats, weight: Floats, carrier: Floats) -> float:
+    """Of the sine and cosine in frames by which a carrier explains most of what is missing (f, 2) beside what
+    goes with `linear` columns."""
+    n, frames, pull = np.arange(len(carrier)), len(carrier), weight * carrier
+    across = np.linalg.qr(np.stack(linear, axis=1) * weight[:, None])[0]
     wanted = missing * weight[:, None]
     wanted = wanted - across @ (across.T @ wanted)
     summed, square = np.concatenate([wanted, across], axis=1).T * pull, pull**2
@@ -69,10 +70,10 @@ def frequency(q: Floats, v: Floats, missing: Floats, weight: Floats, carrier: Fl
     return found
 
 
-def waves(q: Floats, v: Floats, carrier: Floats, turn: float) -> list[Floats]:
-    """q, v and a carrier times the cosine and sine of an angle that turns by so much a frame."""
-    n = np.arange(len(q))
-    return [q, v, carrier * np.cos(turn * n), carrier * np.sin(turn * n)]
+def waves(carrier: Floats, turn: float) -> list[Floats]:
+    """A carrier times the cosine and sine of an angle that turns by so much a frame."""
+    n = np.arange(len(carrier))
+    return [carrier * np.cos(turn * n), carrier * np.sin(turn * n)]
 
 
 TUNING_STEPS = 12

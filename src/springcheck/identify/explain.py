@@ -161,27 +161,30 @@ def _shape(e: Evidence) -> list[Explanation]:
     weight = (e.found.weight / np.max(e.found.weight))[:, None]
     t = np.linspace(-1, 1, e.pairs)
     count = min(14, max(4, e.pairs // 8))
-    linear = [q, v]
+    # what the map takes up, its own constant with it, is taken up by every explanation
+    own = [np.ones_like(q)] if np.any(e.found.centre) else []
+    linear = [q, v, *own]
     carriers = {"oscillation": q, "drive": np.ones_like(q)}
-    tuned = {name: driven.frequency(q, v, missing, weight[:, 0], x) for name, x in carriers.items()}
+    tuned = {name: driven.frequency(linear, missing, weight[:, 0], x) for name, x in carriers.items()}
     groups: dict[str, list[Floats]] = {
-        "constant": [*linear, np.ones_like(q)],
+        "constant": [q, v, np.ones_like(q)],
         "drag": [*linear, np.abs(v) * v],
         "parity": [*_alternating(e).T],
-        "quadratic": [*linear, np.ones_like(q), q * q],
+        "quadratic": [q, v, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
-        "oscillation": driven.waves(q, v, q, tuned["oscillation"]),
+        "oscillation": [*linear, *driven.waves(q, tuned["oscillation"])],
         "anharmonic": [
-            *linear,
+            q,
+            v,
             np.ones_like(q),
             *(q**i * v**k for i in range(4) for k in range(4) if 1 < i + k < 4),
         ],
         "position": [v, *_hats(q, 16).T],
         "velocity": [q, *_hats(v, 16).T],
-        "stiffness in time": [v, *(q[:, None] * _hats(t, count)).T],
-        "friction in time": [q, *(v[:, None] * _hats(t, count)).T],
-        "map in time": [*(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
-        "drive": driven.waves(q, v, np.ones_like(q), tuned["drive"]),
+        "stiffness in time": [v, *own, *(q[:, None] * _hats(t, count)).T],
+        "friction in time": [q, *own, *(v[:, None] * _hats(t, count)).T],
+        "map in time": [*own, *(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
+        "drive": [*linear, *driven.waves(np.ones_like(q), tuned["drive"])],
     }
     # what a few pairs miss follows any law of as many numbers: a frequency that was looked for is more,
     # the map's own constant is none
@@ -191,7 +194,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     left = {
         name: _left(weight * np.stack(columns, axis=1), weight * missing)
         for name, columns in groups.items()
-        if counted > 3 * numbers.get(name, len(columns))
+        if counted > 3 * numbers.get(name, len(columns) - len(own))
     }
     if left.get("constant", 1.0) < 0.35:
         # what a constant explains shows nothing of what has one beside it
@@ -206,10 +209,14 @@ def _shape(e: Evidence) -> list[Explanation]:
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
+    partly = FALLS * left[good[0]] > 1
+    if partly and good[0] in tuned and "anharmonic" not in left:
+        # a frequency that was looked for explains a part of much that so few pairs cannot show
+        return [_too_few(size, counted)]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
     cause += driven.said(e, good[0] == "drive", tuned[good[0]]) if good[0] in tuned else ""
     few = _turns(e) < FEW_TURNS
-    if few and good[0] in (*STATE, *TIME):
+    if few and (good[0] in (*STATE, *TIME) or (partly and good[0] != "parity")):
         # where states hardly come back, any function of time is one of many powers of the state
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
@@ -333,16 +340,20 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
     )
 
 
+def _too_few(size: float, counted: float) -> Explanation:
+    return Explanation(
+        cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about {counted:.0f} "
+        "frames: too few to show its cause",
+        remedy="record more of the motion, before it dies down or after it has begun to grow; a solver "
+        "that chooses its steps has no fixed scheme to find",
+        misfit=size,
+    )
+
+
 def _noise(e: Evidence, size: float, counted: float) -> Explanation:
     """What is left over is irregular, or goes with nothing that is known, or stands in too few frames."""
     if counted < FEWEST_MISSES:
-        return Explanation(
-            cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about {counted:.0f} "
-            "frames: too few to show its cause",
-            remedy="record more of the motion, before it dies down or after it has begun to grow; a solver "
-            "that chooses its steps has no fixed scheme to find",
-            misfit=size,
-        )
+        return _too_few(size, counted)
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"

@@ -51,6 +51,9 @@ CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds the chance of a
 mistake."""
 
+CLEAN = 100.0
+"""What may be left over in the mean square, of what is expected, where it may be rounding."""
+
 KURTOSIS = 0.8
 """Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
 
@@ -122,7 +125,7 @@ class Map:
     @property
     def clean(self) -> bool:
         """Whether what is left over may be rounding: no more than ten times what is expected."""
-        return self.chi2 <= 100 * self.freedom
+        return self.chi2 <= CLEAN * self.freedom
 
     @property
     def within(self) -> bool:
@@ -366,7 +369,9 @@ def _constant_part(
         widest = _minimum(z, sigma, process, best, 2, slips)
         # at rest the roundings are the same in every step, and add up to a constant of their own
         shift = (np.eye(2) - widest.entries) @ (widest.centre - best.centre)
-        if gains(best, widest, CONSTANT_SHOWS) and np.max(np.abs(shift)) > 64 * ROUNDING * np.max(np.abs(z)):
+        # and what a constant does not bring down to rounding may be of something else
+        explained = widest.chi2 <= CLEAN * (numbers - unknown - 3) and gains(best, widest, CONSTANT_SHOWS)
+        if explained and np.max(np.abs(shift)) > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
     return best, centred, slips
 

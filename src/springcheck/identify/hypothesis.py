@@ -23,6 +23,9 @@ SOLVED = 1e-4
 EXCLUDED = 25.0
 """By which chi-squared exceeds that of the best where a hypothesis is excluded: five standard errors."""
 
+SURE = 6.0
+"""Standard errors by which a number differs from another for certain, and within which it may be off."""
+
 STRIDES = 12, 100
 """Steps to a frame looked at: up to so many, and where nothing fits, or a choice is left, up to those."""
 

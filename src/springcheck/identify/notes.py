@@ -133,7 +133,8 @@ def of_unasked_friction(found: Identification) -> Identification:
         return found
     for one in found.candidates:
         for w, rate in zip(one.omega, one.friction, strict=True):
-            share = rate / (w * w * one.step) if w else 0.0
+            # an inverted spring has no frequency
+            share = rate / (w * w * one.step) if w > 0 else 0.0
             n = round(1 / share) if share > 1 / MOST_PARTS / 2 else round(share)
             if not (share and 1 <= n <= MOST_PARTS and abs(share * n - 1) < MARK):
                 continue

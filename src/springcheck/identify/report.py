@@ -63,6 +63,8 @@ VELOCITY_OFFSET = {
 }
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
 
+OLD_FORCE = "fault: old force"
+
 AS_NEAR = 1.5
 """Factor by which one scheme may miss the states by more than another that is explained."""
 
@@ -227,9 +229,6 @@ def _explained(
 ) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
-    if all(x.family == HELD.name and x.endless for x in left):
-        # or of the last step's, which is a fault
-        left = []
     alone = len({(x.scheme, x.stride) for x in accepted}) == 1
     defects: list[list[arithmetic.Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):
@@ -291,6 +290,9 @@ def _known(
         kicks = plainest.substeps[1]
         order = "kick, then drift" if kicks else "drift, then kick"
         statement = f"{held_over(plainest)} ({order}){steps}"
+        if plainest.endless:
+            # coarse numbers do not tell many substeps from no end of them, which is a fault
+            statement, scheme = f"{statement}, or {FAMILIES[OLD_FORCE].cause}", None
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
         slips = faults_like(scheme) if scheme in ELSEWHERE else ()
@@ -301,6 +303,7 @@ def _known(
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         statement = f"Several schemes fit, which the states do not tell apart: {', '.join(names[:4])}{more}"
     undecided = any(not d.certain for d in explained[plainest]) and stated_fits
+    either_force = plainest.family == HELD.name and plainest.endless and len(joints) == 1
     if undecided:
         statement = (
             f"{title(scheme or plainest.scheme)}{law}{steps}, and errors of the force of the size of "
@@ -319,8 +322,8 @@ def _known(
         symplectic_defect=symplectic,
         defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()),
         precision=precision,
-        fits=stated_fits and not undecided,
-        undecided=undecided,
+        fits=stated_fits and not (undecided or either_force),
+        undecided=undecided or either_force,
         difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),

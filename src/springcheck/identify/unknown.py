@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance
 from springcheck.identify.families import title
-from springcheck.identify.hypothesis import distinct
+from springcheck.identify.hypothesis import SURE, distinct
 from springcheck.identify.result import Explanation
 
 REAL = 0.3
@@ -18,9 +18,6 @@ REAL = 0.3
 
 ORDERS = range(1, 9)
 """Powers of h L of which the first wrong coefficient is looked for."""
-
-SURE = 6.0
-"""Standard errors by which two numbers differ for certain."""
 
 FORGOTTEN = 0.1
 """Share of what a map misses at first that is left in the last three quarters of the frames, of a memory that

@@ -11,7 +11,7 @@ from springcheck.identify.compare import compare
 from springcheck.identify.evidence import Evidence, matched
 from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Joint, Terms, distinct, same_map
+from springcheck.identify.hypothesis import SURE, Joint, Terms, distinct, same_map
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import misfit
@@ -100,9 +100,6 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
         )
     ]
 
-
-SURE = 6.0
-"""Standard errors that a number must differ from its right value by to be a cause."""
 
 UNSCALED = 1e-6
 """Factor of velocities less 1 below which it is none of units."""
