@@ -63,8 +63,6 @@ VELOCITY_OFFSET = {
 }
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
 
-OLD_FORCE = "fault: old force"
-
 AS_NEAR = 1.5
 """Factor by which one scheme may miss the states by more than another that is explained."""
 
@@ -292,7 +290,7 @@ def _known(
         statement = f"{held_over(plainest)} ({order}){steps}"
         if plainest.endless:
             # coarse numbers do not tell many substeps from no end of them, which is a fault
-            statement, scheme = f"{statement}, or {FAMILIES[OLD_FORCE].cause}", None
+            statement, scheme = f"{statement}, or {FAMILIES['fault: old force'].cause}", None
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
         slips = faults_like(scheme) if scheme in ELSEWHERE else ()
@@ -303,13 +301,13 @@ def _known(
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         statement = f"Several schemes fit, which the states do not tell apart: {', '.join(names[:4])}{more}"
     undecided = any(not d.certain for d in explained[plainest]) and stated_fits
-    either_force = plainest.family == HELD.name and plainest.endless and len(joints) == 1
     if undecided:
         statement = (
             f"{title(scheme or plainest.scheme)}{law}{steps}, and errors of the force of the size of "
             f"{precision} arithmetic: noise or a systematic error of that size cannot be excluded"
         )
         notes.append("what would show the arithmetic: every step recorded, and the mass")
+    undecided = undecided or (scheme is None and len(joints) == 1)
     if explanations:
         statement = f"{explanations[0].cause}"
     return Identification(
@@ -322,8 +320,8 @@ def _known(
         symplectic_defect=symplectic,
         defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()),
         precision=precision,
-        fits=stated_fits and not (undecided or either_force),
-        undecided=undecided or either_force,
+        fits=stated_fits and not undecided,
+        undecided=undecided,
         difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),
