@@ -23,7 +23,7 @@ from springcheck.identify.candidates import (
 )
 from springcheck.identify.compare import compare, nearest
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, HELD, KNOWN_ELSEWHERE, title
+from springcheck.identify.families import FAMILIES, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
 from springcheck.identify.interrupted import remembered
@@ -308,8 +308,7 @@ def _known(
         )
         notes.append("what would show the arithmetic: every step recorded, and the mass")
     undecided = undecided or (scheme is None and len(joints) == 1)
-    if explanations:
-        statement = f"{explanations[0].cause}"
+    statement = explanations[0].cause if explanations else statement
     return Identification(
         **said_of(candidates, scheme, damped, len(moving)),
         statement=statement,
