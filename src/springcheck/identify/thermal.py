@@ -79,7 +79,7 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
         statement = f"{head}, {THERMOSTATS[best].title}{late}"
     elif best:
-        statement = f"{head}, {' or '.join(kept)}"
+        statement = f"{head}, {' or '.join(kept)}{'' if first.known else ' or one that is not known here'}"
     else:
         statement = (
             f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
@@ -92,8 +92,9 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
         stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
         velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
         determinant=unknown, symplectic_defect=math.nan, defect_ulp=math.nan, precision="unknown",
-        fits=best is not None,
-        undecided=False, nearest=best if named else None, difference=(math.nan,) * 4, notes=tuple(notes),
+        fits=best is not None and first.known,
+        undecided=not first.known, nearest=best if named else None, difference=(math.nan,) * 4,
+        notes=tuple(notes),
         explanations=() if best else (Explanation(cause=statement, remedy=REMEDY, misfit=math.nan),),
     )  # fmt: skip
 

@@ -45,12 +45,14 @@ class Thermal:
     """Whether the draws are uniform rather than normal."""
     sparser: tuple[str, int] | None = None
     """A scheme of which every so many steps would do nearly as well as the best candidate."""
+    known: bool = True
+    """Whether what acts is known: one momentum shows no factor, but any change of it that ends a step."""
 
     @property
     def named(self) -> bool:
         """Whether one scheme beats every other, and every other of smaller steps."""
         best = bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
-        return best and self.sparser is None
+        return best and self.known and self.sparser is None
 
 
 JOINED_FROM = 6.0
@@ -187,8 +189,10 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
     if not found and float(np.median(np.abs(left))) < SPARSE:
         # few steps are off, and all others are not
         return None
-    uniform = bool(len(left)) and _is_uniform(left)
-    return Thermal(candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit, uniform=uniform)
+    return Thermal(
+        candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
+        uniform=bool(len(left)) and _is_uniform(left), known=[x.scheme for x in found] != ["bussi-after"],
+    )  # fmt: skip
 
 
 def _is_correlated(x: Floats) -> bool:
