@@ -12,17 +12,17 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 6092,
     ("schemes",): 1493,
-    ("thermal",): 1485,
-    ("engines/own",): 1696,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1159,
-    ("engines",): 2434,
+    ("thermal",): 1700,
+    ("engines/own",): 1703,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1206,
+    ("engines",): 2446,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4145,
+    ("checks",): 4157,
     ("identify",): 7708,
     ("formats", "store"): 4937,
     ("studies",): 1602,
-    ("studies/*",): 10423,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5693,
+    ("studies/*",): 10428,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5698,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -75,3 +75,9 @@ def test_momenta_of_zero_are_refused_and_all_else_passes(label: str) -> None:
 def test_what_a_factor_is_of_may_have_lost_digits_before_it() -> None:
     """A random bath of 10,000 whose kicks all but cancel the momenta that the factor is then of."""
     assert clean_bath(3402).alarms == ()
+
+
+def test_draws_that_act_on_joined_particles_within_a_step_are_told_apart() -> None:
+    """OABAO's first draws reach the force of the middle of its step: of joined particles they are solved for
+    together.  Another random bath of 10,000."""
+    assert clean_bath(5453).alarms == ()

@@ -33,7 +33,7 @@ HOMES = {
         "figures",
         *(f"studies/{name}/figure.py" for name in STUDIES),
     ),
-    "openmm": ("engines/openmm/simulation.py",),
+    "openmm": ("engines/openmm/simulation.py", "engines/openmm/thermostats.py"),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),

@@ -11,7 +11,7 @@ import numpy as np
 from springcheck import driver, engines
 from springcheck.checks.case import Case
 from springcheck.checks.check import Chance, Finding, check
-from springcheck.checks.thermal import HIDDEN, reading
+from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
@@ -58,6 +58,7 @@ class Seeded:
         return Stepper(
             self.scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal,
             width=np.longdouble, absolute=absolute,
+            freedoms=self.scheme.freedoms(scene.n, scene.particles),
         )  # fmt: skip
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
@@ -208,7 +209,7 @@ class Script:
 def noise_matrix(subject: Seeded) -> Finding | str:
     """A scripted generator reads the noise itself: what each unit draw does in a step, to rounding."""
     scheme, scene = subject.scheme, subject.scene
-    if not subject.scripted or scheme.uniform or scheme.collides:
+    if not subject.scripted or not scheme.draws or scheme.uniform or scheme.collides:
         return "it takes no generator of normal numbers"
     worst = 0.0
     for j in range(scheme.draws):
@@ -231,6 +232,8 @@ def noise_matrix(subject: Seeded) -> Finding | str:
 def seed_kept(subject: Seeded) -> Finding | str:
     """Two runs of one seed are equal bit for bit, and another seed is another run."""
     steps = 20
+    if not subject.scheme.draws:
+        return NO_DRAWS
     if subject.scheme.collides:
         # two runs without a collision are equal whatever their seeds
         rare = law_of(subject.scheme, subject.scene).collision * subject.scene.n
@@ -250,6 +253,8 @@ def seeds_apart(subject: Seeded) -> Chance | str:
 
     All draws in a row are held against those of the next seed at every distance up to half of the run.
     """
+    if not subject.scheme.draws:
+        return NO_DRAWS
     if subject.scheme.collides:
         return "its draws come now and then"
     steps = min(200, subject.scene.steps)

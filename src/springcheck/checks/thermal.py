@@ -18,6 +18,8 @@ from springcheck.thermal.draws import Reading, law_of, read
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
+NO_DRAWS = "it takes no draws: its bath is a chain"
+
 
 def reading(case: Case) -> Reading:
     """What the frames say of the draws behind them."""
@@ -40,8 +42,11 @@ def noise_direction(case: Case) -> Finding | str:
     """Each step is the scheme's own map and some draws: what no draw can explain is rounding.
 
     The draw follows from one number of the state, and predicts the other; a draw that acts in two steps
-    follows from each; a step without a collision has none.  Any temperature, any potential.
+    follows from each; a step without a collision has none.  A chain takes none at all: its own state, at rest
+    before the start, is carried along the states and predicts the next.  Any temperature, any potential.
     """
+    if THERMOSTATS[case.trajectory.scheme].chain and case.steps[0] != 0:
+        return "the state of its chain is known from the start alone"
     found = reading(case)
     if found.across is None:
         return "two fresh draws a step reach every state: their covariance is judged"
@@ -54,6 +59,8 @@ def noise_direction(case: Case) -> Finding | str:
 
 def _draws(case: Case) -> tuple[Floats, Reading] | str:
     """Draws (f, n) as standard normal numbers."""
+    if not THERMOSTATS[case.trajectory.scheme].draws:
+        return NO_DRAWS
     found = reading(case)
     if not found.known:
         return HIDDEN

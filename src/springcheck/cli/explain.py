@@ -160,6 +160,7 @@ _ACTS = {
                "b = (1 - c) kT / sum p**2/m; alpha has the sign of xi_1 + sqrt(c/b)",
     "scale": "p = |alpha| p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
              "b = (1 - c) kT / sum p**2/m",
+    "chain": "p = p exp(-{c} h s0/Q0) and the like, s0' = 2K - N kT - s0 s1/Q1, s1' = s0**2/Q0 - kT ...",
     "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
 }  # fmt: skip
 
@@ -172,7 +173,11 @@ def _thermostat(name: str) -> Iterator[str]:
     if scheme.carried:
         yield "  the first draw xi of a step is the last of the step before"
     if scheme.rescales:
-        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
+        yield "No linear map: " + (
+            "the chain's own state is carried along those of the motion, and predicts each of them"
+            if scheme.chain
+            else "kinetic energies are noncentral chi-squared, whose ranks are judged"
+        )
         return
     turn, x = 0.5, 0.1
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)

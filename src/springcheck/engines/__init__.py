@@ -239,7 +239,8 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{what.scheme} has no noise, and the scene has a bath; its methods are thermostats"
     if what.generator and not scene.bath:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
-    if what.generator and THERMOSTATS[what.scheme].rescales and not any(scene.p):
+    of_bath = THERMOSTATS[what.scheme] if what.generator else None
+    if of_bath and of_bath.rescales and of_bath.draws and not any(scene.p):
         return "it multiplies all momenta by one factor, and those of the start are all 0"
     if scene.kind not in what.kinds:
         moved = " and ".join(PLURAL[kind] for kind in sorted(what.kinds))

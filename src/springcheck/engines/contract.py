@@ -52,6 +52,9 @@ DRIVEN = frozenset({"drive", "modulated-spring"})
 FIELD = frozenset({"magnetic"})
 """The term of a method whose force may turn velocities."""
 
+NO_NUMBERS = "none: a chain is deterministic"
+"""The generator of a thermostat whose bath is a few variables of its own."""
+
 EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
 
 

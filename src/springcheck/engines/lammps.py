@@ -20,6 +20,7 @@ from springcheck.engines import bonds
 from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
+    NO_NUMBERS,
     SPRINGS,
     Engine,
     Label,
@@ -36,7 +37,7 @@ from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.thermal.catalogue import GJ
+from springcheck.thermal.decays import GJ
 
 INNER = 8
 """Steps of the fast springs in one of r-RESPA, as its scheme has them."""
@@ -247,6 +248,10 @@ def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
         none = 3 * scene.particles - scene.n
         modified = f"compute_modify bath_temp extra/dof {none}"
         return ["fix move mobile nve", f"fix bath mobile temp/csvr {given}", modified]
+    if method.name == "nvt":
+        given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r}"
+        none = 3 * scene.particles - scene.n
+        return [f"fix move mobile nvt temp {given}", f"compute_modify move_temp extra/dof {none}"]
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
@@ -320,6 +325,9 @@ ENGINE = Engine(
         thermostat(
             "csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", _DRAWS, SPRINGS,
             default=False,
+        ),
+        thermostat(
+            "nvt", "nose-hoover", "fix nvt, bond_style harmonic", NO_NUMBERS, SPRINGS, default=False
         ),
         *(
             thermostat(

@@ -22,23 +22,13 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
+from springcheck.thermal.chain import FOURTH, SIXTH, Chain
+from springcheck.thermal.decays import GJ, Decay, decay
 
 Part: TypeAlias = Fraction | Callable[[Any], Any]
 """A share of the step, or a function of x = gamma h."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
-
-
-@dataclass(frozen=True, slots=True)
-class Decay:
-    """What a step leaves of a momentum, c(x), and what it takes, 1 - c(x), which small x leave digits of."""
-
-    left: Callable[[Any], Any]
-    lost: Callable[[Any], Any]
-
-    def __call__(self, x: Any) -> Any:
-        """What is left."""
-        return self.left(x)
 
 
 class Act(NamedTuple):
@@ -58,6 +48,7 @@ class Act(NamedTuple):
         "collide",
         "rescale",
         "scale",
+        "chain",
     ]
     part: Part = ONE
     draw: int = 0
@@ -79,6 +70,12 @@ class Thermostat:
     synchronised: bool = True
     """Whether the momentum that it stores belongs to the time of the position."""
     source: str = ""
+    chain: Chain | None = None
+    """The bath of a scheme that takes no draws."""
+
+    def freedoms(self, n: int, particles: int) -> int:
+        """Degrees of freedom that its chain counts, of n coordinates of so many particles."""
+        return 3 * particles if self.chain and self.chain.three_each else n
 
     @property
     def fresh(self) -> int:
@@ -93,7 +90,7 @@ class Thermostat:
     @property
     def rescales(self) -> bool:
         """Whether all momenta get one factor, of their kinetic energy and the draws of all: no linear map."""
-        return any(act.kind in ("rescale", "scale") for act in self.acts)
+        return any(act.kind in ("rescale", "scale", "chain") for act in self.acts)
 
 
 def _stretch(c2: Decay) -> Callable[[Any], Any]:
@@ -101,7 +98,8 @@ def _stretch(c2: Decay) -> Callable[[Any], Any]:
     return lambda x: np.sqrt(2 * c2.lost(x) / ((2 - c2.lost(x)) * x))
 
 
-def _value(part: Part, x: Any) -> Any:
+def value_of(part: Part, x: Any) -> Any:
+    """A share of the step, or a function of x, in the width of x."""
     if callable(part):
         return part(x)
     return x.dtype.type(part.numerator) / x.dtype.type(part.denominator)
@@ -110,15 +108,22 @@ def _value(part: Part, x: Any) -> Any:
 class Stepper:
     """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
 
-    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  With `absolute` every difference
-    is taken as a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
+    on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
+    With `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the
+    roundings of a step, bounds its rounding.
     """
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: float, thermal: float, width: Any,
-        absolute: bool = False,
+        absolute: bool = False, freedoms: int = 0,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
+        if scheme.chain:
+            freedoms = freedoms or self.m.size
+            Q = scheme.chain.masses(freedoms, width(thermal), width(rate))
+            self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
+            self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
         x = np.asarray(self.h * width(rate), width)
         self.collision = float(-np.expm1(-x))
         size = np.sqrt(self.m * width(thermal))
@@ -128,7 +133,7 @@ class Stepper:
         self._moved = len(moves) - moves[::-1].index(True)
         self._acts, self._sign = [], 1 if absolute else -1
         for kind, part, number in scheme.acts:
-            c = _value(part, x)
+            c = value_of(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
             noise = np.sqrt(lost * (2 - lost)) * size if kind == "exchange" else size
             if kind in ("rescale", "scale"):
@@ -173,7 +178,12 @@ class Stepper:
                 p = p + (c * h) * last
             elif kind == "creep":
                 q = q + c * force(q, np.zeros_like(p)) / m
-            elif kind in ("rescale", "scale"):
+            elif kind == "chain" and hit is None:
+                self.chain, factor = self._swing(
+                    self.chain, np.sum(p * p / m, axis=-1), c * h, **self.of_chain
+                )
+                p = p * np.expand_dims(factor, -1)
+            elif kind in ("rescale", "scale", "chain"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
             elif kind == "rebuild":
                 p = m * ((q + self._sign * q_old) / h)
@@ -190,10 +200,6 @@ class Stepper:
         return np.where(first < 0, -size, size) if signed else size
 
 
-def _decay(share: int) -> Decay:
-    return Decay(lambda x: np.exp(-x / share), lambda x: -np.expm1(-x / share))
-
-
 def splitting(letters: str) -> tuple[Act, ...]:
     """The stages of a splitting by its letters: A drift, B kick, O exchange with the bath; letters that come
     n times take an nth of the step each."""
@@ -202,7 +208,7 @@ def splitting(letters: str) -> tuple[Act, ...]:
     for letter in letters:
         share = Fraction(1, times[letter])
         if letter == "O":
-            acts.append(Act("exchange", _decay(times[letter]), drawn))
+            acts.append(Act("exchange", decay(times[letter]), drawn))
             drawn += 1
         else:
             acts.append(Act("drift" if letter == "A" else "kick", share))
@@ -226,36 +232,6 @@ def _by_letters(letters: str) -> Thermostat:
         draws=letters.count("O"), synchronised=letters != "BAOA", source="Leimkuhler & Matthews 2013",
     )  # fmt: skip
 
-
-def _seventh(x: Any) -> Any:
-    """The y > 0 with x = 2 y**2 coth y, by Newton: log c = -2 y solves x = (1 + c)/(1 - c) log(c)**2 / 2."""
-    y = np.where(np.asarray(x) < 1, x / 2, np.sqrt(np.abs(x) / 2))
-    for _ in range(60):
-        change = (2 * y * y / np.tanh(y) - x) / (4 * y / np.tanh(y) - 2 * (y / np.sinh(y)) ** 2)
-        y = y - change
-        if np.all(np.abs(change) <= np.finfo(y.dtype).eps * np.abs(y)):
-            break
-    return y
-
-
-def _root(x: Any) -> Any:
-    return np.sqrt(1 + 4 * x)
-
-
-GJ: dict[str, Decay] = {
-    "i": Decay(lambda x: (1 - x / 2) / (1 + x / 2), lambda x: x / (1 + x / 2)),
-    "ii": _decay(1),
-    "iii": Decay(lambda x: 1 - x, lambda x: x),
-    "iv": Decay(lambda x: 2 / (1 + _root(x)), lambda x: 4 * x / (1 + _root(x)) ** 2),
-    "v": Decay(lambda x: 1 / (1 + x), lambda x: x / (1 + x)),
-    "vi": Decay(lambda x: 1 / (1 + x / 2) ** 2, lambda x: x * (1 + x / 4) / (1 + x / 2) ** 2),
-    "vii": Decay(lambda x: np.exp(-2 * _seventh(x)), lambda x: -np.expm1(-2 * _seventh(x))),
-    "viii": Decay(
-        lambda x: 1 / (np.hypot(1, x) + x),
-        lambda x: x * (1 + x / (np.hypot(1, x) + 1)) / (np.hypot(1, x) + x),
-    ),
-}
-"""The decay c2 of each GJ scheme as a function of x = gamma h."""
 
 _GJ_SOURCE = (
     "Groenbech-Jensen 2020; VII: Finkelstein et al., J. Chem. Phys. 155 (2021) 184104; "
@@ -301,7 +277,7 @@ def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:
     def value(x: Any) -> Any:
         total = np.zeros_like(x)
         for c in reversed(coefficients):
-            total = total * x + _value(Fraction(c), x)
+            total = total * x + value_of(Fraction(c), x)
         return total
 
     return value
@@ -387,7 +363,26 @@ _RESCALED = (
     ),
 )  # fmt: skip
 
+_CHAINS = (
+    Thermostat(
+        name="nose-hoover", title="Nose-Hoover chain of 3, half of it before and after velocity Verlet",
+        acts=(Act("chain", HALF), *_VERLET, Act("chain", HALF)), draws=0, chain=Chain(),
+        source="Martyna et al. 1996; LAMMPS' fix nvt",
+    ),
+    Thermostat(
+        name="nose-hoover-fourth", title="Nose-Hoover chain of 3 by fourth-order weights, 3 N freedoms",
+        acts=(Act("chain", HALF), *_VERLET, Act("chain", HALF)), draws=0,
+        chain=Chain(weights=FOURTH, three_each=True), source="Martyna et al. 1996; as ASE runs it",
+    ),
+    Thermostat(
+        name="nose-hoover-middle", title="Nose-Hoover chain of 3 amid the drift of leapfrog, 3 N freedoms",
+        acts=(Act("kick"), Act("drift", HALF), Act("chain"), Act("drift", HALF)), draws=0,
+        chain=Chain(weights=SIXTH, times=3, three_each=True), synchronised=False,
+        source="Zhang et al. 2019; as OpenMM runs it",
+    ),
+)  # fmt: skip
+
 THERMOSTATS: dict[str, Thermostat] = {
     one.name: one
-    for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED)
+    for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED, *_CHAINS)
 }

@@ -6,6 +6,7 @@ acts in two steps, they over-determine it: what is left over is rounding, at eve
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import ENERGY_LEFT, Stepper, Thermostat
+from springcheck.thermal.catalogue import ENERGY_LEFT, Stepper, Thermostat, value_of
 from springcheck.thermal.laws import Law
 
 PER_ACT, IN_AND_OUT = 6, 4
@@ -91,6 +92,7 @@ class _Reader:
             "rate": scene.bath.friction,
             "thermal": scene.thermal,
         }
+        about["freedoms"] = scheme.freedoms(scene.n, scene.particles)
         self.stepper = Stepper(scheme, **about, width=np.longdouble)
         self.sizer = Stepper(scheme, **about, width=np.longdouble, absolute=True)
         self.roundings = IN_AND_OUT + PER_ACT * len(scheme.acts)
@@ -98,6 +100,8 @@ class _Reader:
 
     def read(self, q: Floats, p: Floats) -> Reading:
         z = q.astype(np.longdouble), p.astype(np.longdouble)
+        if self.scheme.chain:
+            return self._swung(*z)
         start, end = (z[0][:-1], z[1][:-1]), (z[0][1:], z[1][1:])
         if self.scheme.rescales:
             return self._rescaled(start, end)
@@ -178,6 +182,43 @@ class _Reader:
         kinetic = np.concatenate([twice, factor**2 * twice], axis=-1).T / self.scene.thermal
         return replace(found, rescaled=np.asarray(kinetic, np.float64))
 
+    def _swung(self, q: Extended, p: Extended) -> Reading:
+        """A chain is at rest before the first frame, and each state tells how it swings on: it is carried
+        along the frames, and predicts the next one.
+
+        Roundings of the chain add up.  J, what a step makes of them, is found by moving the chain by ten
+        thousand of them; N errors e_i, each carried on by its own product of J, add up to at most
+        sqrt(N sum (J..J e_i)**2), whose sum of squares goes from step to step.
+        """
+        chain, stepper, m, h = self.scheme.chain, self.stepper, self.scene.m, self.scene.step
+        assert chain is not None
+        M, about = chain.length, stepper.of_chain
+        x = np.asarray(h)
+        part = sum(float(value_of(act.part, x)) for act in self.scheme.acts if act.kind == "chain")
+        squares, across = np.zeros((M, M)), np.empty((len(q) - 1, len(m)))
+        state, usual = chain.start(), np.sqrt(about["Q"] * about["thermal"])
+        for i in range(len(q) - 1):
+            moved = 1e4 * self.unit * (usual + np.abs(state[:M]))
+            stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
+            stepper.chain[range(M), range(1, M + 1)] += moved
+            both = np.stack(stepper(q[i], np.tile(p[i], (M + 1, 1)), self._force, []))
+            after, state = stepper.chain, stepper.chain[:, 0]
+            # (q or p, particle, link): what a change of a link moves
+            moves = ((both[:, 1:] - both[:, :1]) / moved[:, None]).transpose(0, 2, 1).astype(np.float64)
+            grown = np.max(np.abs(both[1, 0])) / max(float(np.max(np.abs(p[i]))), float(SMALLEST))
+            of = np.stack(self._allowed((q[i], p[i]), [], np.clip(grown, 1, 2)))
+            hidden = np.sqrt(M * i * np.einsum("znj,jk,znk->zn", moves, squares, moves))
+            off = np.abs(np.stack([q[i + 1], p[i + 1]]) - both[:, 0])
+            across[i] = np.max(off / (of + hidden / self.roundings), axis=0)
+            twice = np.sum(np.maximum(p[i] ** 2, both[1, 0] ** 2) / m)
+            new = self.unit * chain.rounding(state, twice, part * h, **about)
+            # and those of the momenta that it begins from
+            new[0] += part * h * self.roundings * np.sum(2 * np.abs(both[1, 0]) * of[1] / m)
+            J = ((after[:M, 1:] - after[:M, :1]) / moved).astype(np.float64)
+            squares = J @ squares @ J.T + np.diag(new.astype(np.float64) ** 2)
+        none = np.empty((0, len(m)))
+        return self._reading(none, across, none)
+
     def _force(self, q: Reals, p: Reals) -> Reals:
         return self.scene.system.potential_force(q, p)
 
@@ -231,6 +272,9 @@ class _Reader:
         else:
             unit = np.stack([np.abs(d) * of[0] + np.abs(b) * of[1], np.abs(a) * of[1] + np.abs(c) * of[0]])
             unit, across = unit / np.abs(a * d - b * c), np.zeros_like(of[0])
+            if not np.all(np.abs(target - at(found)) <= self.roundings * of):
+                # the force of the middle of a step has draws of particles that are joined in it
+                found, unit = _jointly(at, target, found, of)
         unseen = ~(self.roundings * np.max(unit, axis=0) <= 1)
         if np.any(unseen):
             # what no draw explains is then at most the largest one
@@ -246,6 +290,40 @@ def _unit(u: int, j: int, like: Extended) -> Extended:
     out = np.zeros_like(like)
     out[j] = 1
     return out
+
+
+MOST_JOINTLY = 64
+"""Particles up to which draws are solved for together: a square matrix of twice their number a step."""
+
+
+def _jointly(
+    at: Callable[[Extended], Extended], target: Extended, found: Extended, of: Extended
+) -> tuple[Extended, Extended]:
+    """Draws (2, f, n) that lead to the target (2, f, n), from a first guess, and a rounding of each where
+    the target has those `of`; infinite ones where they are too many, or are not found."""
+    u, f, n = found.shape
+    unknown = np.full_like(found, np.inf)
+    if n > MOST_JOINTLY:
+        return found, unknown
+    for _ in range(6):
+        now = at(found)
+        J = np.empty((f, u * n, u * n))
+        for column in range(u * n):
+            one = np.zeros_like(found)
+            one[column // n, :, column % n] = 1
+            J[:, :, column] = (at(found + one) - now).transpose(1, 0, 2).reshape(f, u * n)
+        try:
+            inverse = np.linalg.inv(J)
+        except np.linalg.LinAlgError:
+            return found, unknown
+        change = (inverse @ (target - now).transpose(1, 0, 2).reshape(f, u * n, 1)).reshape(f, u, n)
+        found = found + change.transpose(1, 0, 2)
+        if np.all(np.abs(change) <= 1e-13 * (1 + np.abs(found.transpose(1, 0, 2)))):
+            break
+    else:
+        return found, unknown
+    unit = np.abs(inverse) @ of.transpose(1, 0, 2).reshape(f, u * n, 1)
+    return found, np.asarray(unit.reshape(f, u, n).transpose(1, 0, 2))
 
 
 def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
-from springcheck.thermal.catalogue import GJ
+from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, TWO, Candidate, likely, sparser
 
 FEWEST = 200

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from springcheck.engines.contract import (
     EVERY_POTENTIAL,
+    NO_NUMBERS,
     RODS,
     Engine,
     Need,
@@ -42,6 +43,11 @@ ENGINE = Engine(
         thermostat(
             "bussi", "bussi-unsigned", "ase.md.bussi.Bussi", _DRAWS, EVERY_POTENTIAL, scripted=True,
             rebuilds_velocity=True, default=False,
+        ),
+        thermostat(
+            "nose-hoover", "nose-hoover-fourth", "ase.md.nose_hoover_chain.NoseHooverChainNVT", NO_NUMBERS,
+            EVERY_POTENTIAL, default=False,
+            note="it counts three degrees of freedom for each atom, whatever is fixed of it",
         ),
     ),
     step_seconds=3e-4,

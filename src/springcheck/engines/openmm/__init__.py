@@ -7,6 +7,7 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
     FIELD,
+    NO_NUMBERS,
     RODS,
     Engine,
     Need,
@@ -105,6 +106,20 @@ ENGINE = Engine(
             "andersen", "andersen-leapfrog",
             "VerletIntegrator with AndersenThermostat, as it stores velocities", _DRAWS, _ON_A_LINE,
             rebuilds_velocity=True,
+        ),
+        thermostat(
+            "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
+            NO_NUMBERS, _ON_A_LINE, default=False, rebuilds_velocity=True,
+            note="it counts three degrees of freedom for each particle, whatever moves it",
+        ),
+        thermostat(
+            "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step", _DRAWS,
+            _ON_A_LINE, default=False,
+        ),
+        thermostat(
+            "variable-langevin", "baoa",
+            "VariableLangevinIntegrator, its longest step that of the scene, at a tolerance that allows it",
+            _DRAWS, _ON_A_LINE, default=False, rebuilds_velocity=True,
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),

@@ -34,6 +34,7 @@ import openmm as mm
 from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic
+from springcheck.engines.openmm.thermostats import thermostat
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
@@ -193,30 +194,6 @@ def _stays_right_way_round(scene: Scene, term: Morse) -> None:
         )
 
 
-BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
-"""kT of a kelvin [kJ/mol] as OpenMM has it."""
-
-
-def _thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.System) -> mm.Integrator:
-    """An integrator with noise of this seed, at the thermal energy of the scene.
-
-    MethodError where springs bend under noise across the line.
-    """
-    assert scene.bath is not None
-    temperature, rate = scene.thermal / BOLTZMANN, scene.bath.friction
-    if name == "andersen":
-        made: Any = mm.VerletIntegrator(step)
-        noise: Any = mm.AndersenThermostat(temperature, rate)
-        system.addForce(noise)
-    elif name == "brownian":
-        noise = made = mm.BrownianIntegrator(temperature, rate, step)
-    else:
-        kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
-        noise = made = kind(temperature, rate, step)
-    noise.setRandomNumberSeed(seed)
-    return made
-
-
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     signed, step = step, abs(step)
     if name in ("verlet", "leapfrog", *LENGTHS):
@@ -312,7 +289,7 @@ class _Context:
         origins = bonds.rests(scene, label) if method.generator else bonds.origins(scene, method.scheme)
         system, positions = _system(scene, origins)
         if method.generator:
-            self._integrator = _thermostat(scene, method.name, step, seed, system)
+            self._integrator = thermostat(scene, method.name, step, seed, system)
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)

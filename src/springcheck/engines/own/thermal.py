@@ -23,7 +23,13 @@ class Random:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._scheme = THERMOSTATS[scheme]
         self._step = Stepper(
-            self._scheme, h=step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=np.float64
+            self._scheme,
+            h=step,
+            m=scene.m,
+            rate=scene.bath.friction,
+            thermal=scene.thermal,
+            width=np.float64,
+            freedoms=self._scheme.freedoms(scene.n, scene.particles),
         )
         self._force = scene.system.potential_force
         self._each = sum(act.kind in ("kick", "creep") for act in self._scheme.acts)
@@ -31,7 +37,7 @@ class Random:
         self._rng = seed if scripted else np.random.Generator(np.random.PCG64(seed))
         # collisions take numbers of their own, far along the same sequence
         self._hits = self._rng if scripted else np.random.Generator(np.random.PCG64(seed).jumped())
-        self._ahead = 1 if scripted else max(1, MOST_DRAWS // (scene.n * self._scheme.draws))
+        self._ahead = 1 if scripted else max(1, MOST_DRAWS // (scene.n * max(1, self._scheme.draws)))
         self._carried = list(self._drawn(1, self._scheme.carried)[0])
 
     def _drawn(self, steps: int, draws: int) -> Floats:

@@ -75,7 +75,7 @@ def broken(
         stepper = Stepper(
             replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
             rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
-            width=np.float64,
+            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles),
         )  # fmt: skip
         # a script of draws stands for every generator
         source = start if hasattr(start, "standard_normal") else seed(start)
