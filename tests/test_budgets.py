@@ -15,7 +15,7 @@ BUDGETS = {
     ("thermal",): 1700,
     ("engines/own",): 1703,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1206,
-    ("engines",): 2446,
+    ("engines",): 2516,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 4157,
     ("identify",): 7708,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,13 @@ from springcheck.schemes import scheme
 
 ANCHOR_MASS = 2.0**100
 """Mass of a particle that stands for the fixed end of a rod: a massless one cannot have any [u]."""
+
+
+Joint: TypeAlias = tuple[tuple[int, ...], float, Floats | None]
+"""A rod: its particles, its length, and where a fixed end stands."""
+
+Bond: TypeAlias = tuple[int, int, float, float, tuple[float, ...] | None]
+"""Both ends, k, rest length, and where an end that is an anchor stands."""
 
 
 def origins(scene: Scene, scheme_name: str) -> Floats:
@@ -138,6 +145,27 @@ def joints(
             f"particle {which} does not"
         )
     return found
+
+
+def rods(joined: list[Joint], anchors: int) -> Iterator[Bond]:
+    """Rods as bonds without a force, but for the third of a triangle; anchors are numbered from here on."""
+    closing = {tuple(sorted(ends)) for ends, *_ in triangles(joined)}
+    for ends, length, point in joined:
+        if point is not None:
+            yield anchors, ends[0], 0.0, length, tuple(point.tolist())
+            anchors += 1
+        elif tuple(sorted(ends)) not in closing:
+            yield ends[0], ends[1], 0.0, length, None
+
+
+def triangles(joined: list[Joint]) -> Iterator[tuple[tuple[int, ...], int, float]]:
+    """The third rod of each triangle as its ends, the particle across it, and the angle there [rad]."""
+    length = {frozenset(ends): x for ends, x, _ in joined}
+    for ends, x, _ in joined:
+        for top in range(min(ends)) if len(ends) == 2 else ():
+            one, other = (length.get(frozenset((top, end))) for end in ends)
+            if one and other:
+                yield ends, top, float(np.arccos((one * one + other * other - x * x) / (2 * one * other)))
 
 
 def lengths(term: Spring, origins: Floats) -> Floats:
