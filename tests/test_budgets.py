@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1206,
     ("engines",): 2516,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4157,
+    ("checks",): 4207,
     ("identify",): 7708,
     ("formats", "store"): 4937,
     ("studies",): 1602,

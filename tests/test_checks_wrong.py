@@ -211,7 +211,7 @@ def test_a_scene_at_rest_is_passed_at_rest_and_nowhere_else() -> None:
 
 
 def test_no_arithmetic_is_judged_by_a_step_defect_that_does_not_apply() -> None:
-    scene = well(every=40, steps=800, step=0.3)
+    scene = well(every=400, steps=8000, step=0.3)
     run = plain(scene, how=Arithmetic(name="coarse", state=2.0**-12, force=2.0**-12))
     assert one(scene, run, checks.step_defect).passed is None
     assert one(scene, run, checks.arithmetic).passed is None

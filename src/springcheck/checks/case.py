@@ -12,7 +12,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
-from springcheck.checks.stretch import Stretch, follow
+from springcheck.checks.stretch import DEVIATIONS, Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.term import Term
@@ -246,9 +246,6 @@ def least_moved(moved: Reals) -> Reals:
     """
     return np.asarray(np.minimum(moved, np.append(moved[:1], moved[:-1])))
 
-
-DEVIATIONS = 5.0
-"""Standard deviations of a random walk of roundings that are allowed: more come about once in 1.7 million."""
 
 REPEATED = 2000
 """Steps between two frames that are redone one by one; more are taken at once where modes allow it."""

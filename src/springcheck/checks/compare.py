@@ -9,9 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from springcheck.checks.case import DEVIATIONS, Case
+from springcheck.checks.case import Case
 from springcheck.checks.solver import tolerance_bound
 from springcheck.checks.steps import fastest, step_defect
+from springcheck.checks.stretch import DEVIATIONS
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene

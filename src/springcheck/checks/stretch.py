@@ -1,10 +1,22 @@
 """Many steps between two frames: where the scheme comes to, and what the roundings on the way may have
 become.
 
-A rounding made in step i is carried to the frame by the tangent map of the steps after it.  With A the
-allowance of one step (see `rounding`), the bound of a frame s steps after the last one is the sum over i <
-s of |D Phi^(s-1-i)| A(z_i), each degree of freedom by itself: in a norm over all of them a heavy body would
+A rounding made in step i is carried to the frame by the tangent map of the steps after it, D Phi^(s-1-i).
+With A the allowance of one step (see `rounding`), s steps later it is at most the sum over i < s of
+|D Phi^(s-1-i)| A(z_i), each degree of freedom by itself: in a norm over all of them a heavy body would
 hide a light one, and a bound by norms of single steps grows exponentially on a motion that merely turns.
+
+That takes all roundings for of one sign.  In double precision they are as good as random, and of the steps
+before the last one 5 standard deviations are allowed.  Three parts add up their variances:
+
+* what a step rounds is uniform within its unit, and a position or momentum is rounded once by each stage
+  that moves it and once by what it moves by: a walk, a third of A**2 for each;
+* a coefficient, or an element of a matrix, is rounded once, and so acts at every step alike, along the state
+  or along its change: A times their signs;
+* where a coordinate moves evenly, by few of its last digits, it is rounded to the same side at step after
+  step by each stage that moves it: A for each with one sign, as much of it as there can be.
+
+The last two are summed up along the way, signs and all, before they are squared.
 
 The tangent map of a scheme is the scheme carried out on the equations of variation (Hairer, Lubich & Wanner,
 Geometric Numerical Integration, VI.4.1), so it needs no code of its own beyond the slope of the force.
@@ -20,7 +32,7 @@ from numpy.typing import NDArray
 
 from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
-from springcheck.physics.arrays import Extended, Force, Reals
+from springcheck.physics.arrays import WIDE, Extended, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
@@ -31,8 +43,14 @@ JOINED = 32
 SAMPLES = 16
 """Tangent vectors of more than these, whose every rounding has a random sign."""
 
-CHANCE = 1e-6
-"""Of so few samples showing less of a degree of freedom's variance than `_widened` allows for."""
+DEVIATIONS = 5.0
+"""Standard deviations of roundings as good as random that are allowed: more once in 1.7 million."""
+
+T_SIXTEEN = 7.98
+"""The same where `SAMPLES` tell the standard deviation, by Student's t."""
+
+WIDENED = 3.32
+"""Times what `SAMPLES` show, a standard deviation is larger than that once in a million: chi-squared."""
 
 NUMBERS = 1 << 20
 """Numbers of states and tangent maps that are kept at a time: 16 MB, and a few times that on the way."""
@@ -81,7 +99,8 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         return Stretch(end=end, allowance=bound, last=bound, reach=reach, turns=turns)
     n, many = q.shape[1], _many
     if case.system.is_separate or n <= JOINED:
-        each = steps * n * (8 if case.system.is_linear else 2 * (2 if case.system.is_separate else 2 * n))
+        wide = 2 if case.system.is_separate else 2 * n
+        each = n * max(steps * (8 if case.system.is_linear else 2 * wide), 8 * wide)
     else:
         each = 2 * n * (1 + SAMPLES) + (n * n if callable(case.law.stiffness) else 0)
         many = _sampled
@@ -123,12 +142,19 @@ def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         turns = np.zeros(len(q), dtype=np.longdouble)
         if case.scheme.has("implicit") and not case.system.is_linear:
             turns = np.max([_turn(case, at) for at in on[0, 1:]], axis=0)
-        carried = np.zeros_like(bounds[0])
+        states = _joined(separate)(list(on), axis=-1)
+        alike = _alike(case, states[:-1], states[1:])
+        worst, walk = np.zeros_like(bounds[0]), np.zeros_like(bounds[0])
+        drifts = np.zeros((len(alike), *bounds[0].shape, bounds.shape[-1]), dtype=np.longdouble)
         power: Extended = np.broadcast_to(np.eye(maps.shape[-1], dtype=np.longdouble), maps.shape[1:])
         for i in reversed(range(steps)):
-            carried = carried + _apply(np.abs(power), bounds[i])
+            worst = worst + _apply(np.abs(power), bounds[i])
+            walk = walk + _apply(power * power, bounds[i] * bounds[i])
+            drifts = drifts + power * (alike[:, i] * bounds[i])[..., None, :]
             if i:
                 power = power @ maps[i]
+        spread = np.sqrt(walk * 2 * _times(case) / 3 + np.sum(drifts * drifts, axis=(0, -1)))
+        carried = _allowed(case, worst, bounds[-1], spread, DEVIATIONS)
     allowance = np.moveaxis(carried, -1, 0) if separate else np.stack(np.split(carried, 2, axis=-1))
     reach = np.max(np.abs(on), axis=1)
     return Stretch(end=on[:, -1], allowance=allowance, last=each[:, -1], reach=reach, turns=turns)
@@ -140,6 +166,8 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     the standard deviation of the end where every rounding has a random sign; some such ends tell it.
     """
     rng = np.random.default_rng(0)
+    signs = np.array([-1.0, 1.0])
+    fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(2 * _times(case) / 3)
     off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble)
     on, forces = np.stack([q, p]), variational(case.system)
     reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
@@ -152,20 +180,42 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         for _ in range(steps):
             both = np.concatenate([on[:, None], off], axis=1)
             off = np.stack(case.step(*both, forces=forces, slope=slope, varied=True))[:, 1:]
+            before = on
             on, last = _one(case, *on)
-            off = off + last[:, None] * rng.choice(np.array([-1.0, 1.0]), size=off.shape)
+            alike = np.sum(fixed * _alike(case, before, on)[:, :, None], axis=0)
+            off = off + last[:, None] * (walk * rng.choice(signs, size=off.shape) + alike)
             reach = np.maximum(reach, np.abs(on))
             if case.law.has("implicit") and not case.system.is_linear:
                 turns = np.maximum(turns, _turn(case, on[0]))
-        spread = np.sqrt(np.mean(off * off, axis=1) * (2 * q.shape[1] * steps)) * _widened()
-    return Stretch(end=on, allowance=np.maximum(spread, last), last=last, reach=reach, turns=turns)
+        spread = np.sqrt(np.mean(off * off, axis=1))
+        worst = np.maximum(last, spread * np.sqrt(2 * q.shape[1] * steps) / walk * WIDENED)
+        allowance = _allowed(case, worst, last, spread, T_SIXTEEN)
+    return Stretch(end=on, allowance=allowance, last=last, reach=reach, turns=turns)
 
 
-def _widened() -> float:
-    """By how much a standard deviation may exceed that of so few samples: chi-squared."""
-    from scipy.special import gammaincinv
+def _alike(case: Claim, before: Reals, after: Reals) -> Extended:
+    """What a rounding may be step after step, in deviations: to one side, along the state, along its change.
 
-    return float(np.sqrt(SAMPLES / (2 * gammaincinv(SAMPLES / 2, CHANCE))))
+    Of those to one side each may be as large as it can; the others are as good as random.
+    """
+    most = max(_times(case) / DEVIATIONS, 1 / np.sqrt(3))
+    return np.stack([0 * before + most, np.sign(before) / np.sqrt(3), np.sign(after - before) / np.sqrt(3)])
+
+
+def _times(case: Claim) -> int:
+    """How often one step rounds numbers as large as the whole position, or the whole momentum."""
+    kinds = case.scheme.kinds
+    moves = sum(kind.drifts for kind in kinds), sum(not kind.drifts for kind in kinds)
+    return max(1, len(case.scheme.b), *moves)
+
+
+def _allowed(case: Claim, worst: Extended, last: Extended, spread: Extended, deviations: float) -> Extended:
+    """What roundings of all steps may be, in those of one: at worst, or where they are as good as random so
+    many standard deviations of them beside the worst of the last step."""
+    how = case.trajectory.arithmetic
+    if not WIDE or how.quantum or how.lengths or how.stale:
+        return worst
+    return np.minimum(worst, last + deviations / case.roundings * spread)
 
 
 def _joined(separate: bool) -> Callable[..., Extended]:
