@@ -252,7 +252,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("studies")
     methods = ["--method", "own:euler", "--method", "own:semi-implicit-euler"]
     calls = {
-        "precision": ["precision", "spring", "--budget", "1.5", *methods],
+        "precision": ["precision", "spring", "--budget", "0.5", *methods],
         "stability": ["stability", "rlc-circuit", *methods[2:]],
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],
@@ -404,7 +404,7 @@ EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")
 )
 def test_every_scheme_of_one_particle_is_computed_again(tmp_path: Path, opened: Any, name: str) -> None:
     base = scenes.load_scene(name)
-    measure.run(replace(base, steps=min(base.steps, 400)), tmp_path / "a.h5", methods=EVERY)
+    measure.run(replace(base, steps=min(base.steps, 100)), tmp_path / "a.h5", methods=EVERY)
     content = page.gather(tmp_path / "a.h5")
     found, said = _checked(opened(content))
     assert found == "equal", said

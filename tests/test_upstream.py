@@ -36,6 +36,13 @@ SCRIPTS = sorted(x for x in FOLDER.iterdir() if x.suffix in (".py", ".cjs", ".c"
 
 HARMLESS = "**harmless**"
 
+FEWER = {
+    "ase_andersen": ("N, M, K, H, T, P = 20_000", "N, M, K, H, T, P = 4_000"),
+    "lammps_langevin": ("N, H, G, FRAMES = 30", "N, H, G, FRAMES = 20"),
+    "openmm_andersen": ("N, T, H, RATE = 6000", "N, T, H, RATE = 1500"),
+}
+"""Particles of the statistical ones here: their effects are 8 standard errors and more with a quarter of them."""
+
 
 def command(script: Path, folder: Path) -> list[str]:
     """How to run a reproducer; skips where its engine is not here."""
@@ -65,7 +72,13 @@ def command(script: Path, folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda x: x.stem)
 def test_a_finding_is_still_there(script: Path, tmp_path: Path) -> None:
-    ran = subprocess.run(command(script, tmp_path), capture_output=True, text=True, timeout=300, check=False)
+    words = command(script, tmp_path)
+    if script.stem in FEWER:
+        text = script.read_text()
+        assert text.count(FEWER[script.stem][0]) == 1
+        words[-1] = str(tmp_path / script.name)
+        Path(words[-1]).write_text(text.replace(*FEWER[script.stem]))
+    ran = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
     if "no registered Platform" in ran.stderr:
         pytest.skip("OpenMM finds no OpenCL here")
     assert ran.returncode == 0, ran.stderr
