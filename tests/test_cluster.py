@@ -97,7 +97,7 @@ class Pid:
 PIDS: Rows[Pid] = Rows(kind=Pid, beginning="pids/", named="", joined=True)
 
 
-def test_killed_and_hanging_workers_lose_nothing(farm: Farm) -> None:
+def test_killed_and_hanging_workers_lose_nothing_and_a_scheduler_that_dies_is_said(farm: Farm) -> None:
     parts = [partial(slow, i, 0.2) for i in range(30)]
     found = {}
     for i, answer in Cluster(str(farm.file), patience=3.0).carried_out(parts):
@@ -111,6 +111,18 @@ def test_killed_and_hanging_workers_lose_nothing(farm: Farm) -> None:
     assert sorted(found) == list(range(30))
     assert all(np.array_equal(found[i][1], np.sqrt(np.arange(5.0) + i)) for i in found)
     assert len({pid for pid, _ in found.values()}) >= 3
+    kept = []
+
+    def all_of_them() -> None:
+        parts = [partial(slow, i, 0.3) for i in range(40)]
+        for i, _ in Cluster(str(farm.file), patience=3.0).carried_out(parts):
+            kept.append(i)
+            if len(kept) == 4:
+                farm.scheduler.kill()
+
+    with pytest.raises(SpringcheckError, match="scheduler of the cluster is gone"):
+        all_of_them()
+    assert 4 <= len(kept) < 40
 
 
 def test_a_study_by_a_cluster_is_the_study_by_one_process(calm: Farm, tmp_path: Path) -> None:
@@ -123,21 +135,6 @@ def test_a_study_by_a_cluster_is_the_study_by_one_process(calm: Farm, tmp_path: 
     for name in one:
         for column, values in one[name].columns.items():
             assert repr(np.asarray(values).tolist()) == repr(np.asarray(many[name].columns[column]).tolist())
-
-
-def test_a_scheduler_that_dies_is_said_and_what_was_finished_is_kept(farm: Farm) -> None:
-    found = []
-
-    def all_of_them() -> None:
-        parts = [partial(slow, i, 0.3) for i in range(40)]
-        for i, _ in Cluster(str(farm.file), patience=3.0).carried_out(parts):
-            found.append(i)
-            if len(found) == 4:
-                farm.scheduler.kill()
-
-    with pytest.raises(SpringcheckError, match="scheduler of the cluster is gone"):
-        all_of_them()
-    assert 4 <= len(found) < 40
 
 
 @pytest.mark.parametrize("package", ["openmm", "numpy"])
