@@ -41,7 +41,7 @@ FEWER = {
     "lammps_langevin": ("N, H, G, FRAMES = 30", "N, H, G, FRAMES = 20"),
     "openmm_andersen": ("N, T, H, RATE = 6000", "N, T, H, RATE = 1500"),
 }
-"""Particles of the statistical ones here: their effects are 8 standard errors and more with a quarter of them."""
+"""Particles of the statistical ones here: their effects are 8 standard errors and more with a quarter."""
 
 
 def command(script: Path, folder: Path) -> list[str]:
