@@ -30,10 +30,10 @@ HEAVY = {"numba", "matplotlib", "scipy"}
 
 
 def imported(folder: Path, command: str, *more: str) -> set[str]:
-    """Top-level modules that commands have imported when the last ends, in one fresh interpreter."""
+    """Modules that commands have imported when the last ends, in one fresh interpreter."""
     code = (
         "import sys; from springcheck.cli import main; status = max(main(x.split()) for x in sys.argv[1:]); "
-        "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr); sys.exit(status)"
+        "print(*sys.modules, file=sys.stderr); sys.exit(status)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, command, *more], cwd=folder, capture_output=True, text=True, check=False
@@ -68,8 +68,15 @@ def test_two_hundred_steps_of_a_spring_compile_and_draw_nothing(tmp_path: Path) 
     assert not imported(tmp_path, "run spring --quiet") & {"numba", "matplotlib"}
 
 
-def test_a_quiet_run_formats_no_tables(tmp_path: Path) -> None:
+def test_a_quiet_run_formats_no_tables_and_a_small_one_imports_what_it_needs(tmp_path: Path) -> None:
     assert "rich" not in imported(tmp_path, "run spring --method own:* --quiet")
+    found = {
+        name.removeprefix("springcheck.") for name in imported(tmp_path, "run spring --method own:euler")
+    }
+    others = {"checking", "exporting", "foreign", "trust"}
+    assert not found & {f"store.{name}" for name in others}
+    assert not found & {"studies.ensemble.vary", "studies.tables", "studies.stability.longest", "identify"}
+    assert "store.journal" in found
 
 
 def stored(name: str, folder: Path, **changes: Any) -> dict[str, tuple[int, ...]]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -160,6 +159,8 @@ class Tiled:
     ) -> None:
         tiles = self._cut(width, margin)
         if self._threads > 1 and len(tiles) > 1 and steps * self._job.n >= PARALLEL:
+            from concurrent.futures import ThreadPoolExecutor
+
             with ThreadPoolExecutor(min(self._threads, len(tiles))) as pool:
                 for future in [pool.submit(go, tile, every, q, p) for tile in tiles]:
                     future.result()

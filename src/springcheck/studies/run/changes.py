@@ -10,7 +10,6 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
-from springcheck.studies.ensemble.vary import Axis, Plan, Varied
 
 
 def changed(options: Namespace) -> Scene:
@@ -31,6 +30,8 @@ def changed(options: Namespace) -> Scene:
             _put(given, field, getattr(options, name), f"--{name}: a number is needed")
     if not given:
         return bathed(scene, options)
+    from springcheck.studies.ensemble.vary import Axis, Plan, Varied
+
     plan = Plan(
         axes=tuple(Axis(field=field, values=(value,)) for field, value in given.items()),
         samples=None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
@@ -14,16 +15,18 @@ from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
-from springcheck.studies.ensemble.result import Ensemble
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
 from springcheck.text.wording import count, seconds
 
+if TYPE_CHECKING:
+    from springcheck.studies.ensemble.result import Ensemble
+
 
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
     """What `springcheck run` says, what `run --from` says, and what `inspect` says of a stored run."""
-    if isinstance(found, Ensemble):
+    if not isinstance(found, Report | Repeats | Stored):
         return ENSEMBLE.lines(found, options)
     verdicts = getattr(options, "verdicts", False)
     if isinstance(found, Repeats):
@@ -85,6 +88,13 @@ def _report(report: Report) -> Lines:
 
 def _beyond(report: Report) -> Lines:
     """The methods for which the step is too long: their motion grows without bound, whoever runs them."""
+    system, h, known = report.scene.system, abs(report.scene.step), schemes.known()
+    ran = [known[name] for name in {run.scheme for run in report.runs} if name in known]
+    if system.has_modes and not system.is_damped and not any(one.has("mixes") for one in ran):
+        # no scan is needed: the catalogue's limits are those of springs without friction, 0 where it has none
+        least = min((one.limit for one in ran if one.limit), default=np.inf)
+        if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
+            return []
     from springcheck.studies.stability.longest import too_long
 
     out: Lines = []
