@@ -13,15 +13,15 @@ BUDGETS = {
     ("physics",): 6092,
     ("schemes",): 1493,
     ("thermal",): 1700,
-    ("engines/own",): 1703,
+    ("engines/own",): 1704,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1206,
     ("engines",): 2516,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 4207,
     ("identify",): 7708,
-    ("formats", "store"): 4937,
+    ("formats", "store"): 4952,
     ("studies",): 1602,
-    ("studies/*",): 10428,
+    ("studies/*",): 10439,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5698,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -34,6 +34,7 @@ def test_a_hostile_store_does_no_harm(kind: str, served: SERVED, monkeypatch: py
     # a short form: a tenth of the text; each of two arrays above the memory allowed, and the file above what
     # is checked before it is shown
     monkeypatch.setattr(hostile, "REPEATED", hostile.REPEATED // 10)
+    monkeypatch.setattr(hostile, "VERDICTS", 30_000)
     monkeypatch.setattr(hostile, "SPARSE", max(2 * campaign.MEMORY, checking.LONGEST_CHECK) + (1 << 20))
     number = list(hostile.KINDS).index(kind)
     # every second one with a seal; every 24th is drawn, which takes as long as all other commands together

@@ -536,11 +536,15 @@ def columns_linked_to_each_other(file: Any, rng: random.Random, folder: Path) ->
         group[f"x{i}"] = group["wide"]
 
 
+VERDICTS = 1_000_000
+"""Rows of their table in what follows."""
+
+
 @kind
 def a_million_verdicts(file: Any, rng: random.Random, folder: Path) -> None:
     for name in list(file["verdicts"]):
         old = file["verdicts"][name]
-        values = np.resize(old[()], REPEATED // 9)
+        values = np.resize(old[()], VERDICTS)
         kept = h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
         replace(file, f"verdicts/{name}", data=values, dtype=kept)
 
