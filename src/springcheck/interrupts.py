@@ -83,7 +83,7 @@ def install() -> None:
 
 
 def _end_with_parent(lifeline: int) -> None:
-    """Whoever kills the process that waits for this one means this one."""
+    """Kill this process when the one that waits for it is gone: a signal to that one was meant for this."""
     os.read(lifeline, 1)
     os.kill(os.getpid(), signal.SIGKILL)
 

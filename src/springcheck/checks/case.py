@@ -178,10 +178,11 @@ class Case(Claim):
         """What the roundings of so many steps add up to in the coordinates in which a step is a rotation, in
         allowances of a step (f,); infinite but for kicks and drifts in double precision without friction.
 
-        Roundings of states are as good as random: they walk, 5 standard deviations of one unit each.  A
-        coefficient is rounded once, and so acts at every step: a kick and a drift turn the phase by h w, as
-        far as an engine makes them, and the factor of the whole state, near 1, where it has one.  A closed
-        form that rounds like the engine is no walk.  `turn` is h w, that of the modes unless it is given.
+        Roundings of states are as good as random and add up as a random walk: 5 standard deviations of one
+        unit each.  A coefficient is rounded once, so that its error is the same in every step: one for the
+        kick and one for the drift, each of which turns the phase by h w, and one for the factor of the whole
+        state, near 1, where there is one.  A closed form that rounds like the engine is no walk.  `turn`
+        is h w, that of the modes unless it is given.
         """
         how, plain = self.trajectory.arithmetic, self.law.has("plain", "undamped")
         double = how.state == how.force == 2.0**-53 and not how.quantum

@@ -23,7 +23,7 @@ PARTS = {-1.0: "the start of the step before", 0.0: "the start", 0.5: "the middl
 """Places within a step, in words."""
 
 SLACK = 4.0
-"""Bounds that a right hypothesis stays within: allowances are those of the scheme's own states."""
+"""Multiple of the scheme's own bound within which the residuals of a right hypothesis stay."""
 
 NEWTON_STEPS = 4
 """Newton steps of the search for a time: the force is linear in a small shift but for its curvature."""

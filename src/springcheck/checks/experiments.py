@@ -69,7 +69,7 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     scale = np.concatenate([1 / root, root])
 
     def columns(q: Extended, p: Extended, sign: int) -> Floats:
-        """Of each push, over the copy that was not pushed."""
+        """Displacement of each perturbed copy from the unperturbed one, per perturbation (2n, 2n)."""
         states = np.concatenate([q.reshape(2 * n + 1, n), p.reshape(2 * n + 1, n)], axis=1)
         return np.asarray(((states[1:] + sign * states[0]) / pushes[:, None]).T, np.float64)
 

@@ -128,7 +128,7 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
 
 
 STILL = "standing still would pass: rounding may be as large as"
-"""A check that an engine passes which does not move says nothing of one that does."""
+"""An engine that does not move passes such a check too, so a pass proves nothing there."""
 
 
 def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:

@@ -112,7 +112,7 @@ class Simulation(Protocol):
 
     @property
     def force_calls(self) -> int:
-        """Evaluations of the force so far, counted by us."""
+        """Number of force evaluations so far, as springcheck counts them."""
         ...
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:

@@ -1,8 +1,8 @@
 """The map between recorded states: generalised least squares under the observation model.
 
 States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is what the form of the file leaves uncertain,
-p is what the arithmetic rounds in a step.  What a map leaves over, r[n] = z[n+1] - B z[n] - c, then has the
-covariance V = A S A^T + P of a banded matrix, for each recorded error stands in two of them.  B and c
+p is what the arithmetic rounds in a step.  The residuals of a map, r[n] = z[n+1] - B z[n] - c, then have the
+covariance V = A S A^T + P, a banded matrix, since each recorded error enters two of them.  B and c
 minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and Least Squares, 1976, chapter 9).  Where
 the file has all digits V is diagonal and neighbours are all that counts; where it has few, V^-1 adds up what
 the whole orbit shows.  One fit serves both, and what lies between.

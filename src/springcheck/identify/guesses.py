@@ -67,9 +67,9 @@ LARGEST = 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
-    """Steps without friction over their phase, where it rises and where it falls: the family of each curve,
-    its first and last phase, and at `CELLS` + 1 phases h w, log of the determinant, M11 and M12 over its
-    root, and how far these bend within a cell."""
+    """One-step maps of the frictionless families as functions of their phase, on each interval where it is
+    monotonic.  Of each curve the family and the first and last phase; at `CELLS` + 1 phases h w, the log of
+    the determinant, and M11 and M12 over its root; and how far these bend within a cell."""
 
     family: Integers
     low: Floats

@@ -1,7 +1,7 @@
-"""Forces cut off at multiples of a quantum, carried out: what frames many steps apart show of them.
+"""Forces truncated to multiples of a quantum: what frames many steps apart show of them.
 
-Between frames several steps apart single forces cannot be read, but the steps can be redone from each
-recorded frame with forces that are cut off.  Where that brings the misses down to the rounding of states, it
+Where frames lie several steps apart single forces cannot be read off, but the steps can be repeated from each
+recorded frame with truncated forces.  Where that brings the residuals down to the rounding of states, it
 is those forces; noise of the same size, or an error that goes with anything else, stays as large as it was.
 """
 

@@ -1,4 +1,4 @@
-"""A collection made of parts: copied object by object, checked against its digests, sealed."""
+"""Merge parts into one store: copy object by object, compare digests, seal the result."""
 
 from __future__ import annotations
 

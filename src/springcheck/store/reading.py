@@ -118,9 +118,9 @@ def digest(path: str | Path, label: str) -> str:
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
-    """Pieces of a trajectory, at most `rows` + 1 frames each, the first of them the last one's last.
+    """Split a trajectory into pieces of at most `rows` + 1 frames; consecutive pieces share one frame.
 
-    With a stride only every stride-th piece is read, and the last.
+    With a stride only every stride-th piece is read, and the last one.
     """
     with _held(path, label) as (known, rest, datasets):
         starts = range(0, max(1, known.frames - 1), rows)

@@ -62,7 +62,7 @@ def bits() -> dict[str, str]:
 
 
 def sentences(pieces: Iterable[tuple[str, Mapping[str, str]]]) -> list[str]:
-    """What is said of who measured these pieces; nothing where it was one kind of processor."""
+    """Sentences on the processors that measured these pieces; none where all were of one kind."""
     counts: Counter[tuple[str, ...]] = Counter()
     hosts: dict[tuple[str, ...], dict[str, None]] = {}
     for _, by in pieces:

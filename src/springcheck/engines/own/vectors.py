@@ -48,7 +48,7 @@ class Vectors:
 
 
 def _kept(force: Force, damped: bool) -> Force:
-    """A force that is evaluated again only where the state that it depends on is another one."""
+    """A force that is evaluated again only when the state that it depends on has changed."""
     last: list[Reals] = []
 
     def again(q: Reals, p: Reals) -> Reals:

@@ -107,7 +107,7 @@ def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Ex
 def _morse(system: System[Any], bonds: tuple[Morse, _Bond], t: Extended) -> States:
     """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
 
-    w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass goes straight on.
+    w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass moves uniformly.
     """
     q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
     term, bond = bonds

@@ -43,7 +43,7 @@ class Axis:
 
     field: str
     values: tuple[float, ...] = ()
-    """Of a grid that lists them; else they are spaced evenly."""
+    """The values of a grid that lists them; empty where they are spaced evenly."""
     low: float = math.nan
     high: float = math.nan
     count: int = 0
@@ -211,7 +211,7 @@ class Varied:
                     table[key] = held
 
     def check(self, values: Mapping[str, Floats], changes: Mapping[Place, Floats]) -> None:
-        """SpringcheckError where fields act on one another: the cells would not be what the file says.
+        """Raise SpringcheckError where fields depend on each other, so that cells would differ from the file.
 
         Looked at are the first and the last cell and some between, each read from the file as a whole.
         """

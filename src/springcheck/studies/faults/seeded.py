@@ -246,7 +246,7 @@ def significant(x: Floats, size: float) -> Floats:
 
 
 def towards_zero(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """Every result is cut off instead of rounded: no step is off by more than one rounding."""
+    """Every result is rounded towards zero: no step is off by more than one unit in the last place."""
     force = scene.system.force
     m = scene.m.astype(np.longdouble)
 

@@ -164,7 +164,7 @@ def imaged(nearest: Callable[[Reals, Floats], Reals]) -> Callable[[Scene, scheme
 
 
 def swapped_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Positions of particles in a plane, each axis counted on by the borders that the other crosses."""
+    """Positions of particles in a plane, unwrapped along each axis by the image counts of the other."""
     if scene.box is None:
         return run
     crossed = _crossed(scene, run.q)
@@ -174,7 +174,7 @@ def swapped_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 
 
 def late_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Positions counted on by the borders that were crossed until the frame before."""
+    """Positions unwrapped by the image counts of the frame before."""
     crossed = _crossed(scene, run.q)
     crossed[1:] -= crossed[:-1].copy()
     crossed[0] = 0

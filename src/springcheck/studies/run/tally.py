@@ -48,7 +48,7 @@ class Tally:
 
 
 def line(piece: Trajectory, tally: Tally) -> MethodRun:
-    """The line of the report on a run, whose last piece this is."""
+    """The row of the report for a run, from its last piece and the tally of all of them."""
     # a run that left no frame but the start has no error: that of the start is nothing
     ended = piece.outcome.status != "complete" and piece.outcome.step == 0
     return MethodRun(

@@ -64,7 +64,7 @@ class Linear:
 
 @lru_cache(maxsize=8)
 def stiffest(scene: Scene) -> Floats:
-    """Positions (n,) where the exact solution of an anharmonic scene is stiffest; the start of others."""
+    """Positions (n,) where the exact solution of an anharmonic scene is stiffest; elsewhere the start."""
     system = scene.system
     if system.is_linear or scene.n > MOST_MODES or not exact.has_true_motion(scene):
         return np.asarray(scene.q)
