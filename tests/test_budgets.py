@@ -10,18 +10,18 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6092,
-    ("schemes",): 1493,
+    ("physics",): 6444,
+    ("schemes",): 1577,
     ("thermal",): 1700,
-    ("engines/own",): 1704,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1206,
-    ("engines",): 2516,
+    ("engines/own",): 1705,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
+    ("engines",): 2521,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4207,
+    ("checks",): 4230,
     ("identify",): 7708,
     ("formats", "store"): 4952,
     ("studies",): 1602,
-    ("studies/*",): 10439,
+    ("studies/*",): 10464,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 5698,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -11,6 +11,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, schemes
+from springcheck.checks.case import strongest
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE, Arithmetic
 from springcheck.physics.scene import Scene
@@ -240,7 +241,7 @@ def test_the_strongest_force_is_that_of_one_spring_or_of_all_on_a_particle() -> 
     q = np.array([[-3.0, 0.0, 3.0], [0.5, 1.0, 1.5]])
     # the outer springs of the first state cancel at the middle one; in the second only the walls pull
     scene = replace(scenes.load_scene("chain"), terms=(pulled, walls))
-    assert scene.system.strongest(q) == pytest.approx([2.9 * 2.5, 1.3 + 1.7])
+    assert strongest(scene.terms, q) == pytest.approx([2.9 * 2.5, 1.3 + 1.7])
 
 
 def overflowing(declared: float) -> tuple[Scene, Trajectory]:

@@ -28,8 +28,8 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "reference" / "motion"
-ELSEWHERE = ("detest-b1", "stiff-spring", "two-scales", "multiple-time-steps", "overdamped")
-"""Scenes whose references are made by stiff_references.py."""
+ELSEWHERE = ("detest-b1", "stiff-spring", "two-scales", "multiple-time-steps", "overdamped", "van-der-pol")
+"""Scenes whose references are made by stiff_references.py and van_der_pol.py."""
 DIGITS = 25
 ORDER = 40
 

@@ -207,7 +207,7 @@ class Case(Claim):
             true = system.force_of(parts)
 
             def force(q: Reals, p: Reals) -> Reals:
-                np.maximum(peak, system.strongest(q, parts), out=peak)
+                np.maximum(peak, strongest(parts, q), out=peak)
                 return true(q, p)
 
             return force
@@ -227,6 +227,18 @@ class Case(Claim):
         reach = np.hypot(self.w * u, v) * np.where(np.isfinite(axes), axes, 1)
         q = np.abs(modes.rest) + modes.spread(reach / self.w) / modes.root_m
         return np.asarray(q), np.asarray(modes.spread(reach) * modes.root_m)
+
+
+def strongest(parts: tuple[Term, ...], q: Reals) -> Reals:
+    """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""
+    each = ((parts, q), *(((alone,), where) for alone, where in (term.separated(q) for term in parts)))
+    found = []
+    for some, where in each:
+        out = np.zeros_like(where)
+        for term in some:
+            term.add_force(where, np.zeros_like(where), out)
+        found.append(np.abs(out))
+    return np.asarray(np.max(np.concatenate(found, axis=-1), axis=-1))
 
 
 def overflows(how: Arithmetic) -> str:

@@ -83,6 +83,9 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
                 stiffness=stiffness,
                 joined=not scene.system.is_separate,
                 q=near,
+                friction=scene.system.friction_at(near)
+                if near is not None and scene.system.brakes_by_place
+                else None,
                 pull=None if near is None else scene.system.potential_force(near, np.zeros_like(near)),
             )
         found.append(made[known])

@@ -100,6 +100,8 @@ def flow_growth(case: Case) -> float:
             return float(np.exp(turn) * max(turn, 1.0))
     if duration == 0:
         return 1.0
+    if scene.system.solution and (grown := scene.system.solution.growth):
+        return grown
     maps = _flow_maps(case, duration)
     if maps is None:
         return 1.0 + fastest(case) * duration / 2

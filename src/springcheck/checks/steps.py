@@ -180,6 +180,8 @@ def rates_met(case: Case, *states: Reals) -> Floats:
     rows = [case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
     steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
     turns = 0.0 if case.law.turns is None else np.max(case.law.turns)
+    if case.system.brakes_by_place:
+        turns = turns + max(float(np.max(np.abs(case.system.friction_at(q)[0]))) for q in states)
     return np.asarray(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns, np.float64)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from springcheck import formats, interrupts, schemes
 from springcheck.doors.function import UNKNOWN
-from springcheck.engines import DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation
+from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -52,7 +52,7 @@ def engine(
                 name=name,
                 scheme=known[name],
                 about=f"{shlex.join(words)}; its time is the whole command's",
-                terms=EVERY_FORCE | DRIVEN,
+                terms=EVERY_FORCE | DRIVEN | BRAKES,
             )
             for name, words in commands.items()
         },

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import engines, schemes
-from springcheck.engines import DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
+from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper
 from springcheck.physics.arrays import Floats
@@ -132,7 +132,7 @@ def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: ""
         scheme = stated(name)
         known = schemes.scheme(scheme).name if scheme else _identified(function)
         about = f"{spec}, {'stated to be' if scheme else 'found to be'} {schemes.title(known)}"
-        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE | DRIVEN)
+        methods[name] = Method(name=name, scheme=known, about=about, terms=EVERY_FORCE | DRIVEN | BRAKES)
     return Engine(
         name="stepper",
         title=f"the function {_called(specs[0])}" if len(specs) == 1 else "functions",

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 from springcheck import schemes
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
+    BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
@@ -49,8 +50,8 @@ from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
 
 __all__ = [
-    "ANY_POTENTIAL", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine", "Label",
-    "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
+    "ANY_POTENTIAL", "BRAKES", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine",
+    "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
     "guarded", "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
     "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable", "while_here",
 ]  # fmt: skip

@@ -55,6 +55,9 @@ FIELD = frozenset({"magnetic"})
 NO_NUMBERS = "none: a chain is deterministic"
 """The generator of a thermostat whose bath is a few variables of its own."""
 
+BRAKES = frozenset({"van-der-pol"})
+"""The term of a method whose friction may depend on the position."""
+
 EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
 
 

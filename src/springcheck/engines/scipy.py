@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.engines.contract import (
+    BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
@@ -56,7 +57,7 @@ class _Solver:
             "atol": scene.tolerance * np.where(sizes > 0, sizes, 1.0),
         }
         if name in ("Radau", "BDF", "LSODA"):
-            options["jac"] = lambda t, y: jacobian(t, y[:n])
+            options["jac"] = lambda t, y: jacobian(t, y[:n], y[n:])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self._solver = getattr(integrate, name)(
@@ -108,7 +109,7 @@ ENGINE = Engine(
                 name,
                 f"scipy-{name}",
                 f"scipy.integrate.{solver}, as solve_ivp steps it",
-                EVERY_FORCE | DRIVEN | FIELD,
+                EVERY_FORCE | DRIVEN | FIELD | BRAKES,
                 adaptive=True,
                 kinds=EVERY_KIND,
             )

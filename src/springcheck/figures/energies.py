@@ -44,7 +44,7 @@ def energy(runs: Runs, exact: Exact) -> Figure:
     figure = Figure(figsize=(7.8, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, sharex=True)
     scene = runs.scene
-    start = scene.system.initial_energy
+    start = float(scene.system.energy(scene.q, scene.p))
     unit = float(scene.system.norm.unit) ** 2 or 1.0
     whole = abs(start - unit) <= 1e-12 * unit
     unit = start if whole else unit

@@ -137,16 +137,16 @@ def with_clock(scene: Any) -> Any:
     return scene.derived(q=q, p=p, m=m, terms=terms, places=places)
 
 
-def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], Callable[[float, Floats], Floats]]:
-    """What a solver with a time of its own asks for: the force (t, q, p) -> (n,) [M L/T2], and (t, q) -> the
+def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], ...]:
+    """What a solver with a time of its own asks for, functions of (t, q, p): the force (n,) [M L/T2], and the
     derivatives (2n, 2n) of (p/m, force) by (q, p)."""
     system, n = scene.system, scene.n
     if not system.is_driven:
-        return lambda t, q, p: system.force(q, p), lambda t, q: system.jacobian(q)
+        return lambda t, q, p: system.force(q, p), lambda t, q, p: system.jacobian(q, p)
     clocked = system.clocked.system
     kept = np.append(np.arange(n), np.arange(n + 1, 2 * n + 1))
 
     def force(t: float, q: Floats, p: Floats) -> Floats:
         return np.asarray(clocked.force(np.append(q, t), np.append(p, CLOCK))[:n], np.float64)
 
-    return force, lambda t, q: clocked.jacobian(np.append(q, t))[np.ix_(kept, kept)]
+    return force, lambda t, q, p: clocked.jacobian(np.append(q, t), np.append(p, CLOCK))[np.ix_(kept, kept)]

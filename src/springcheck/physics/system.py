@@ -22,7 +22,7 @@ from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.rods import Rods, rods_of
 from springcheck.physics.term import Term, in_pieces
-from springcheck.physics.terms import Damping
+from springcheck.physics.terms import Damping, VanDerPol
 
 Fields = TypeVar("Fields", bound=SceneFields)
 
@@ -73,7 +73,12 @@ class System(Generic[Fields]):
     @cached_property
     def is_damped(self) -> bool:
         """Whether any friction acts."""
-        return bool(np.any(self.friction_rates != 0))
+        return self.brakes_by_place or bool(np.any(self.friction_rates != 0))
+
+    @cached_property
+    def brakes_by_place(self) -> bool:
+        """Whether some friction depends on the position."""
+        return any(isinstance(term, VanDerPol) for term in self.terms)
 
     @cached_property
     def is_uniform_chain(self) -> bool:
@@ -198,18 +203,6 @@ class System(Generic[Fields]):
 
         return in_pieces(law, sum(map(len, parts)), *(() if near is None else (near,)))
 
-    def strongest(self, q: Reals, terms: Iterable[Term] | None = None) -> Reals:
-        """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""
-        parts = tuple(self.terms if terms is None else terms)
-        each = ((parts, q), *(((alone,), where) for alone, where in (term.separated(q) for term in parts)))
-        found = []
-        for some, where in each:
-            out = np.zeros_like(where)
-            for term in some:
-                term.add_force(where, np.zeros_like(where), out)
-            found.append(np.abs(out))
-        return np.asarray(np.max(np.concatenate(found, axis=-1), axis=-1))
-
     @cached_property
     def friction_rates(self) -> Extended:
         """Rates at which friction alone would slow each particle down, c/m (n,) [1/T], extended precision."""
@@ -218,6 +211,13 @@ class System(Generic[Fields]):
             if isinstance(term, Damping):
                 term.scatter(term.c / self.m[term.i].astype(np.longdouble), out)
         return out
+
+    def friction_at(self, q: Reals) -> tuple[Reals, Reals]:
+        """Rates of friction at q (..., n) [1/T], and their derivatives by each particle's position."""
+        rates = self.friction_rates.astype(q.dtype) + np.zeros_like(q), np.zeros_like(q)
+        for term in (term for term in self.terms if isinstance(term, VanDerPol)):
+            term.add_rates(q, self.m, rates)
+        return rates
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         """Rows, columns and values (..., s) of what each pair of ends adds to the `hessian` at q (..., n)."""
@@ -256,11 +256,15 @@ class System(Generic[Fields]):
         rows, columns, values = (np.concatenate(x) for x in zip(*self.elements(q), strict=True))
         return csc_array((values.astype(np.float64), (rows, columns)), shape=(self.n, self.n))
 
-    def jacobian(self, q: Floats) -> Floats:
-        """Derivatives of (p/m, force) by (q, p) at q (n,) -> (2n, 2n), double precision."""
+    def jacobian(self, q: Floats, p: Floats | None = None) -> Floats:
+        """Derivatives of (p/m, force) by (q, p) at q, p (n,) -> (2n, 2n), double precision."""
         upper = np.hstack([np.zeros((self.n, self.n)), np.diag(1 / self.m)])
         turned = (x.by_velocity(self.m) for x in self.terms if isinstance(x, Magnetic))
-        lower = np.hstack([-self.hessian(q), sum(turned, -np.diag(self.friction_rates))])
+        bent, rate = self.hessian(q), self.friction_rates
+        if self.brakes_by_place and p is not None:
+            rate, bend = self.friction_at(q)
+            bent = bent + np.diag(bend * p)
+        lower = np.hstack([-bent, sum(turned, -np.diag(rate))])
         return np.vstack([upper, lower]).astype(np.float64)
 
     def curvatures(self, q: Reals) -> Any:
@@ -303,11 +307,6 @@ class System(Generic[Fields]):
         for term in self.terms:
             total = total + in_pieces(lambda q, _, term=term: term.energy(q), len(term))(q, p)
         return np.asarray(total)
-
-    @cached_property
-    def initial_energy(self) -> float:
-        """Initial total energy [M L2/T2]."""
-        return float(self.energy(self.q, self.p))
 
     @cached_property
     def norm(self) -> Norm:

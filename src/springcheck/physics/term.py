@@ -166,6 +166,11 @@ class Term:
             _scatter(np.add, out, self._places[0], pull)
         _scatter(np.subtract, out, self._places[-1], pull)
 
+    def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
+        """Add to out (..., n) the change of the force at (q, v) by small ones, but for what is linear in
+        v."""
+        self.add_pull(self.curvature(q) * self.stretch(dq), out)
+
     def add_rounding(
         self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
     ) -> None:

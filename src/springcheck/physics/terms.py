@@ -18,10 +18,11 @@ from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
+from springcheck.physics.vanderpol import VanDerPol
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "Magnetic", "ModulatedSpring", "Morse", "OnPairs", "OnParticles",
-    "Quartic", "Rod", "Spring", "Term", "WallRod", "WallSpring", "Weight", "known", "register",
+    "Quartic", "Rod", "Spring", "Term", "VanDerPol", "WallRod", "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -269,6 +270,7 @@ _KNOWN: dict[str, type[Term]] = {
         Weight,
         Morse,
         Damping,
+        VanDerPol,
         Magnetic,
         Drive,
         ModulatedSpring,

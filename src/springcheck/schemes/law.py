@@ -59,8 +59,28 @@ class Law:
 
     @cached_property
     def rate(self) -> Extended | None:
-        """Rates of friction (n,) [1/T]; None where nothing is damped."""
+        """Rates of friction (n,) [1/T], without what depends on the position; None where nothing is
+        damped."""
         return self.scene.system.friction_rates if self.scene.system.is_damped else None
+
+    def rates(self, *, varied: bool = False) -> Any:
+        """What a step needs of the friction: its rates, or where they depend on the position a function of
+        the end Q and the start q of an implicit stage, (..., n) each.  It gives the rates at Q, their
+        derivatives times Q - q, and what the changes of a motion lose beside the rates, all (..., n) [1/T],
+        [1/T], [L/T]."""
+        system = self.scene.system
+        if not system.brakes_by_place:
+            return self.rate
+
+        def at(end: Reals, start: Reals) -> tuple[Reals, Reals, Reals]:
+            rate, bend = system.friction_at(end[:1] if varied else end)
+            lost = np.zeros_like(end)
+            bent = bend * (end - start)[: len(bend)]
+            if varied:
+                lost[1:] = bent * end[1:]
+            return rate, bent, lost
+
+        return at
 
     @cached_property
     def fields(self) -> tuple[tuple[Term, ...], ...]:
@@ -111,7 +131,7 @@ class Law:
             parts=tuple(forces(part) for part in (system.slow, system.fast, *self.fields)),
             turns=self.turns,
             stiffness=slope if slope and callable(self.stiffness) else self.stiffness,
-            rate=self.rate,
+            rate=self.rates(varied=varied),
             met=met,
             near=near,
             draws=draws,

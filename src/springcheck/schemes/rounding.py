@@ -30,6 +30,14 @@ class Met:
     joined: bool = False
     q: Reals | None = None
     pull: Reals | None = None
+    friction: tuple[Reals, Reals] | None = None
+    """Rates of friction there, and their derivatives (..., n), where it depends on the position."""
+
+    def bent_by(self, more: Reals) -> Met:
+        """With more stiffness (..., n) [M/T2] of each particle by itself."""
+        if not self.joined:
+            return replace(self, stiffness=self.stiffness + more)
+        return replace(self, stiffness=self.stiffness + more[..., None] * np.eye(more.shape[-1]))
 
 
 def magnitude_step(
@@ -97,6 +105,8 @@ def _tableau(
         past = [float(c) * h for c in row[: len(forces)]]
         qs, ps = weighted_sum(q, np.abs(past), velocities), weighted_sum(p, np.abs(past), forces)
         own = float(row[len(forces)]) * h
+        if here.friction is not None:
+            slowing = here.friction[0]
         if here.q is None or here.pull is None:
             end = None
         else:
@@ -107,6 +117,8 @@ def _tableau(
             if end is not None:
                 fastest = p + np.abs(end - start[1])
                 way = np.abs(end), q + size * fastest / m, fastest
+            if here.friction is not None and end is not None:
+                here = here.bent_by(here.friction[1] * end)
             pull = _implicit_stage(here, way, qs, ps, np.abs(own), m, np.abs(1 + own * slowing))
             ps = (ps + np.abs(own) * pull) / np.abs(1 + own * slowing)
         else:

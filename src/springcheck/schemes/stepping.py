@@ -16,6 +16,9 @@ from springcheck.schemes.kinds import Acting, Setting
 Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]
 """Positions (..., n) -> second derivatives there, and whether as matrices (..., n, n) instead of (..., n)."""
 
+Rate: TypeAlias = "Reals | Callable[[Reals, Reals], tuple[Reals, Reals, Reals]]"
+"""Rates of friction (n,) [1/T], or a function of where an implicit stage ends and starts: see `Law.rates`."""
+
 
 def weighted_sum(start: Reals, coefficients: Iterable[Any], values: Sequence[Reals]) -> Reals:
     """start plus the sum of c x; a coefficient of 0 adds nothing, whatever x is."""
@@ -34,7 +37,7 @@ def step(
     m: Reals,
     force: Force,
     stiffness: Reals | Slope | None = None,
-    rate: Reals | None = None,
+    rate: Rate | None = None,
     parts: tuple[Force, ...] | None = None,
     turns: Reals | None = None,
     met: list[Reals] | None = None,
@@ -48,7 +51,8 @@ def step(
     Implicit schemes need `stiffness`, the second derivatives of the potential: (n, n), or (n,) where no
     particle is joined to another; or a function of the position, where that bends.  Double precision is
     enough, because it only steers an iteration whose residual has the full width.  `rate` is
-    `System.friction_rates`, left out where nothing is damped; `parts` are the forces of the slow and the fast
+    `System.friction_rates`, left out where nothing is damped, or for stages without an exponential of it a
+    function of the position; `parts` are the forces of the slow and the fast
     springs, for the schemes that part them, and of magnetic fields, which turn velocities at the rates
     `turns` (n,).  `met` takes the position (..., n) of each evaluation of the
     force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
@@ -60,7 +64,7 @@ def step(
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
-        rate = None if rate is None else rate.astype(width)
+        rate = None if rate is None or callable(rate) else rate.astype(width)
         last, each = np.zeros_like(p), iter(() if draws is None else draws)
         drifts = [kind.drifts for kind in scheme.kinds]
         for i, (kind, (_, c)) in enumerate(zip(scheme.kinds, scheme.stages, strict=True)):
@@ -144,22 +148,33 @@ def _implicit_stage(
     m: Reals,
     force: Force,
     stiffness: Reals | Slope,
-    rate: Reals | None,
+    rate: Rate | None,
     *,
     guess: Reals,
 ) -> tuple[Reals, Reals]:
     """Solve Q = q + x P/m, P = p + x F(Q, P) by Newton's iteration on Q.
 
-    Friction is linear in P: P (1 + x rate) = p + x F(Q, 0), so it needs no iteration of its own.
+    Friction is linear in P: P (1 + x rate) = p + x F(Q, 0), so it needs no iteration of its own.  One that
+    depends on Q has that equation multiplied by 1 + x rate, which may vanish on the way: a polynomial in Q.
     """
     none = np.zeros_like(p)
-    slowed = 1 if rate is None else 1 + x * rate.astype(q.dtype)
+    slowed: Any = 1
+    if rate is not None and not callable(rate):
+        slowed = 1 + x * rate.astype(q.dtype)
     factor = x * x / (m * slowed)
     eps = np.finfo(q.dtype).eps
     scale = np.abs(q) + np.abs(x * p / m)
     last: Reals = np.full_like(q, np.inf)
-    for _ in range(50):
-        residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
+    done = np.zeros(np.shape(q), bool)
+    for count in range(MOST_NEWTON_STEPS):
+        if callable(rate):
+            if count == MOST_NEWTON_STEPS // 2:
+                guess = _bracketed(lambda at: _braked(at, q, p, x, m, force, rate)[0], guess)
+            lacks, steep, size = _braked(guess, q, p, x, m, force, rate)
+            residual, factor = lacks / steep, x * x / (m * steep)
+            done = np.abs(lacks) <= 2 * eps * size
+        else:
+            residual = guess - q - x * ((p + x * force(guess, none)) / slowed) / m
         k, joined = stiffness(guess) if callable(stiffness) else (stiffness, stiffness.ndim == 2)
         change = _newton(residual, k, joined, factor)
         guess = guess - change
@@ -168,10 +183,47 @@ def _implicit_stage(
         going = (off > 4 * eps * np.abs(guess)) & (
             (off < last / 2) | (off > 1e3 * eps * (scale + np.abs(guess)))
         )
-        if not np.any(going & np.isfinite(off)):
+        if not np.any(going & np.isfinite(off) & ~done):
             break
         last = off
+    if callable(rate):
+        braked, _, lost = rate(guess, q)
+        slowed, p = 1 + x * braked, p - m * lost
     return guess, np.asarray((p + x * force(guess, none)) / slowed)
+
+
+MOST_NEWTON_STEPS = 50
+
+
+def _braked(
+    at: Reals, q: Reals, p: Reals, x: Any, m: Reals, force: Force, rate: Callable[..., Any]
+) -> tuple[Reals, Reals, Reals]:
+    """What a stage's end `at` lacks, times 1 + x rate, its derivative but for the stiffness, and the size of
+    what cancels in it, (..., n)."""
+    braked, bent, lost = rate(at, q)
+    slowed, moved, kick = 1 + x * braked, at - q, x * force(at, np.zeros_like(p))
+    lacks = moved * slowed + x * (lost - (p + kick) / m)
+    felt = np.abs(slowed) * (np.abs(at) + np.abs(q)) + np.abs(moved) * (1 + np.abs(x * braked))
+    size = felt + np.abs(x) * (np.abs(lost) + (np.abs(p) + np.abs(kick)) / m)
+    return np.asarray(lacks), np.asarray(slowed + x * bent), np.asarray(size)
+
+
+def _bracketed(lacks: Callable[[Reals], Reals], guess: Reals) -> Reals:
+    """A zero of a function that rises in the large, component by component: the next one in its direction.
+
+    Where a solution ceases to exist, as at a fold, Newton's iteration from there is thrown to and fro.
+    """
+    sign, near = np.sign(lacks(guess)), guess
+    width: Reals = np.maximum(np.abs(guess), np.finfo(guess.dtype).tiny) / 1024
+    for _ in range(64):
+        on = np.sign(lacks(guess - sign * width)) == sign
+        near, width = np.where(on, guess - sign * width, near), np.where(on, 2 * width, width)
+    far = guess - sign * width
+    for _ in range(64):
+        middle = (near + far) / 2
+        on = np.sign(lacks(middle)) == sign
+        near, far = np.where(on, middle, near), np.where(on, far, middle)
+    return np.asarray(far)
 
 
 def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> Reals:

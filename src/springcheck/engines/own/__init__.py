@@ -7,6 +7,7 @@ are there for whoever names them, in a scene's `include` or by `--method`.
 from __future__ import annotations
 
 from springcheck.engines.contract import (
+    BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_POTENTIAL,
@@ -46,11 +47,11 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
-        return SPRINGS | {"damping"}
+        return SPRINGS | BRAKES | {"damping"}
     kicked = all(kind.drifts or kind.evaluates == "all" for kind in scheme.kinds)
     if scheme.has("explicit") and kicked and not scheme.has("mixes"):
         # a field is a force like any other
-        return EVERY_FORCE | FIELD | (RODS if scheme.has("symplectic", "splitting") else frozenset())
+        return EVERY_FORCE | FIELD | BRAKES | (RODS if scheme.has("symplectic", "splitting") else frozenset())
     # rods hold after every stage of a splitting
     return EVERY_FORCE | RODS if scheme.has("symplectic", "splitting") else EVERY_FORCE
 

@@ -24,7 +24,7 @@ class Vectors:
         self._scheme, self._h, self._m = scheme, step, scene.m
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._law = Law(scheme=scheme, scene=scene, h=step)
-        self._hold = system.rods
+        self._hold, self._rates = system.rods, self._law.rates()
         moving = system.is_damped or bool(self._law.fields)
         self._force = _kept(system.force, moving)
         self._parts = tuple(
@@ -40,7 +40,7 @@ class Vectors:
                     self._done += 1
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
-                        rate=self._law.rate, parts=self._parts, stiffness=self._law.stiffness,
+                        rate=self._rates, parts=self._parts, stiffness=self._law.stiffness,
                         turns=self._law.turns, hold=self._hold,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from springcheck.engines.contract import (
+    BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
@@ -14,7 +15,7 @@ from springcheck.engines.contract import (
     named,
 )
 
-_TERMS = EVERY_FORCE | DRIVEN | FIELD
+_TERMS = EVERY_FORCE | DRIVEN | FIELD | BRAKES
 _SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 
 ENGINE = Engine(

@@ -172,7 +172,7 @@ class _Solver:
                 np.add(yp, pull, out=yp)
 
         def jacobian(t: float, y: Floats, yp: Floats, jacobian: Floats) -> None:
-            jacobian[:] = slope if as_matrix else slopes(t, y[:n])
+            jacobian[:] = slope if as_matrix else slopes(t, y[:n], y[n:])
 
         self._n, self._step, self._done = n, step, 0
         atol = absolute_tolerance(scene)

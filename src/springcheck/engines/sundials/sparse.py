@@ -22,6 +22,10 @@ def options(scene: Scene) -> dict[str, Any]:
     for i, j, _ in scene.system.elements(scene.q):
         rows.append(n + i)
         columns.append(j)
+    by_place = scene.system.brakes_by_place
+    if by_place:
+        rows.append(n + np.arange(n))
+        columns.append(np.arange(n))
     where = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
     constant: list[Reals] = [1 / scene.m, -scene.system.friction_rates.astype(np.float64)]
 
@@ -31,6 +35,10 @@ def options(scene: Scene) -> dict[str, Any]:
 
     def jacobian(t: float, y: Floats, yp: Floats, out: Floats) -> None:
         values = [*constant, *(-k for *_, k in scene.system.elements(y[:n]))]
+        if by_place:
+            rate, bend = scene.system.friction_at(y[:n])
+            values[1] = -rate
+            values.append(-bend * y[n:])
         out[:] = matrix(np.concatenate(values)).data
 
     pattern = matrix(np.ones(len(where[0])))

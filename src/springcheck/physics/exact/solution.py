@@ -63,6 +63,13 @@ class Solution:
         # infinite where the motion itself is; never no number
         return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
 
+    @property
+    def growth(self) -> float | None:
+        """The largest derivative of the flow between two times, in the energy norm; None where some law does
+        not know it."""
+        each = [group.law.growth and group.law.growth(group.system, group.found) for group in self.groups]
+        return None if None in each else max(x for x in each if x is not None)
+
 
 class SolvedSystem(System[Fields]):
     """The facts of one scene, its normal modes and its exact motion among them."""
@@ -102,6 +109,11 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
 
         if ready := LUMPED.prepare(system):
             return Solution(n=system.n, groups=(everything(found=ready, law=LUMPED),))
+    laws = [QUARTIC, COSINE, MORSE, ROD, WALL_ROD, RIGID, linear.LINEAR]
+    if system.brakes_by_place:
+        from springcheck.physics.exact.relaxation import VAN_DER_POL
+
+        laws.insert(0, VAN_DER_POL)
     found: list[_Group] = []
     nothing = np.zeros(system.n, dtype=bool)
     acting = system.acting
@@ -110,7 +122,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
         acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
-        for law in (QUARTIC, COSINE, MORSE, ROD, WALL_ROD, RIGID, linear.LINEAR):
+        for law in laws:
             others = (here for key, here in acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
             mine = left if law is linear.LINEAR else acting.get(law.key, nothing) & ~other

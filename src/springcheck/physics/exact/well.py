@@ -35,6 +35,9 @@ class Well:
     """A scene, what was worked out of it, and times t (f, 1) [T] -> q and p (f, n)."""
     doubt: Callable[[System[Any], Any, np.longdouble], States]
     """The same and one time -> bounds (n,) of the errors of q and p from the start to then."""
+    growth: Callable[[System[Any], Any], float] | None = None
+    """A scene and what was worked out of it -> the largest derivative of the flow between two times of it, in
+    the energy norm, where the law knows it."""
 
 
 def wide(x: Any) -> Extended:

@@ -1,8 +1,9 @@
 """What stiffness costs: steps, force calls and error of every method as two scales move apart.
 
-Two families: the chain of a soft and a stiff spring (the shipped `two-scales` with another ratio of
-stiffnesses), and a spring in ever more friction (`overdamped` with another damping ratio).  Every run
-goes as far as the slow motion needs to show; the error is that of the slow motion at the end.
+Three families: the chain of a soft and a stiff spring (the shipped `two-scales` with another ratio of
+stiffnesses), a spring in ever more friction (`overdamped` with another damping ratio), and `van-der-pol`
+with another mu.  Every run goes as far as the slow motion needs to show; the error is that of the slow
+motion at the end.
 """
 
 from __future__ import annotations
@@ -20,13 +21,21 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 
-Family = Literal["two-scales", "overdamped"]
+Family = Literal["two-scales", "overdamped", "van-der-pol"]
 
 RATIOS: dict[Family, tuple[float, ...]] = {
     "two-scales": tuple(10.0**e for e in range(0, 13, 2)),
     "overdamped": tuple(10.0**e for e in range(7)),
+    "van-der-pol": tuple(10.0**e for e in range(7)),
 }
-"""Stiffness ratios, and damping ratios c / (2 sqrt(k m))."""
+"""Stiffness ratios, damping ratios c / (2 sqrt(k m)), and mu = c / sqrt(k m)."""
+
+RATIO_NAMES: dict[str, str] = {
+    "two-scales": "stiffness ratio",
+    "overdamped": "damping ratio",
+    "van-der-pol": "mu",
+}
+"""What the ratios of a family are called."""
 
 OUTPUTS = 2000
 """Steps of a method that no fast mode holds down."""
@@ -72,6 +81,11 @@ def scene(family: Family, ratio: float) -> Scene:
     if family == "two-scales":
         stiff: Any = replace(second, k=first.k * ratio)  # type: ignore[attr-defined, type-var]
         end = 8.0
+    elif family == "van-der-pol":
+        c = ratio * np.sqrt(first.k * found.m)  # type: ignore[attr-defined]
+        stiff = replace(second, c=c)  # type: ignore[type-var]
+        # a period and a quarter, which ends on a slow arc
+        end = float(2 * np.pi * np.sqrt(found.m[0] / first.k[0]) + 2 * c[0] / first.k[0])  # type: ignore[attr-defined]
     else:
         c = 2 * ratio * np.sqrt(first.k * found.m)  # type: ignore[attr-defined]
         stiff = replace(second, c=c)  # type: ignore[type-var]
@@ -86,11 +100,15 @@ def step_for(found: Scene, label: Label) -> float:
     scheme = schemes.scheme(engines.method(label).scheme)
     held = found.step
     if np.isfinite(scheme.limit):
-        fastest = float(np.sqrt(np.max(found.system.modes.w2)))
-        held = min(held, (scheme.limit / 2 or 0.1) / fastest)
+        modes = (
+            found.system.modes.w2
+            if found.system.has_modes
+            else found.system.hessian_diagonal(found.q) / found.m
+        )
+        held = min(held, (scheme.limit / 2 or 0.1) / float(np.sqrt(np.max(modes))))
         if not any(kind.friction for kind in scheme.kinds) and found.system.is_damped:
             # friction in the force of an explicit method: h c/m < 2
-            held = min(held, 0.5 / float(np.max(found.system.friction_rates)))
+            held = min(held, 0.5 / float(np.max(found.system.friction_at(found.q)[0])))
     return held
 
 
@@ -148,6 +166,10 @@ def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
 
 def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
     """Distance of a state from the true slow motion at the end, in units of the slow amplitude."""
+    if not found.system.has_modes:
+        # a relaxation oscillation starts at its amplitude
+        true_q, _ = exact.true_motion(found, np.array([steps]), found.step)
+        return float(np.max(np.abs(q - true_q[0])) / np.max(np.abs(found.q)))
     modes = found.system.modes
     j = int(np.argmin(modes.w2))
     w = np.sqrt(modes.w2[j])

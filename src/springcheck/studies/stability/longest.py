@@ -72,7 +72,10 @@ def stiffest(scene: Scene) -> Floats:
     here = q[np.isfinite(q).all(axis=-1)].astype(np.float64)
     if not len(here):
         return np.asarray(scene.q)
-    return np.asarray(here[int(np.argmax([_largest(system, at) for at in here]))])
+    stiff = np.array([_largest(system, at) for at in here])
+    if system.brakes_by_place:
+        stiff = stiff + np.max(np.maximum(system.friction_at(here)[0], 0), axis=-1) ** 2
+    return np.asarray(here[int(np.argmax(stiff))])
 
 
 def _largest(system: System[Scene], q: Floats) -> float:
@@ -106,9 +109,9 @@ def fastest(scene: Scene) -> float:
 
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at, and
-    in a magnetic field, which is no stiffness."""
+    in a magnetic field, which is no stiffness, and where friction that depends on positions joins them."""
     system = scene.system
-    if "magnetic" in system.acting:
+    if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
@@ -128,7 +131,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
         return Linear.of_modes(modes.w2[some], rate[some])
     here = stiffest(scene)
     if system.is_separate:
-        return Linear.of_modes(system.hessian_diagonal(here) / system.m, system.friction_rates)
+        return Linear.of_modes(system.hessian_diagonal(here) / system.m, system.friction_at(here)[0])
     w2 = np.array([_largest(system, here)])
     if scene.n <= MOST_DENSE:
         w2 = np.linalg.eigvalsh(_scaled(system, here).astype(np.float64))

@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
-from springcheck.studies.stability.costs import Cost
+from springcheck.studies.stability.costs import RATIO_NAMES, Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.regions import Region
@@ -127,7 +127,7 @@ def _resonance(x: Resonance) -> Chart:
 
 
 def _costs(costs: Sequence[Cost]) -> list[Chart]:
-    ratio = "stiffness ratio" if costs[0].family == "two-scales" else "damping ratio"
+    ratio = RATIO_NAMES[costs[0].family]
     what: tuple[tuple[str, str, Callable[[Cost], bool]], ...] = (
         ("steps", "steps; those of unfinished runs are estimates", lambda x: True),
         ("force_calls", "force calls of finished runs", lambda x: x.outcome == "complete"),

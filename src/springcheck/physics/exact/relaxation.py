@@ -1,0 +1,254 @@
+"""Van der Pol's oscillator in extended precision: without a closed form, it is integrated once for all times.
+
+With u = (q - at)/width it is u'' = (g (1 - u**2) - r) u' - w2 (u - u0), stiff by g**2/w2.  The velocities
+at the nodes of Radau IIA are solved for (Hairer & Wanner, Solving ODEs II, IV.8): on the slow arcs, where
+its terms cancel, the equation keeps all digits of u', and steps pass over whatever has died out.  They are
+as long as the series of u' in Legendre polynomials ends in roundings.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.exact.well import LAST, States, Well, wide
+from springcheck.physics.system import System
+from springcheck.physics.vanderpol import VanDerPol
+
+RADAU_STAGES = 16
+LATENESS = LAST / 4
+"""Relative error of the time; `validation/van_der_pol.py` finds errors of at most 0.075 of what follows."""
+SERIES_TAIL = 32 * EPS
+"""Part of the largest coefficient of a step's series that its last two may have."""
+MOST_RADAU_STEPS = 20_000
+MOST_RADAU_CORRECTIONS = 40
+
+
+class _Rule(NamedTuple):
+    """Nodes c (s,) on [0, 1], A (s, s), and what makes coefficients of values (s, s)."""
+
+    nodes: Extended
+    a: Extended
+    series: Extended
+
+
+class _Law(NamedTuple):
+    """g, r, w2 and u0 of one particle."""
+
+    g: np.longdouble
+    r: np.longdouble
+    w2: np.longdouble
+    centre: np.longdouble
+
+
+class _Path(NamedTuple):
+    """One particle: the ends of its steps t (j + 1,), u at their starts (j,), and the series of u' (j, s)."""
+
+    at: np.longdouble
+    width: np.longdouble
+    start: tuple[float, float]
+    t: Extended
+    u: Extended
+    series: Extended
+    fastest: tuple[float, float, float]
+    """The largest |u|, |u'| and |u''| on the way."""
+    growth: float
+    """The largest |D phi| between any two ends of steps, in the energy norm."""
+
+
+class _Met(NamedTuple):
+    """u, u' and u'' at the nodes of a step (s,), and the derivative of its end by its start (2, 2)."""
+
+    u: Extended
+    v: Extended
+    push: Extended
+    tangent: Floats
+
+
+def _legendre(x: Extended, count: int) -> Extended:
+    """P_0 to P_(count - 1) at x (...,) -> (..., count)."""
+    found = [np.ones_like(x), x]
+    for j in range(1, count - 1):
+        found.append(((2 * j + 1) * x * found[j] - j * found[j - 1]) / (j + 1))
+    return np.stack(found[:count], axis=-1)
+
+
+def _integrals(x: Extended, count: int) -> Extended:
+    """Their integrals from -1 to x (..., count)."""
+    p, j = _legendre(x, count + 1), np.arange(1, count)
+    return np.concatenate([x[..., None] + 1, (p[..., 2:] - p[..., :-2]) / (2 * j + 1)], axis=-1)
+
+
+@lru_cache(maxsize=1)
+def _rule() -> _Rule:
+    s = RADAU_STAGES
+    ends = np.zeros(s + 1)
+    ends[-2:] = -1, 1
+    x = np.sort(np.polynomial.legendre.legroots(ends)).astype(np.longdouble)
+    x[-1] = 1
+    for _ in range(4):
+        p = _legendre(x[:-1], s + 1)
+        # (x**2 - 1) P_s' = s (x P_s - P_(s-1))
+        slopes = [n * (x[:-1] * p[:, n] - p[:, n - 1]) for n in (s, s - 1)]
+        x[:-1] -= (p[:, s] - p[:, s - 1]) * (x[:-1] ** 2 - 1) / (slopes[0] - slopes[1])
+    p = _legendre(x, s)
+    series = np.linalg.inv(p.astype(np.float64)).astype(np.longdouble)
+    for _ in range(3):
+        series = np.asarray(series @ (2 * np.eye(s) - p @ series), np.longdouble)
+    return _Rule((1 + x) / 2, wide(_integrals(x, s) @ series / 2), series)
+
+
+def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
+    """A step of h from (u, v), None where Newton's iteration does not get there."""
+    rule = _rule()
+    found, last = guess, np.inf
+    # near u = 1 the brake is nearly 0, and feels the rounding of u: let it be the same one at all nodes
+    first = law.g * ((1 - u) * (1 + u)) - law.r
+    for _ in range(MOST_RADAU_CORRECTIONS):
+        moved = h * (rule.a @ found)
+        at = u + moved
+        brake = first - law.g * (moved * (2 * u + moved))
+        push = brake * found - law.w2 * (at - law.centre)
+        residual = found - v - h * (rule.a @ push)
+        steep = -2 * law.g * at * found - law.w2
+        reach = np.asarray(h * rule.a, np.float64)
+        matrix = np.eye(RADAU_STAGES) - reach @ (np.diag(brake) + steep[:, None] * reach).astype(np.float64)
+        scale = np.max(np.abs(residual))
+        if not np.isfinite(scale):
+            return None
+        if scale:
+            change = np.linalg.solve(matrix, (residual / scale).astype(np.float64)) * scale
+            found = found - change
+        else:
+            change = np.zeros(1)
+        off, size = float(np.max(np.abs(change))), float(np.max(np.abs(found)))
+        if off <= 4 * EPS * size or (off <= 64 * EPS * size and off > last / 4):
+            # what Newton's iteration makes of a change of u and of v at the start
+            by = np.linalg.solve(
+                matrix, np.stack([reach @ steep, np.ones(RADAU_STAGES)], axis=-1).astype(np.float64)
+            )
+            return _Met(at, found, push, np.stack([np.eye(2)[0] + reach[-1] @ by, by[-1]]))
+        last = off
+    return None
+
+
+@lru_cache(maxsize=8)
+def _path(law: _Law, u: Any, v: Any, end: Any) -> tuple[Any, ...] | None:
+    """Ends of the steps up to a time, u at their starts, series of u', the largest |u|, |u'|, |u''|, and the
+    derivatives of the ends of steps by their starts (j, 2, 2)."""
+    t, ts = wide(0), [wide(0)]
+    us: list[Any] = []
+    rows: list[Extended] = []
+    maps: list[Floats] = []
+    rate = abs(law.g) * (1 + u * u) + abs(law.r) + np.sqrt(abs(law.w2))
+    h, rule = 1 / np.where(rate > 0, rate, 1), _rule()
+    most = [abs(u), abs(v), np.longdouble(0)]
+    series, before = np.zeros(RADAU_STAGES, np.longdouble), wide(0)
+    while t < end:
+        if len(rows) == MOST_RADAU_STEPS or not t + h > t:
+            return None
+        guess = np.full(RADAU_STAGES, v)
+        if before > 0 and h <= 2 * before:
+            guess = _legendre(1 + 2 * rule.nodes * h / before, RADAU_STAGES) @ series
+        met = _step(law, u, v, h, guess) or _step(law, u, v, h, np.full(RADAU_STAGES, v))
+        if met is None:
+            h = h / 4
+            continue
+        of = rule.series @ met.v
+        tail = np.max(np.abs(of[-2:])) / np.max(np.abs(of))
+        factor = 0.9 * (SERIES_TAIL / np.maximum(tail, SERIES_TAIL / 1e12)) ** (1 / (RADAU_STAGES - 1))
+        if tail > 4 * SERIES_TAIL:
+            h = h * np.clip(factor, 0.1, 0.9)
+            continue
+        ts.append(t + h)
+        us.append(u)
+        rows.append(of)
+        maps.append(met.tangent)
+        most = [max(x, np.max(np.abs(y))) for x, y in zip(most, met[:3], strict=True)]
+        t, u, v, series, before = wide(t + h), met.u[-1], met.v[-1], wide(of), wide(h)
+        h = h * np.clip(factor, 0.3, 3)
+    return np.stack(ts), np.stack(us), np.stack(rows), tuple(float(x) for x in most), np.stack(maps)
+
+
+def _growth(maps: Floats, w: float) -> float:
+    """The largest |D phi| of steps in a row, from each start to each later end, on (w u, v)."""
+    scaled = maps * np.array([[1, w], [1 / w, 1]])
+    whole, most = np.empty((0, 2, 2)), 1.0
+    for one in scaled:
+        whole = np.asarray(one @ np.concatenate([whole, np.eye(2)[None]]), np.float64)
+        most = max(most, float(np.sqrt(np.max(np.sum(whole**2, axis=(1, 2))))))
+    return most
+
+
+def prepare(system: System[Any]) -> tuple[_Path, ...] | None:
+    """None where a particle has more than one such friction, and backwards in time, where it blows up."""
+    found: list[_Path] = []
+    term = next(term for term in system.terms if isinstance(term, VanDerPol))
+    if system.scene.step < 0 or len(term) != system.n or len(np.unique(term.i)) < system.n:
+        return None
+    none = np.zeros(system.n, np.longdouble)
+    springs = system.potential_force(none, none)
+    k = system.hessian_diagonal(none)
+    for i, c, width, at in sorted(term.rows()):
+        m, wall, wide_at = (np.longdouble(x) for x in (system.m[i], width, at))
+        w2 = k[i] / m
+        # the force at `at`, in units of the stiffness: where the springs rest
+        centre = (springs[i] / k[i] - wide_at) / wall if k[i] else np.longdouble(0)
+        if not k[i] and springs[i]:
+            return None
+        law = _Law(np.longdouble(c) / m, system.friction_rates[i], w2, centre)
+        start = float(system.q[i]), float(system.p[i])
+        u, v = (system.q[i] - wide_at) / wall, np.longdouble(system.p[i]) / m / wall
+        if u == centre and v == 0:
+            return None
+        done = _path(law, u, v, np.longdouble(system.scene.step) * system.scene.steps)
+        if done is None:
+            return None
+        t, us, series, most, maps = done
+        slow = float(np.sqrt(np.abs(w2))) or 1 / float(t[-1])
+        found.append(_Path(wide_at, wall, start, t, us, series, most, _growth(maps, slow)))
+    return tuple(found)
+
+
+def motion(system: System[Any], found: tuple[_Path, ...], t: Extended) -> States:
+    """Exact q and p (f, n) at times t (f, 1) [T]; not known beyond the end of the scene."""
+    q, p = np.full((2, len(t), system.n), np.nan, dtype=np.longdouble)
+    for i, path in enumerate(found):
+        inside = np.flatnonzero((t[:, 0] >= 0) & (t[:, 0] <= path.t[-1]))
+        times = t[inside, 0]
+        j = np.clip(np.searchsorted(path.t, times) - 1, 0, len(path.u) - 1)
+        h = path.t[j + 1] - path.t[j]
+        x = 2 * (times - path.t[j]) / h - 1
+        series = path.series[j]
+        u = path.u[j] + h / 2 * np.sum(series * _integrals(x, RADAU_STAGES), axis=-1)
+        q[inside, i] = path.at + path.width * u
+        p[inside, i] = path.width * np.sum(series * _legendre(x, RADAU_STAGES), axis=-1) * system.m[i]
+        q[t[:, 0] == 0, i], p[t[:, 0] == 0, i] = path.start
+    return q, p
+
+
+def doubt(system: System[Any], found: tuple[_Path, ...], t: np.longdouble) -> States:
+    """Bounds (n,) of the errors of `motion`: those of its size, and a time known to `LATENESS`."""
+    u, v, a = (np.array([path.fastest[j] * float(path.width) for path in found]) for j in range(3))
+    late = LATENESS * np.abs(t)
+    return np.asarray(LAST * u + late * v), np.asarray((LAST * v + late * a) * system.m)
+
+
+def growth(system: System[Any], found: tuple[_Path, ...]) -> float:
+    """The largest |D phi| of the exact flow between two times of the scene, in the energy norm."""
+    return max(path.growth for path in found)
+
+
+VAN_DER_POL = Well(
+    key="van-der-pol",
+    terms=frozenset({"van-der-pol", "wall-spring", "damping"}),
+    prepare=prepare,
+    motion=motion,
+    doubt=doubt,
+    growth=growth,
+)
+"""Single particles with such a friction, on springs to walls."""

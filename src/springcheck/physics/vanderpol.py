@@ -1,0 +1,77 @@
+"""Van der Pol's friction: it feeds small swings and brakes large ones, and every motion ends in one cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.term import Column, Origin, Term
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VanDerPol(Term):
+    """Friction of particles i that their place decides: force c (1 - ((q - at)/width)**2) v.
+
+    c [M/T], width and at [L].  On a spring k, m q'' = c (1 - x**2) q' - k q has mu = c/sqrt(k m).
+    B. van der Pol, Phil. Mag. 2 (1926) 978.
+    """
+
+    key: ClassVar[str] = "van-der-pol"
+    formula: ClassVar[str] = "force c (1 - ((q - at)/width)**2) p/m"
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("coefficient", "c", sign="nonnegative", single=False),
+        Column("width", "width", 1.0, sign="positive", single=False),
+        Column("at", "at", 0.0, single=False),
+    )
+    ends: ClassVar[tuple[str, ...]] = ("i",)
+    kind: ClassVar[Origin] = "friction"
+    i: Integers
+    c: Floats
+    width: Floats
+    at: Floats
+
+    @staticmethod
+    def potential(u: Reals, *_: Floats) -> Reals:
+        return np.zeros_like(u)
+
+    @staticmethod
+    def second(u: Reals, c: Floats, *_: Floats) -> Reals:
+        return np.zeros_like(c)
+
+    def resistance(self, q: Reals) -> tuple[Reals, Reals]:
+        """What the velocity is multiplied by to give the brake, and its derivative by q: (..., s) each
+        [M/T]."""
+        x = (np.take(q, self.i, axis=-1) - self.at) / self.width
+        # (x - 1) (x + 1) keeps its digits where the friction changes its sign
+        return np.asarray(self.c * ((x - 1) * (x + 1))), np.asarray(2 * self.c * x / self.width)
+
+    def add_rates(self, q: Reals, m: Floats, out: tuple[Reals, Reals]) -> None:
+        """Add the same over the masses m (n,) to the numbers of each particle (..., n): see
+        `System.friction_at`."""
+        for values, each in zip(self.resistance(q), out, strict=True):
+            self.scatter(values / m[self.i].astype(q.dtype), each)
+
+    def pull(self, q: Reals) -> Reals:
+        return np.zeros((*q.shape[:-1], len(self)), q.dtype)
+
+    def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
+        self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
+
+    def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
+        brake, bend = self.resistance(q)
+        v, dq, dv = (np.take(x, self.i, axis=-1) for x in (v, dq, dv))
+        self.add_pull(brake * dv + bend * v * dq, out)
+
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        x = (np.abs(np.take(q if near is None else near, self.i, axis=-1)) + np.abs(self.at)) / self.width
+        # a rounding of the place is felt twice in its square
+        self.scatter(self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1)), out)
+
+    def scaled(self, factor: float | Floats) -> Any:
+        """Itself: friction is no part of the potential."""
+        return self
