@@ -189,16 +189,12 @@ def grid_of(counts: tuple[int, ...], value: Callable[..., Any]) -> tuple[Any, di
     return found, {**dict(zip(names, cells, strict=True)), "max_error": value(*cells)}
 
 
-def test_every_cell_of_a_grid_stands_in_its_map_and_the_tiles_touch() -> None:
+def test_every_cell_of_a_grid_stands_in_its_map() -> None:
     found, cells = grid_of((5, 4), lambda a, b: a + 1000 * b)
     (choice,) = shown.choices(found, "max_error")
     part = shown.reduced(cells, found, choice)
     assert isinstance(part, shown.Map)
     np.testing.assert_allclose(part.values, part.x + 1000 * part.y[:, None], rtol=1e-14)
-    u, v = shown.edges(part.x), shown.edges(part.y)
-    # on a logarithmic axis a tile reaches as many times over its cell as below it
-    np.testing.assert_allclose(u[1:] * u[:-1], part.x**2, rtol=1e-13)
-    np.testing.assert_allclose((v[1:] + v[:-1]) / 2, part.y, atol=1e-15)
 
 
 def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
@@ -263,7 +259,8 @@ def test_a_figure_says_what_was_found_and_where_the_limit_is() -> None:
     two = ["own:euler", "own:velocity-verlet"]
     found = springcheck.ensemble("spring", {"time.step": "0.5:2.5:9"}, two)
     figure = found.figures()["ensemble-max_error"]
-    assert figure.get_suptitle() == "largest error over step h; own:velocity-verlet has the smallest"
+    title = " ".join(figure.get_suptitle().split())
+    assert title.startswith("Mass on a spring: largest error over step h; smallest by own:velocity-verlet, ")
     (axes,) = figure.axes
     assert axes.get_xlabel() == "step h"
     limit = next(line for line in axes.lines if line.get_color() == "#b00020")
@@ -272,5 +269,7 @@ def test_a_figure_says_what_was_found_and_where_the_limit_is() -> None:
         "spring", {"spring.0.stiffness": [1, 9, 25], "time.step": [0.1, 0.5, 0.9]}, two
     )
     curve = grid.figures()["ensemble-max_error"].axes[0].lines[0]
-    k, h = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    k = np.interp(np.asarray(curve.get_xdata(), float), [0, 1, 2], [1, 9, 25])
+    h = np.interp(np.asarray(curve.get_ydata(), float), [0, 1, 2], [0.1, 0.5, 0.9])
+    assert len(k) > 9
     np.testing.assert_allclose(h * np.sqrt(k), 2, rtol=1e-12)

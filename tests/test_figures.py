@@ -14,14 +14,14 @@ import pytest
 from springcheck import driver, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
-from springcheck.figures import chain, looks, overlay
+from springcheck.figures import chain, energies, looks, overlay, render
 from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.attached import ATTACHED
-from springcheck.studies.run import figure as trajectories
+from springcheck.studies.run.page import of_runs
 
 mpl.use("agg")
 
@@ -30,6 +30,11 @@ OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 
 def runs(scene: Scene, *methods: str) -> dict[str, Trajectory]:
     return {method: driver.run(scene, method) for method in methods}
+
+
+def figures(scene: Scene, made: dict[str, Trajectory], **how: Any) -> dict[str, Any]:
+    """As `plot` draws them, by name."""
+    return {bank.name: render.picture(bank) for bank in of_runs(scene, made, made, **how)}
 
 
 def test_every_scheme_has_a_look_of_its_own() -> None:
@@ -56,8 +61,14 @@ def test_a_run_that_failed_is_drawn_in_red_on_top_of_the_scheme_that_it_breaks()
     right = made["own:semi-implicit-euler"]
     wrong = replace(right, label="stepper:mine", q=right.q * 1.1)
     made = {"stepper:mine": wrong, **made}
-    for figure in trajectories.of_runs(scene, made, made, failed=["stepper:mine"]).values():
-        (line,) = [x for x in figure.axes[0].lines if x.get_label() == "FAILED: stepper:mine"]
+    for figure in figures(scene, made, failed=["stepper:mine"]).values():
+        (line,) = [
+            x
+            for axes in figure.axes
+            for x in axes.lines
+            if x.get_label() == "stepper:mine" and x.get_linestyle() != "None"
+        ][:1]
+        assert "stepper:mine is wrong (red)" in figure.get_suptitle().replace("\n", " ")
         assert line.get_color() == looks.FAILED
         # only marks stand above it
         above = [x for x in figure.axes[0].lines if x.get_zorder() > line.get_zorder()]
@@ -73,8 +84,9 @@ def test_marks_of_runs_that_lie_on_one_another_stand_apart() -> None:
     made = runs(
         scene, *(f"own:{name}" for name in ("euler", "semi-implicit-euler", "velocity-verlet", "rk4"))
     )
-    axes = trajectories.of_runs(scene, made, made)["phase-portrait"].axes[0]
-    first = [x.get_xdata()[0] for x in axes.lines if x.get_label() in made]
+    axes = figures(scene, made)["phase-portrait"].axes[0]
+    marks = [x for x in axes.lines if x.get_label() in made and x.get_linestyle() == "None"]
+    first = [x.get_xdata()[0] for x in marks]
     assert len(first) == len(set(first)) == 4
 
 
@@ -135,7 +147,7 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
     assert looks.members(run.label for run in group.members).split() == [
         looks.mark("own")[1], "own", looks.mark("x")[1], "x", "(2)", looks.mark("y")[1], "y",
     ]  # fmt: skip
-    figure = trajectories.of_runs(scene, same, same)["energy"]
+    figure = figures(scene, same)["energy"]
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 2  # the exact solution, and the scheme
 
@@ -195,7 +207,7 @@ def test_errors_are_distances_from_the_exact_solution() -> None:
     # m = k = 1 from (0, 1): the distance in the plane
     expected = np.hypot(run.q[:, 0] - np.sin(run.t), run.p[:, 0] - np.cos(run.t))
     np.testing.assert_allclose(exact.error(run), expected, rtol=1e-9, atol=1e-15)
-    axes = trajectories.of_runs(scene, {"own:euler": run}, {"own:euler": run})["error"].axes[0]
+    axes = figures(scene, {"own:euler": run})["error"].axes[0]
     np.testing.assert_allclose(np.asarray(axes.lines[0].get_ydata(), float), expected[1:], rtol=1e-9)
 
 
@@ -221,7 +233,7 @@ def test_a_scene_has_the_pictures_that_suit_it(name: str, also: set[str]) -> Non
 
         scene = replace(scene, steps=40)
     made = runs(scene, "own:semi-implicit-euler", "own:euler")
-    found = trajectories.of_runs(scene, made, made)
+    found = figures(scene, made)
     assert set(found) == {"phase-portrait", "position", "energy", "error"} | also
     for picture in found.values():
         for axes in picture.axes:
@@ -231,7 +243,7 @@ def test_a_scene_has_the_pictures_that_suit_it(name: str, also: set[str]) -> Non
 def test_many_periods_are_shown_by_the_first_and_the_last_ones() -> None:
     scene = scenefile.load_scene("stiff-spring")
     made = runs(scene, "own:implicit-euler")
-    figure = trajectories.of_runs(scene, made, made)["position"]
+    figure = figures(scene, made)["position"]
     first, last = (axes.get_xlim() for axes in figure.axes)
     omega = np.sqrt(14800 / 0.37)
     assert (last[1] - last[0]) * omega / (2 * np.pi) == pytest.approx(6, rel=0.15)
@@ -258,15 +270,18 @@ def test_one_particle_is_drawn_beside_the_others_figures(
 def test_a_cell_of_an_ensemble_that_explodes_does_not_set_its_scale(fields: tuple[str, ...]) -> None:
     from types import SimpleNamespace
 
-    from springcheck.studies.ensemble import figure, shown
+    from springcheck.studies.ensemble import page
 
     x = np.arange(1.0, 7.0)
     for error in ([1e-3, 1e-2, 0.1, 1.0, 1e107, 1e300], [-1.0, 0.0, 1e-9, 1.0, 1e107, 1e300]):
-        cells = {"own:euler": {"a": x, "b": x[::-1], "max_error": np.array(error)}}
-        found: Any = SimpleNamespace(fields=fields, grid=True)
-        choice = shown.Choice(quantity="max_error", over=fields)
-        parts = {method: shown.reduced(x, found, choice) for method, x in cells.items()}
-        picture = figure.picture(parts, choice)
+        cells = {"max_error": np.array(error), **dict.fromkeys(fields, x)}
+        found: Any = SimpleNamespace(
+            fields=fields, grid=True, path=Path("a.h5"), scene=scenefile.load_scene("spring"),
+            tallies=[SimpleNamespace(method="own:euler")], of=lambda method, cells=cells: cells,
+        )  # fmt: skip
+        (bank,) = page.banks(found, quantity="max_error")
+        assert "Mass on a spring: largest error over a" in bank.heading
+        picture = render.picture(bank)
         picture.draw_without_rendering()
         limits = [axes.get_ylim()[1] for axes in picture.axes]
         assert len(fields) == 2 or error[0] < 0 or max(limits) <= 1e3
@@ -290,19 +305,76 @@ def test_the_exact_solution_is_a_smooth_line_where_a_stiff_motion_decays_at_once
 def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     scene = scenefile.load_scene("spring")
     made = runs(scene, *OWN)
-    figure = trajectories.of_runs(scene, made, made)["energy"]
-    title = " ".join(figure._suptitle.get_text().split())  # type: ignore[attr-defined]
+    figure = figures(scene, made)["energy"]
+    title = " ".join(figure.get_suptitle().split())
     # (h w)**2 = 0.01
     assert "explicit Euler gains 1 % a step" in title
     assert "implicit Euler loses 0.99 % a step" in title
-    assert "semi-implicit" not in title
+    assert "semi-implicit Euler, kick-drift gains" not in title
+    assert "semi-implicit Euler, kick-drift loses" not in title
+    (title,) = (bank.heading for bank in of_runs(scene, made, made) if bank.name == "phase-portrait")
+    assert "explicit Euler spirals out; implicit Euler spirals in; semi-implicit Euler" in title
+
+
+def test_what_wavers_neither_gains_nor_loses() -> None:
+    n = np.arange(400)
+    assert energies.steady(np.exp(0.01 * n), 1) == pytest.approx(np.expm1(0.01))
+    # 7 % within a period, and it happens to end low
+    assert energies.steady(1 - 0.07 * np.sin(0.0471 * n) ** 2, 1) == 0.0
+    rng = np.random.default_rng(7)
+    assert energies.steady(rng.exponential(size=400), 1) == 0.0
+
+
+def test_no_decade_of_an_error_is_empty_and_every_run_is_in_one_panel() -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    made = runs(scene, *OWN, "sundials:adams")
+    (bank,) = (bank for bank in of_runs(scene, made, made) if bank.name == "error")
+    assert sorted(x.name for chart in bank.charts for x in chart.curves) == sorted(made)
+    for chart in bank.charts:
+        assert chart.y.shown is not None
+        y = np.concatenate([np.asarray(x.y) for x in chart.curves])
+        low, high = (np.log10(x) for x in chart.y.shown)
+        filled = {int(x) for x in np.floor(np.log10(y[y > 0]))}
+        assert set(range(int(np.ceil(low)), int(np.floor(high)))) <= filled
+    # and each curve is named at its end
+    named = {label.text for chart in bank.charts for label in chart.labels}
+    assert {"explicit Euler", "CVODE Adams-Moulton"} <= named
+
+
+def test_frames_too_far_apart_to_be_joined_are_dots() -> None:
+    for name, dots in (("spring", False), ("ch-bond", True)):
+        scene = scenefile.load_scene(name)
+        made = runs(scene, "own:velocity-verlet")
+        bank = of_runs(scene, made, made)[0]
+        (curve,) = (x for x in bank.charts[0].curves if x.name in made)
+        assert curve.dots == dots
+        assert curve.line != dots
+
+
+def test_in_a_bath_every_scheme_has_a_panel_with_the_ring_of_kt_and_its_temperatures() -> None:
+    scene = replace(scenefile.load_scene("bath-spring"), steps=4000)
+    made = {x: driver.run(scene, x, seed=3) for x in ("own:baoab", "own:obabo")}
+    found = {bank.name: bank for bank in of_runs(scene, made, made)}
+    assert set(found) == {"phase-portrait", "position", "energy", "temperature"}
+    assert len(found["phase-portrait"].charts) == 2
+    (ring,) = (x for x in found["phase-portrait"].charts[0].curves if x.group == "guide")
+    q, p = (np.asarray(x)[:, None] for x in (ring.x, ring.y))
+    least = float(np.min(scene.system.energy(q, 0 * p)))
+    energy = scene.system.energy(q, p)
+    np.testing.assert_allclose(energy, least + scene.thermal, rtol=0.01)
+    kinetic = found["temperature"].charts[1]
+    measured = {x.name: float(x.x[0]) for x in kinetic.curves if x.name in made}
+    assert measured["own:baoab"] == pytest.approx(
+        np.mean(made["own:baoab"].p ** 2) / scene.m[0] / scene.thermal, rel=0.3
+    )
 
 
 def test_the_title_of_errors_says_who_is_nearest_and_who_is_farthest() -> None:
     scene = scenefile.load_scene("spring")
     made = runs(scene, *OWN)
-    figure = trajectories.of_runs(scene, made, made)["error"]
+    figure = figures(scene, made)["error"]
     title = " ".join(figure.get_suptitle().split())
-    assert re.search(r"exact solution \S+ by own:semi-implicit-euler to 1\.7e\+00 by own:euler$", title), (
-        title
-    )
+    assert re.search(
+        r"exact solution by at most 4\.9 % \(semi-implicit Euler, kick-drift\) to 171 % \(explicit Euler\)$",
+        title,
+    ), title

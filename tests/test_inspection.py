@@ -22,7 +22,7 @@ import springcheck
 from springcheck import engines, store
 from springcheck.cli import main, output
 from springcheck.errors import StoreError
-from springcheck.figures import overlay
+from springcheck.figures import overlay, render
 from springcheck.figures.motion import true_motion
 from springcheck.figures.overlay import Frame
 from springcheck.figures.style import save
@@ -31,9 +31,9 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision import text as report
-from springcheck.studies.run import figure as trajectories
 from springcheck.studies.run import measure as session
 from springcheck.studies.run.drawable import drawable
+from springcheck.studies.run.page import of_runs
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
 
@@ -234,7 +234,7 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     # 1,500 parts of one length, and closer ones at the start, where a stiff motion may decay
     assert 1400 < len(t) <= 1501 + 200
     np.testing.assert_allclose(q, exact.true_motion(scene, t / step, step)[0], atol=1e-12)
-    assert trajectories.of_runs(scene, found.runs, found.followed)
+    assert of_runs(scene, found.runs, found.followed)
 
 
 def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
@@ -242,10 +242,11 @@ def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
     session.run(scene, path, methods=["own:euler", "own:implicit-euler"])
     found = drawable(path)
     assert np.max(np.abs(found.runs["own:euler"].q)) > 1e200
-    for name, picture in trajectories.of_runs(scene, found.runs, found.followed).items():
+    for bank in of_runs(scene, found.runs, found.followed):
+        name, picture = bank.name, render.picture(bank)
         for axes in picture.axes:
             assert max(np.abs(axes.get_ylim())) <= 1000, name
-            assert "outside: explicit Euler at 0.05" in [axes.get_title(loc="right")], name
+            assert "outside: explicit Euler at 0.05" in axes.get_title(loc="right"), name
             lines = [line for line in axes.lines if line.get_label() == "own:implicit-euler"]
             assert lines, name
             low, high = axes.get_ylim()
@@ -257,12 +258,12 @@ def drawn(tmp_path: Path, name: str, *methods: str) -> dict[str, Any]:
     scene, path = scenes.load_scene(name), tmp_path / f"{name}.h5"
     session.run(scene, path, methods=methods)
     found = drawable(path)
-    return trajectories.of_runs(scene, found.runs, found.followed)
+    return {bank.name: render.picture(bank) for bank in of_runs(scene, found.runs, found.followed)}
 
 
 def test_a_line_that_leaves_the_picture_leaves_it_towards_the_next_state(tmp_path: Path) -> None:
     axes = drawn(tmp_path, "two-scales", "own:euler", "own:implicit-euler")["phase-portrait"].axes[0]
-    (line,) = (line for line in axes.lines if line.get_label() == "explicit Euler")
+    (line,) = (x for x in axes.lines if x.get_label() == "own:euler" and x.get_marker() != "o")
     q, p = line.get_data()
     run = store.read_one(tmp_path / "two-scales.h5", "own:euler")
     true = np.arctan2(run.p[1, 0] - run.p[0, 0], run.q[1, 0] - run.q[0, 0])
@@ -281,7 +282,7 @@ def test_a_state_brought_nearer_keeps_its_direction_at_any_size() -> None:
 
 
 def test_with_friction_energies_are_drawn_beside_that_of_the_true_motion(tmp_path: Path) -> None:
-    upper, lower = drawn(tmp_path, "rlc-circuit", "own:euler", "sundials:adams")["energy"].axes
+    upper, *_, lower = drawn(tmp_path, "rlc-circuit", "own:euler", "sundials:adams")["energy"].axes
     truth = upper.lines[0]
     assert truth.get_label() == "exact solution"
     # R/L = 22 Ohm / 3.3 mH: amplitudes fall with exp(-R t/2L), energies with exp(-R t/L) on average
@@ -289,7 +290,7 @@ def test_with_friction_energies_are_drawn_beside_that_of_the_true_motion(tmp_pat
     assert lower.get_xlabel() == "time t (\N{MICRO SIGN}s)"
     rate = np.polyfit(np.asarray(t, float) / 1e6, np.log(np.asarray(energy, float)), 1)[0]
     assert rate == pytest.approx(-22 / 3.3e-3, rel=0.02)
-    (adams,) = (line for line in lower.lines if str(line.get_label()).startswith("CVODE"))
+    adams = next(line for line in lower.lines if line.get_label() == "sundials:adams")
     assert np.max(adams.get_ydata()) < 1e-8
     assert lower.get_ylabel() == "|energy - exact| / initial energy"
 

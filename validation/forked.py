@@ -252,7 +252,7 @@ def _import() -> None:
     from springcheck.figures import render  # noqa: F401
     from springcheck.identify import files, stepper  # noqa: F401
     from springcheck.studies.precision import measure  # noqa: F401
-    from springcheck.studies.run import figure as f2  # noqa: F401
+    from springcheck.studies.run import page as f2  # noqa: F401
     from springcheck.studies.stability import measure as m1  # noqa: F401
 
 

@@ -27,8 +27,9 @@ from arguments import arguments
 from springcheck import load_scene
 from springcheck.checks import compare, judge
 from springcheck.driver import run
+from springcheck.figures.render import picture
 from springcheck.figures.style import save, style
-from springcheck.studies.run.figure import of_runs
+from springcheck.studies.run.page import of_runs
 
 METHODS = [
     "own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:euler", "openmm:leapfrog",
@@ -74,8 +75,8 @@ def main() -> int:
     failed = [verdict for verdict in verdicts if verdict.passed is False]
     print(f"{sum(v.passed is True for v in verdicts)} verdicts passed, {len(failed)} failed")
     with style():
-        for name, picture in of_runs(scene, runs, runs).items():
-            print(*save(picture, folder, name), sep="\n")
+        for bank in of_runs(scene, runs, runs):
+            print(*save(picture(bank), folder, bank.name), sep="\n")
     return 0 if good and not failed else 1
 
 

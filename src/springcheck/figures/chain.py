@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from springcheck.figures import overlay
+from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.figures.motion import Exact
-from springcheck.figures.overlay import TRUTH, Runs
+from springcheck.figures.overlay import NAME_HIGH, Frame, Runs, exact_curve, share
+from springcheck.figures.portraits import extremes
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 
 FEWEST_MASSES, LONG = 3, 8
 """Particles from which a scene has modes worth drawing, and from which its wave is drawn as an image."""
@@ -30,19 +32,33 @@ PANELS = 6
 DECADES = 20.0
 """Ratio of energies from which their scale is logarithmic."""
 
-BLOCKS = 100
-"""Of neighbours, over which errors are averaged: no picture resolves the short waves of a long chain."""
+BLOCKS, MOST_ROWS = 100, 120
+"""Of neighbours, over which errors are averaged, and of frames: no picture resolves the short waves of a long
+chain."""
+
+WAVE_SHADES = (
+    "#2166ac",
+    "#4393c3",
+    "#92c5de",
+    "#d1e5f0",
+    "#f7f7f7",
+    "#fddbc7",
+    "#f4a582",
+    "#d6604d",
+    "#b2182b",
+)
+"""Of displacements from the largest below rest to the largest above, by Brewer."""
+
+SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Bounds of the shades of errors, as parts of the largest displacement."""
 
 
-def pictures(runs: Runs, exact: Exact) -> dict[str, Figure]:
-    """The figures of a chain by name, none where a scene is no linear chain of at least three."""
+def banks(runs: Runs, exact: Exact) -> list[Bank]:
+    """The charts of a chain, none where a scene is no linear chain of at least three."""
     scene, system = runs.scene, runs.scene.system
     if scene.n < FEWEST_MASSES or system.is_separate or not system.has_modes:
-        return {}
-    out = {"modes": _modes(runs, exact)}
-    if scene.n >= LONG and exact.known:
-        out["wave"] = _wave(runs, exact)
-    return out
+        return []
+    return [_modes(runs, exact), *([_wave(runs, exact)] if scene.n >= LONG and exact.known else [])]
 
 
 def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
@@ -53,7 +69,7 @@ def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
         return np.asarray((v * v + modes.w2 * y**2) / 2, np.float64)
 
 
-def _modes(runs: Runs, exact: Exact) -> Figure:
+def _modes(runs: Runs, exact: Exact) -> Bank:
     scene = runs.scene
     start = np.abs(_energies(scene, scene.q[None, :], scene.p[None, :])[0])
     total = float(np.sum(start)) or 1.0
@@ -61,78 +77,116 @@ def _modes(runs: Runs, exact: Exact) -> Figure:
     chosen = sorted(strongest, key=lambda i: float(scene.system.modes.w2[i]))
     unit = np.where(start > 0, start, 1.0)[chosen]
     found = {run.label: _energies(scene, run.q, run.p)[:, chosen] / unit for run in runs.every}
-    figure, panels, _ = overlay.panels(len(chosen), 1, (7.8, 0), (1.9, 0.8), shared="x")
     dt, t_unit = runs.time_unit
     order = np.argsort(np.argsort(scene.system.modes.w2))
     longest = runs.longest
     true = _energies(scene, *exact.at(longest))[:, chosen] / unit if exact.known else None
-    for j, (axes, mode) in enumerate(zip(panels, chosen, strict=True)):
+    xs = Frame(float(longest.t[0]), float(longest.t[-1]))
+    charts = []
+    for j, mode in enumerate(chosen):
         mine = {label: x[:, j] for label, x in found.items()}
-        if true is not None:
-            axes.plot(dt * longest.t, true[:, j], **TRUTH)
-        _mode(axes, runs, mine, None if true is None else true[:, j])
+        ys = _scale(list(mine.values()), None if true is None else true[:, j])
+
+        def inside(run: Trajectory, ys: Frame = ys, mine: dict[str, Floats] = mine) -> tuple[Floats, Floats]:
+            y = ys.within(mine[run.label])
+            return run.t[: len(y)], y
+
+        def when(run: Trajectory, ys: Frame = ys, mine: dict[str, Floats] = mine) -> int | None:
+            return ys.leaves(mine[run.label])
+
         turn = abs(scene.step) * np.sqrt(max(float(scene.system.modes.w2[mode]), 0.0))
-        share = f"{100 * start[mode] / total:.2g} % of the energy"
-        name = f"mode {order[mode] + 1} of {scene.n}, $h\\,\\omega$ = {turn:.3g}, {share}"
-        axes.set_title(name, fontsize=9, loc="left")
-        axes.set_ylabel("energy / its start")
-    panels[-1].set_xlabel(with_unit("time t", t_unit))
-    what = "modes" if len(chosen) > 1 else "mode"
-    overlay.heading(figure, f"{scene.title}: energy of the strongest {what}")
-    runs.legend(figure, truth=true is not None)
-    return figure
+        name = f"mode {order[mode] + 1} of {scene.n}, h \N{GREEK SMALL LETTER OMEGA} = {turn:.3g}"
+        curves = runs.curves(inside)
+        charts.append(
+            Chart(
+                title=f"Energy of {name}.",
+                short=f"{name}, {100 * start[mode] / total:.2g} % of the energy",
+                x=Scale(name=with_unit("time t", t_unit), factor=dt, shown=xs.ends),
+                y=Scale(name="energy / its start", log=ys.log, shown=ys.ends),
+                curves=[*([] if true is None else [exact_curve(longest.t, true[:, j])]), *curves],
+                labels=overlay.at_ends(runs.first(curves), xs, ys, height=2 * NAME_HIGH),
+                note=runs.leaving(when),
+            )
+        )
+    off = {}
+    for group in runs.groups:
+        x = found[group.members[0].label][:, -1]
+        with np.errstate(all="ignore"):
+            off[group.title] = float(np.max(np.abs(x - (1.0 if true is None else true[: len(x), -1]))))
+    fastest = f"the energy of mode {order[chosen[-1]] + 1} is off by at most {{}}"
+    return Bank(
+        name="modes", title="Methods drawn", charts=charts, columns=1, size=(7.2, 2.0),
+        heading=f"{scene.title}: {runs.wrong}{extremes(off, fastest)}",
+    )  # fmt: skip
 
 
-def _mode(axes: Axes, runs: Runs, found: Mapping[str, Floats], true: Floats | None) -> None:
-    """The energy of one mode."""
-    ys = overlay.frame(list(found.values()), true, far=10.0)
-    dt, _ = runs.time_unit
-    runs.draw(axes, lambda run: (dt * run.t, ys.within(found[run.label])))
-    inside = [x for x in found.values() if ys.leaves(x) is None]
-    least = min((float(np.min(x)) for x in inside), default=0.0)
+def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
+    """Of the energies of one mode."""
+    ys = overlay.frame(found, true, far=10.0)
+    least = min((float(np.min(x)) for x in found if ys.leaves(x) is None), default=0.0)
     if least > 0 and ys.high > DECADES * least:
-        axes.set_yscale("log")
-        axes.set_ylim(least / 1.5, ys.high)
-    else:
-        axes.set_ylim(ys.low, ys.high)
-    runs.note(axes, lambda run: ys.leaves(found[run.label]))
+        return Frame(least / 1.5, ys.high, ys.clipped, log=True)
+    return ys
 
 
-def _wave(runs: Runs, exact: Exact) -> Figure:
+def _wave(runs: Runs, exact: Exact) -> Bank:
     """Displacement over particle and time: the exact wave, and what each scheme's differs from it."""
     scene, modes, longest = runs.scene, runs.scene.system.modes, runs.longest
     rest = np.asarray(modes.rest, np.float64)
     dt, t_unit = runs.time_unit
     true = np.asarray(exact.at(longest)[0], np.float64) - rest
-    images = [("exact solution", longest.t, true)]
+    size = float(np.max(np.abs(true))) or 1.0
+    width = 2 / len(WAVE_SHADES)
+    signed = [(f"{-1 + width * i:.1f} to {-1 + width * (i + 1):.1f}", x) for i, x in enumerate(WAVE_SHADES)]
+    names = [
+        f"below {share(SHARES[0])}",
+        *(f"{share(a)} to {share(b)}" for a, b in itertools.pairwise(SHARES)),
+        "above",
+    ]
+    errors = [(f"error {name}", f"s{i}") for i, name in enumerate(names)]
+    bounds = np.linspace(-1, 1, len(WAVE_SHADES) + 1)[1:-1]
+    images = [("exact solution", longest.t, np.searchsorted(bounds, _few(true / size, signed=True)), signed)]
+    largest = {}
     for group in runs.groups[: PANELS - 1]:
         run = group.members[0]
-        images.append(
-            (f"{group.title}\n{run.label}", run.t, np.asarray(run.q - exact.at(run)[0], np.float64))
+        with np.errstate(all="ignore"):
+            off = np.nan_to_num(np.asarray(run.q - exact.at(run)[0], np.float64) / size, nan=np.inf)
+            largest[group.title] = float(np.max(np.abs(off)))
+            images.append(
+                (
+                    f"{group.title}: {share(largest[group.title])}",
+                    run.t,
+                    np.searchsorted(SHARES, _few(off)),
+                    errors,
+                )
+            )
+    charts = []
+    for name, t, rows, kinds in images:
+        places = np.linspace(0, scene.n - 1, rows.shape[1])
+        times = np.linspace(dt * float(t[0]), dt * float(t[-1]), rows.shape[0])
+        charts.append(
+            Chart(
+                title=f"{name}.",
+                short=name,
+                x=Scale(name="particle", values=places.round().tolist()),
+                y=Scale(name=with_unit("time t", t_unit), values=times.tolist()),
+                tiles=Tiles(kinds=kinds, rows=rows.tolist()),
+            )
         )
-    figure, grid, columns = overlay.panels(len(images), 3, (3.6, 0), (3.3, 0.5), shared="xy")
-    for j, (axes, (name, t, image)) in enumerate(zip(grid, images, strict=True)):
-        axes.grid(False)
-        size = float(np.max(np.abs(image))) or 1.0
-        shown = image / size if j == 0 else _mean(image / size)
-        low, high = (0.0, float(np.max(shown)) or 1.0) if j else (-1.0, 1.0)
-        axes.imshow(
-            shown, origin="lower", aspect="auto", interpolation="nearest",
-            cmap="magma_r" if j else "RdBu_r", vmin=low, vmax=high,
-            extent=(-0.5, scene.n - 0.5, dt * float(t[0]), dt * float(t[-1])),
-        )  # fmt: skip
-        axes.set_title(f"{name}\n{'error up to' if j else 'displacement up to'} {size:.2g}", fontsize=8.5)
-        if j % columns == 0:
-            axes.set_ylabel(with_unit("time t", t_unit))
-        if j >= len(images) - columns:
-            axes.set_xlabel("particle")
-    overlay.heading(figure, f"{scene.title}: the wave, and what schemes make of it", 40 * columns)
-    return figure
+    return Bank(
+        name="wave", title="The exact wave over its largest displacement, and errors", charts=charts,
+        heading=f"{scene.title}: {runs.wrong}{extremes(largest, 'the wave is off by at most {}')}",
+        columns=min(3, len(charts)), size=(3.4, 2.9),
+    )  # fmt: skip
 
 
-def _mean(error: Floats) -> Floats:
-    """Root mean square of errors (f, n) over blocks of neighbours (f, b)."""
-    size = max(1, error.shape[1] // BLOCKS)
-    starts = np.arange(0, error.shape[1], size)
-    counts = np.diff([*starts, error.shape[1]])
-    return np.asarray(np.sqrt(np.add.reduceat(error**2, starts, axis=1) / counts), np.float64)
+def _few(image: Floats, *, signed: bool = False) -> Floats:
+    """An image (f, n) of few frames: of errors the root mean square over blocks of neighbours."""
+    image = image[np.linspace(0, len(image) - 1, min(MOST_ROWS, len(image))).round().astype(np.int64)]
+    if signed:
+        columns = min(2 * BLOCKS, image.shape[1])
+        return image[:, np.linspace(0, image.shape[1] - 1, columns).round().astype(np.int64)]
+    size = max(1, image.shape[1] // BLOCKS)
+    starts = np.arange(0, image.shape[1], size)
+    counts = np.diff([*starts, image.shape[1]])
+    return np.asarray(np.sqrt(np.add.reduceat(image**2, starts, axis=1) / counts), np.float64)

@@ -16,8 +16,9 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
-GUIDE = "guide"
-"""The group of lines that show a slope."""
+GUIDE, EXACT, SEPARATRIX, START, WRONG = "guide", "exact", "separatrix", "start", "failed"
+"""Groups that are no scheme's: lines that show a slope or a limit, the exact solution, what parts motions of
+two kinds, where all begin, and what some verdict rejects."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +33,8 @@ class Scale:
     """The same in words, all of which are written."""
     shown: tuple[float, float] | None = None
     """From and to at first; left out: what the curves fill."""
+    factor: float = 1.0
+    """What numbers are multiplied by in the unit of the name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +55,14 @@ class Curve:
     """What is said of each point beside its numbers."""
     open: Sequence[bool] = ()
     """Which points are estimates: their marks are hollow, and full of the others."""
+    title: str = ""
+    """The scheme in words, or what is wrong with it."""
+    over: bool = False
+    """Whether its line is that of an earlier curve of its group, on which a figure shows its marks alone."""
+    dots: bool = False
+    """Whether points stand too far apart to be joined: each is a dot, and its line is faint if it has one."""
+    band: tuple[Sequence[float] | Floats, Sequence[float] | Floats] | None = None
+    """The least and the largest of the numbers whose middle one is y."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +89,17 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Naming:
+    """The name of a curve where it stands apart, in its colour; at x = 1 beside the picture."""
+
+    text: str
+    group: str
+    x: float
+    y: float
+    """Parts of the picture's width and height."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chart:
     """Curves or tiles over two axes."""
 
@@ -91,6 +113,9 @@ class Chart:
     """What tells it from the other charts of its bank."""
     equal: bool = False
     """Whether a unit is of one length on both axes."""
+    labels: Sequence[Naming] = ()
+    note: str = ""
+    """What the picture leaves out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +130,10 @@ class Bank:
     """Of its figure; left out: the title of its first chart."""
     on: Sequence[str] | None = None
     """What is drawn at first; left out: everything."""
+    columns: int = 0
+    """Charts beside each other in a figure; left out: as many as suit it."""
+    size: tuple[float, float] | None = None
+    """Of a chart in a figure [in]; left out: what suits it."""
 
 
 def plain(bank: Bank) -> dict[str, Any]:
@@ -118,7 +147,8 @@ def plain(bank: Bank) -> dict[str, Any]:
             axis |= {"named": bool(said), "values": said or numbers(axis["values"])}
         for curve in chart["curves"]:
             curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
-            del curve["open"]
+            for name in ("open", "over", "band"):
+                del curve[name]
         if tiles := chart["tiles"]:
             texts = list(dict.fromkeys(note for row in tiles["notes"] for note in row if note))
             at = {"": -1} | {text: i for i, text in enumerate(texts)}

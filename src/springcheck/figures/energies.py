@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from springcheck.figures import overlay
-from springcheck.figures.motion import Exact, true_motion
-from springcheck.figures.overlay import TRUTH, Frame, Runs
+from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures.motion import Exact, periods, true_motion
+from springcheck.figures.overlay import NAME_HIGH, Frame, Runs, exact_curve
+from springcheck.figures.portraits import extremes
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
@@ -27,22 +27,27 @@ DECADES = 100.0
 LEAST = 1e-4
 """Of the initial energy, what the logarithmic scale goes down to."""
 
-CHANGED, MOST_FINDINGS = 0.05, 3
-"""Logarithm of an energy over that of the start from which it has changed; schemes that a title names."""
+MOST_TURNING = 8
+"""Of which some must turn where an orbit is one."""
 
-FLOOR = 2.0**-53
-"""Relative differences below this are none: they stand on the lower edge."""
+CHANGED, EVENLY, MOST_FINDINGS = 0.05, 0.99, 3
+"""Part of an energy, or logarithm of it over the start's, from which it has changed; part of its change that
+is even, which what wavers has not; schemes that a title names."""
+
+FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
+"""Relative differences below this are none: they stand on the lower edge; differences that are roundings."""
+
+EMPTY = 1e3
+"""Factor between the errors of some and all others from which both have a picture of their own."""
 
 
-def energy(runs: Runs, exact: Exact) -> Figure:
+def energy(runs: Runs, exact: Exact) -> Bank:
     """Energy over time, and below it how far it is from that of the exact motion on a logarithmic scale.
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
     initial one too, and the axis says so.  All in units of the kinetic plus the absolute potential energy of
     the start, which is the initial energy unless a potential is negative.
     """
-    figure = Figure(figsize=(7.8, 6.0), layout="constrained")
-    upper, lower = figure.subplots(2, sharex=True)
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
     unit = float(scene.system.norm.unit) ** 2 or 1.0
@@ -57,109 +62,260 @@ def energy(runs: Runs, exact: Exact) -> Figure:
 
     def off(run: Trajectory) -> Floats:
         right = energies(*exact.at(run)) if changes else start
-        return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
 
     found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
     dt, t_unit = runs.time_unit
+    lines = []
     true: Floats | None = None
     if changes and (truth := true_motion(scene, runs.every)) is not None:
         true = energies(*truth[1:]) / unit
-        upper.plot(dt * truth[0], true, **TRUTH)
+        lines.append(exact_curve(truth[0], true))
     elif scene.system.keeps_energy:
         true = np.full(2, start / unit)
-        upper.axhline(start / unit, **TRUTH)
-    ys = _scale(upper, list(found.values()), true)
-    runs.draw(upper, lambda run: (dt * run.t, ys.within(found[run.label])))
-    upper.set_ylabel(f"energy / {of}")
-    runs.note(upper, lambda run: ys.leaves(found[run.label]))
-    _decades(lower, runs, off)
-    lower.set_ylabel(f"|energy - {'exact' if changes else 'initial'}| / {of}")
-    lower.set_xlabel(with_unit("time t", t_unit))
-    lower.ticklabel_format(axis="x", useOffset=False)
-    said = _findings(runs, found) if scene.system.keeps_energy else []
-    overlay.heading(figure, f"{scene.title}: energy" + "".join(f"; {one}" for one in said[:MOST_FINDINGS]))
-    runs.legend(figure, truth=true is not None)
-    return figure
+        lines.append(exact_curve(runs.longest.t[[0, -1]], true))
+    ys = _scale(list(found.values()), true)
+
+    def inside(run: Trajectory) -> tuple[Floats, Floats]:
+        y = ys.within(found[run.label])
+        return run.t[: len(y)], y
+
+    curves = runs.curves(inside)
+    time = Scale(name=with_unit("time t", t_unit), factor=dt, shown=_times(runs).ends)
+    upper = Chart(
+        title="Energy over time.",
+        x=time,
+        y=Scale(name=f"energy / {of}", log=ys.log, shown=ys.ends),
+        curves=[*lines, *curves],
+        labels=overlay.at_ends(runs.first(curves), _times(runs), ys, height=1.5 * NAME_HIGH),
+        note=runs.leaving(lambda run: ys.leaves(found[run.label])),
+    )
+    differences = {run.label: off(run) for run in runs.every}
+    what = "exact" if changes else "initial"
+    lower = decades(runs, differences, time, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
+    said = _said(runs, found, differences) if scene.system.keeps_energy or changes else ""
+    return Bank(
+        name="energy", title="Methods drawn", charts=[upper, *lower], columns=1, size=(7.2, 2.7),
+        heading=f"{scene.title}: {runs.wrong}{said or 'energy'}",
+    )  # fmt: skip
 
 
-def _findings(runs: Runs, found: Mapping[str, Floats]) -> list[str]:
-    """Which schemes gain or lose energy in every step alike, and how much."""
+def _times(runs: Runs) -> Frame:
+    ends = [float(run.t[i]) for run in runs.every for i in (0, -1)]
+    return Frame(min(ends), max(ends))
+
+
+def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
+    """Who gains or loses energy in every step alike, and how far the others are off."""
+    largest = {group.title: float(np.max(differences[group.members[0].label])) for group in runs.groups}
     said = []
+    if runs.scene.system.keeps_energy:
+        if max(largest.values()) <= ALL_ROUNDED:
+            return f"all keep the energy to rounding, {max(largest.values()):.0e}"
+        for group in runs.groups:
+            each = steady(found[group.members[0].label], group.members[0].every)
+            if each and not group.failed:
+                said.append(
+                    f"{group.title} {'gains' if each > 0 else 'loses'} {100 * abs(each):.2g} % a step"
+                )
+                del largest[group.title]
+        said = said[:MOST_FINDINGS]
+    if largest:
+        said.append(extremes(largest, "energy off by at most {}", beyond=LARGE))
+    return "; ".join(said)
+
+
+def steady(energies: Floats, every: int) -> float:
+    """By which part of itself an energy changes in every step alike; 0 where it wavers or stays."""
+    if not (np.isfinite(energies).all() and np.min(energies) > 0 and len(energies) > 4):
+        return 0.0
+    y, n = np.log(energies), np.arange(len(energies))
+    if abs(y[-1] - y[0]) <= CHANGED:
+        return 0.0
+    rate, begin = np.polyfit(n, y, 1)
+    if np.var(y - rate * n - begin) > (1 - EVENLY) * np.var(y):
+        return 0.0
+    return float(np.expm1(rate / every))
+
+
+def orbits(runs: Runs, exact: Exact) -> str:
+    """Whose orbits spiral, and how far the states of others are off at most."""
+    scene = runs.scene
+    said: dict[str, list[str]] = {"spirals out": [], "spirals in": [], "keeps to its orbit": []}
+    off = {}
     for group in runs.groups:
-        x = found[group.members[0].label]
-        steps = (len(x) - 1) * group.members[0].every
-        middle = len(x) // 2
-        if group.failed or middle < 2 or not (np.isfinite(x[-1]) and min(x[0], x[middle], x[-1]) > 0):
+        run = group.members[0]
+        if group.failed:
             continue
-        rate, half = (np.log(x[j] / x[0]) / j for j in (len(x) - 1, middle))
-        # what only wavers does not change alike in both halves
-        if abs(rate) * (len(x) - 1) > CHANGED and abs(half - rate) < abs(rate) / 4:
-            each = 100 * abs(np.expm1(np.log(x[-1] / x[0]) / steps))
-            said.append(f"{group.title} {'gains' if rate > 0 else 'loses'} {each:.2g} % a step")
-    return said
+        if exact.known:
+            off[group.title] = float(np.max(exact.error(run)))
+        if scene.system.keeps_energy:
+            with np.errstate(over="ignore", invalid="ignore"):
+                e = np.asarray(scene.system.energy(run.q, run.p), np.float64)
+            first, last = e[: len(e) // 4 + 1], e[-(len(e) // 4) - 1 :]
+            unit = CHANGED * float(scene.system.norm.unit) ** 2
+            # what ran away did not turn
+            out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
+            inwards = not out and np.max(last) < np.min(first) - unit
+            way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
+            said[way].append(group.title)
+    turns = max(periods(x) for x in runs.longest.q.T[:MOST_TURNING])
+    if turns >= 1 and (said["spirals out"] or said["spirals in"]):
+        many = {
+            "spirals out": "spiral out",
+            "spirals in": "spiral in",
+            "keeps to its orbit": "keep to their orbits",
+        }
+        return "; ".join(
+            f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {many[way]}"
+            for way, names in said.items()
+            if names
+        )
+    some = {name: x for name, x in off.items() if np.isfinite(x)}
+    return extremes(some, "states off by at most {}", beyond=MOST) if some else ""
 
 
-def _scale(axes: Axes, found: Sequence[Floats], true: Floats | None) -> Frame:
-    """Scale and limits of an axis of energies, set by all that stay within some times the right one."""
+def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
+    """Limits of an axis of energies, set by all that stay within some times the right one."""
     largest = max(1.0, 0.0 if true is None else float(np.max(np.abs(true))))
     near = [x for x in found if np.max(np.abs(x)) <= LARGE * largest] or list(found)
     right = [] if true is None else [true]
     low, high = (float(f([f(x) for x in (*near, *right)])) for f in (np.min, np.max))
     if low > 0 and high > DECADES * low:
-        axes.set_yscale("log")
         # the right energy may fall further
         bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
-        ys = Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom)
-    else:
-        ys = overlay.widened(low, high, clipped=len(near) < len(found))
-    axes.set_ylim(ys.low, ys.high)
-    return ys
+        return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
+    return overlay.widened(low, high, clipped=len(near) < len(found))
 
 
-def _decades(axes: Axes, runs: Runs, pick: Callable[[Trajectory], Floats]) -> None:
-    """Differences on a logarithmic scale."""
-    dt, _ = runs.time_unit
-    found = {run.label: pick(run) for run in runs.every}
-    # the start is right; what is less than the floor at other frames stands on the lower edge
-    positive = [x[1:][x[1:] > 0] for x in found.values()]
-    low = max(min((float(np.min(x)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
-    inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST]
-    clipped = len(inside) < len(found)
-    high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 1e3 * low)
+def decades(
+    runs: Runs, found: Mapping[str, Floats], time: Scale, name: str, title: str, *, known: bool = False
+) -> list[Chart]:
+    """Differences (f,) of each run on logarithmic scales: those far smaller than all others apart, so that no
+    decade is empty; none where all are roundings.
 
-    def shown(run: Trajectory) -> tuple[Floats, Floats]:
-        y = found[run.label]
-        end = _beyond(y, high)
-        last = len(y) if end is None else end + 1
-        return dt * run.t[1:last], np.clip(y[1:last], low, high * overlay.FAR_OFF)
+    `known`: what says how large they are follows from the scene, and 1 is as large as the motion itself.
+    """
+    charts = []
+    finite = {label: np.where(np.isfinite(x), x, np.inf) for label, x in found.items()}
+    if max((float(np.max(x)) for x in finite.values()), default=0.0) <= ALL_ROUNDED and not known:
+        return []
+    for labels in _apart(finite):
+        mine = {label: finite[label] for label in labels}
+        # the start is right; what is less than the floor at other frames stands on the lower edge
+        positive = [x[1:][x[1:] > 0] for x in mine.values()]
+        low = max(min((float(np.quantile(x, 0.02)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
+        inside = [float(np.max(x)) for x in mine.values() if np.max(x) <= MOST]
+        clipped = len(inside) < len(mine)
+        high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 10 * low)
+        ys = Frame(low, high, clipped, log=True)
+        groups = [group for group in runs.groups if group.members[0].label in labels]
 
-    runs.draw(axes, shown)
-    axes.set_yscale("log")
-    axes.set_ylim(low, high)
-    runs.note(axes, lambda run: _beyond(found[run.label], high))
+        def shown(run: Trajectory, ys: Frame = ys) -> tuple[Floats, Floats]:
+            y = found[run.label]
+            end = _beyond(y, ys.high)
+            last = len(y) if end is None else end + 1
+            return run.t[1:last], np.clip(y[1:last], min(ys.low, FLOOR), ys.high * overlay.FAR_OFF)
+
+        curves: list[Curve] = runs.curves(shown, groups=groups)
+        xs = Frame(*(time.shown or (0.0, 1.0)))
+
+        def when(run: Trajectory, ys: Frame = ys) -> int | None:
+            return _beyond(found[run.label], ys.high)
+
+        charts.append(
+            Chart(
+                title=title,
+                x=time,
+                y=Scale(name=name, log=True, shown=ys.ends),
+                curves=curves,
+                rules=[Rule(axis="y", at=1.0, name="as large as the motion", look="one")]
+                if known and low < 1 < high
+                else [],
+                labels=overlay.at_ends(runs.first(curves), xs, ys, height=1.4 * NAME_HIGH),
+                note=runs.leaving(when) if clipped else "",
+            )
+        )
+    return charts
+
+
+def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
+    """Labels by the decades that they fill, the largest first; apart where decades between are empty."""
+    spans = []
+    for label, x in found.items():
+        some = x[1:][(x[1:] > 0) & np.isfinite(x[1:])]
+        low, high = np.quantile(some, [0.1, 1.0]) if len(some) else (FLOOR, FLOOR)
+        # what explodes stands with the largest of the others
+        spans.append((min(float(low), 1.0), min(float(high), MOST), label))
+    sets: list[set[str]] = []
+    lowest = np.inf
+    for low, high, label in sorted(spans, key=lambda x: -x[1]):
+        if high * EMPTY < lowest:
+            sets.append(set())
+            lowest = np.inf
+        lowest = min(lowest, max(low, FLOOR))
+        (sets or [set()])[-1].add(label)
+    return sets
 
 
 def _beyond(values: Floats, high: float) -> int | None:
-    return int(np.argmax(values > high)) if np.any(values > high) else None
+    above = ~(values <= high)
+    return int(np.argmax(above)) if np.any(above) else None
 
 
-def error(runs: Runs, exact: Exact) -> Figure:
+def error(runs: Runs, exact: Exact) -> Bank:
     """Distance from the exact solution over time, on a logarithmic scale."""
-    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
-    axes = figure.add_subplot()
-    _decades(axes, runs, exact.error)
-    axes.axhline(1.0, color="#888888", linewidth=0.8)
-    axes.set_xlabel(with_unit("time t", runs.time_unit[1]))
-    axes.ticklabel_format(axis="x", useOffset=False)
-    axes.set_ylabel("error / initial energy norm")
-    ends = {run.label: float(np.max(exact.error(run))) for run in runs.every}
-    known = {label: x for label, x in ends.items() if np.isfinite(x)}
-    title = f"{runs.scene.title}: largest distance from the exact solution"
-    if known:
-        small, large = min(known, key=lambda x: known[x]), max(known, key=lambda x: known[x])
-        title += f" {known[small]:.1e} by {small}" + (
-            f" to {known[large]:.1e} by {large}" if len(known) > 1 else ""
-        )
-    overlay.heading(figure, title)
-    runs.legend(figure)
-    return figure
+    found = {run.label: exact.error(run) for run in runs.every}
+    dt, unit = runs.time_unit
+    time = Scale(name=with_unit("time t", unit), factor=dt, shown=_times(runs).ends)
+    charts = decades(
+        runs, found, time, "error / initial energy norm", "Distance from the exact solution.", known=True
+    )
+    largest = {group.title: float(np.max(found[group.members[0].label])) for group in runs.groups}
+    some = {label: x for label, x in largest.items() if np.isfinite(x)}
+    said = extremes(some, "off the exact solution by at most {}", beyond=MOST) if some else "errors"
+    return Bank(
+        name="error", title="Methods drawn", charts=charts, columns=1,
+        size=(7.2, 4.2 if len(charts) == 1 else 2.6), heading=f"{runs.scene.title}: {runs.wrong}{said}",
+    )  # fmt: skip
+
+
+def means(runs: Runs, thermal: float) -> Bank:
+    """Of runs in a bath: the mean of their energy up to each time, over kT."""
+    found = {}
+    scene = runs.scene
+    for run in runs.every:
+        with np.errstate(over="ignore", invalid="ignore"):
+            e = np.asarray(scene.system.energy(run.q, run.p), np.float64) / thermal
+        found[run.label] = np.cumsum(e) / np.arange(1, len(e) + 1)
+    ends = {group.title: float(found[group.members[0].label][-1]) for group in runs.groups}
+    usual = float(np.median(list(ends.values())))
+    near = [x for x in found.values() if abs(x[-1] - usual) <= 3 * abs(usual)]
+    later = [x[len(x) // 20 :] for x in near] or [np.array([usual])]
+    ys = overlay.widened(min(map(np.min, later)), max(map(np.max, later)))
+    dt, unit = runs.time_unit
+    some = {name: x for name, x in ends.items() if np.isfinite(x)}
+    low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
+    linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
+    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *_far(ys))))
+    xs = _times(runs)
+    chart = Chart(
+        title="Mean energy up to each time, over kT.",
+        x=Scale(name=with_unit("time t", unit), factor=dt, shown=xs.ends),
+        y=Scale(name="mean energy so far / kT", shown=ys.ends),
+        curves=curves,
+        rules=[Rule(axis="y", at=float(scene.n), name=f"equipartition: {scene.n} kT", look="here")]
+        if linear and ys.low < scene.n < ys.high
+        else [],
+        labels=overlay.at_ends(runs.first(curves), xs, ys),
+    )
+    said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
+    return Bank(
+        name="energy", title="Methods drawn", charts=[chart], columns=1, size=(7.2, 4.2),
+        heading=f"{scene.title}: {runs.wrong}{said}",
+    )  # fmt: skip
+
+
+def _far(ys: Frame) -> tuple[float, float]:
+    return ys.centre - overlay.FAR_OFF * ys.half, ys.centre + overlay.FAR_OFF * ys.half

@@ -120,13 +120,10 @@ _OTHER_MARKS = (("8", "\u2b23"), ("d", "\u29eb"))
 
 
 def look(scheme: str) -> Look:
-    """Colour and line of a scheme, of any name, the same in every figure."""
+    """Colour and line of a scheme, of any name, the same in every figure; red of what is wrong."""
+    if scheme == "failed":
+        return Look(FAILED, SOLID)
     return LOOKS.get(scheme) or _REST[zlib.crc32(scheme.encode()) % len(_REST)]
-
-
-def failed(j: int) -> Look:
-    """Colour and line of the j-th run that a verdict rejects: red, whatever its scheme."""
-    return Look(FAILED, LINES[j % len(LINES)])
 
 
 def mark(engine: str) -> tuple[str, str]:
@@ -145,14 +142,6 @@ def scheme_of(label: str) -> str:
         return engines.method(engines.parse(label)).scheme
     except MethodError:
         return label
-
-
-def by_scheme(labels: Iterable[str]) -> dict[str, list[str]]:
-    """Labels by their schemes."""
-    found: dict[str, list[str]] = {}
-    for label in labels:
-        found.setdefault(scheme_of(label), []).append(label)
-    return found
 
 
 def title(scheme: str) -> str:

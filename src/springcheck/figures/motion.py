@@ -22,19 +22,19 @@ SPLIT, CLOSE = 64, 20
 """Parts of the distance of its points, and distances from its start within which there are more."""
 
 
-def true_motion(scene: Scene, runs: Sequence[Trajectory]) -> Motion | None:
+def true_motion(scene: Scene, runs: Sequence[Trajectory], points: int = SMOOTH) -> Motion | None:
     """A smooth exact motion from the first frame of these runs to the last, None where none is known."""
     times = [np.abs(run.t[[0, -1]]) for run in runs]
-    return smooth(scene, float(np.min(times)), float(np.max(times)))
+    return smooth(scene, float(np.min(times)), float(np.max(times)), points)
 
 
-def smooth(scene: Scene, first: float, last: float) -> Motion | None:
+def smooth(scene: Scene, first: float, last: float, points: int = SMOOTH) -> Motion | None:
     """A smooth exact motion between two times from the start [T], None where none is known."""
     if not exact.has_true_motion(scene):
         return None
     begin, end = (round(x / abs(scene.step)) for x in (first, last))
     # whole parts of steps, or whole steps; closer where a stiff motion may decay
-    points = max(FEWEST_POINTS, min(SMOOTH, MOST_NUMBERS // scene.n))
+    points = max(FEWEST_POINTS, min(points, MOST_NUMBERS // scene.n))
     finer = SPLIT * max(1, -(-points // max(1, end - begin)))
     even = np.linspace(begin * finer, end * finer, points + 1)
     close = begin * finer + np.geomspace(1, CLOSE * max(1, even[1] - even[0]), min(CLOSE * 10, points))

@@ -1,33 +1,23 @@
-"""Runs laid over each other: a line a motion, marks of its engines, one legend, what explodes clipped.
+"""Runs laid over each other: a curve a motion, marks of its engines, and what explodes cut off.
 
 Right engines of one scheme move alike and share a line; one that failed has its own, in red and on top.
 """
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from springcheck.figures import looks
+from springcheck.figures.charts import EXACT, WRONG, Curve, Naming
 from springcheck.figures.views import units
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
-TRUTH: dict[str, Any] = {
-    "color": "#b3b3b3",
-    "linewidth": 4.0,
-    "alpha": 0.7,
-    "label": "exact solution",
-    "zorder": 1,
-}
+TRUTH = "exact solution"
 
 EXPLODED, LARGE = 3.0, 6.0
 """How many times as far as the exact solution goes a run that grows may go and still set the scale of a
@@ -42,14 +32,15 @@ FAR_OFF = 1e6
 ROUNDINGS = 1e-9
 """Relative difference of values below which a picture shows them as equal."""
 
-MOST_MARKS, MARKS, FEWEST_MARKS = 11, 66, 4
-"""Of a run, on a picture, and of each run however many there are."""
-
-GOLDEN = 0.618
-"""Multiples of it, modulo 1, stand far from one another, however many: there runs have their marks."""
-
 MOST_LEAVING = 4
 """Schemes that are named where they leave a picture."""
+
+MOST_NAMINGS, NAME_HIGH = 9, 0.052
+"""Curves that are named where they stand, and the height of a name as a part of the picture's."""
+
+NAME_AWAY, LETTER, NAME_PLACES = 0.03, 0.018, 60
+"""Parts of a picture that its name is away from other curves, and that a letter is wide; points at which
+there may be room for a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,21 +49,12 @@ class Group:
 
     scheme: str
     members: tuple[Trajectory, ...]
-    look: looks.Look
     failed: bool = False
 
     @property
     def title(self) -> str:
         """Of its scheme, or of the run that is wrong."""
-        return f"FAILED: {self.members[0].label}" if self.failed else looks.title(self.scheme)
-
-    @property
-    def legend(self) -> str:
-        """Its title, and whose marks are on its line."""
-        if self.failed:
-            mark = looks.mark(looks.engine(self.members[0].label))[1]
-            return f"{self.title}\n{mark} {textwrap.fill('is not ' + looks.title(self.scheme), 30)}"
-        return f"{self.title}\n{looks.members([run.label for run in self.members])}"
+        return self.members[0].label if self.failed else looks.title(self.scheme)
 
 
 Pick = Callable[[Trajectory], tuple[Floats, Floats]]
@@ -93,11 +75,9 @@ class Runs:
                 wrong.append(run)
             elif len(run.t) > 1:
                 found.setdefault(run.scheme, []).append(run)
-        self.groups = [Group(name, tuple(members), looks.look(name)) for name, members in found.items()]
+        self.groups = [Group(name, tuple(members)) for name, members in found.items()]
         # drawn last: on top of all that is right
-        self.groups += [
-            Group(run.scheme, (run,), looks.failed(j), failed=True) for j, run in enumerate(wrong)
-        ]
+        self.groups += [Group(run.scheme, (run,), failed=True) for run in wrong]
         self.every = [run for group in self.groups for run in group.members]
 
     @property
@@ -111,28 +91,56 @@ class Runs:
         last = max(abs(float(run.t[-1])) for run in self.every)
         return looks.prefixed(last, units(self.scene).t)
 
-    def draw(self, axes: Axes, pick: Pick, *, joined: bool = True, faint: bool = False) -> None:
-        """The first run of each motion as a line (`joined`) or dots, and marks of every engine.
+    @property
+    def wrong(self) -> str:
+        """Which of them are wrong, to begin a title with; "" where none is."""
+        names = [group.title for group in self.groups if group.failed]
+        if not names:
+            return ""
+        more = f" and {len(names) - 2} more" if len(names) > 2 else ""
+        return f"{', '.join(names[:2])}{more} {'is' if len(names) == 1 else 'are'} wrong (red); "
 
-        `faint`: lines between the dots that are seen to be none of the motion.
+    def curves(
+        self,
+        pick: Pick,
+        *,
+        dots: bool = False,
+        faint: bool = False,
+        timed: bool = False,
+        groups: Sequence[Group] | None = None,
+    ) -> list[Curve]:
+        """A curve of each run, the first of each motion as a line or `dots`.
+
+        `faint`: lines between the dots that are seen to be none of the motion; `timed`: the time of each
+        point is said.
         """
-        drawn, most = 0, min(MOST_MARKS, max(FEWEST_MARKS, MARKS // len(self.every)))
-        for group in self.groups:
-            color, high = group.look.color, int(group.failed)
+        found = []
+        for group in self.groups if groups is None else groups:
             for j, run in enumerate(group.members):
                 x, y = pick(run)
-                line: dict[str, Any] = {"color": color, "label": group.title, "zorder": 2 + 1.2 * high}
-                if j == 0 and joined:
-                    axes.plot(x, y, linestyle=group.look.linestyle, linewidth=1.3 + 0.7 * high, **line)
-                elif j == 0:
-                    axes.plot(x, y, ".", markersize=3 + 2 * high, **line)
-                    if faint:
-                        axes.plot(x, y, color=color, linewidth=0.7, alpha=0.4, zorder=1.5)
-                _marks(axes, x, y, group, drawn * GOLDEN % 1, run.label, most)
-                drawn += 1
+                found.append(
+                    Curve(
+                        name=run.label,
+                        group=WRONG if group.failed else group.scheme,
+                        title=("is not " if group.failed else "") + looks.title(group.scheme),
+                        x=x,
+                        y=y,
+                        line=not dots or faint,
+                        dots=dots,
+                        marks=True,
+                        over=j > 0,
+                        notes=[f"t {t!r}" for t in run.t[: len(x)].tolist()] if timed else (),
+                    )
+                )
+        return found
 
-    def note(self, axes: Axes, when: Callable[[Trajectory], int | None]) -> None:
-        """Say above a picture which schemes leave it for good, and when: at which frame, None where never."""
+    def first(self, curves: Sequence[Curve]) -> Iterable[tuple[str, Curve]]:
+        """Of each motion its title and its first curve."""
+        titles = {group.members[0].label: group.title for group in self.groups}
+        return [(titles[curve.name], curve) for curve in curves if curve.name in titles]
+
+    def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
+        """Which schemes leave a picture for good, and when: at which frame, None where never."""
         factor, unit = self.time_unit
         firsts = {group.title: group.members[0] for group in self.groups}
         frames = {name: when(run) for name, run in firsts.items()}
@@ -143,51 +151,12 @@ class Runs:
         ]
         if len(said) > MOST_LEAVING:
             said = [*said[: MOST_LEAVING - 1], f"{len(said) - MOST_LEAVING + 1} more"]
-        if said:
-            text = "outside: " + ", ".join(said)
-            axes.set_title(textwrap.fill(text, 76), loc="right", fontsize=7.5, color="#555555")
-
-    def legend(self, figure: Figure, *extra: Line2D, truth: bool = False) -> None:
-        """One entry for each scheme, with the marks of its engines; first the `truth`, and `extra` lines."""
-        first = [Line2D([], [], **{name: TRUTH[name] for name in ("color", "linewidth", "label")})]
-        entries = [(group.look, group.legend) for group in self.groups]
-        # what is wrong comes first
-        entries.sort(key=lambda entry: not entry[1].startswith("FAILED"))
-        _legend(figure, entries, *(first if truth else []), *extra)
+        return "outside: " + ", ".join(said) if said else ""
 
 
-def _marks(axes: Axes, x: Floats, y: Floats, group: Group, share: float, label: str, most: int) -> None:
-    """Marks of an engine, at the `most`; each run's a share of their distance behind those of the first."""
-    apart = max(1, len(x) // most)
-    first = round(share * apart) % apart
-    axes.plot(
-        x[first::apart],
-        y[first::apart],
-        linestyle="none",
-        marker=looks.mark(looks.engine(label))[0],
-        markersize=4.2,
-        markerfacecolor="white",
-        markeredgecolor=group.look.color,
-        markeredgewidth=0.9,
-        label=label,
-        zorder=3 + group.failed,
-    )
-
-
-def scheme_legend(figure: Figure, methods: Mapping[str, Sequence[str]], *extra: Line2D) -> None:
-    """One entry for each scheme, with the marks of the engines of its methods; `extra` lines first."""
-    entries = [
-        (looks.look(scheme), f"{looks.title(scheme)}\n{looks.members(labels)}")
-        for scheme, labels in methods.items()
-    ]
-    _legend(figure, entries, *extra)
-
-
-def _legend(figure: Figure, entries: Sequence[tuple[looks.Look, str]], *extra: Line2D) -> None:
-    lines = [Line2D([], [], color=x.color, linestyle=x.linestyle, label=label) for x, label in entries]
-    figure.legend(
-        handles=[*extra, *lines], loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
-    )
+def exact_curve(x: Floats, y: Floats) -> Curve:
+    """The exact solution."""
+    return Curve(name=TRUTH, group=EXACT, x=x, y=y, title=TRUTH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +167,8 @@ class Frame:
     high: float
     clipped: bool = False
     """Whether some run goes far beyond."""
+    log: bool = False
+    """Whether decades are of one length."""
 
     @property
     def centre(self) -> float:
@@ -209,6 +180,19 @@ class Frame:
         """From its middle to its edge."""
         return self.high / 2 - self.low / 2
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """From and to."""
+        return self.low, self.high
+
+    def parts(self, values: Sequence[float] | Floats) -> Floats:
+        """Values as parts of the axis: 0 to 1 inside."""
+        x, low, high = np.asarray(values, np.float64), self.low, self.high
+        with np.errstate(all="ignore"):
+            if self.log:
+                x, low, high = np.log(x), np.log(low), np.log(high)
+            return np.asarray((x - low) / (high - low))
+
     def leaves(self, values: Floats) -> int | None:
         """The first of the values outside, None where all are inside or nothing was left out."""
         if not self.clipped:
@@ -219,8 +203,8 @@ class Frame:
     def within(self, values: Floats) -> Floats:
         """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
         end = self.leaves(values)
-        near = np.clip(values, self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half)
-        return near if end is None else np.where(np.arange(len(near)) <= end, near, np.nan)
+        values = values if end is None else values[: end + 1]
+        return np.clip(values, self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half)
 
 
 def frame(runs: Sequence[Floats], truth: Floats | None, *, far: float | None = None) -> Frame:
@@ -276,23 +260,71 @@ def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
     return tuple(np.asarray(w / scale * its.half + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]
 
 
-def heading(figure: Figure, text: str, width: int = 66) -> None:
-    """A title over all axes of a figure, broken where the legend begins."""
-    figure.suptitle(textwrap.fill(text, width), x=0.02, ha="left", fontsize=10)
+def at_ends(
+    named: Iterable[tuple[str, Curve]], xs: Frame, ys: Frame, *, height: float = NAME_HIGH
+) -> list[Naming]:
+    """Names at the ends of curves over time, beside the picture; of a curve that leaves it, where it leaves.
 
-
-def panels(
-    count: int, most: int, width: tuple[float, float], height: tuple[float, float], *, shared: str = ""
-) -> tuple[Figure, list[Axes], int]:
-    """A figure of so many panels, and how many of them stand beside each other, at the `most`.
-
-    `width` and `height` of a panel, and of what the figure has besides [in]; `shared`: of x, y or both.
+    They are moved apart as far as a line of text is high.
     """
-    columns = min(most, count)
-    rows = -(-count // columns)
-    size = width[0] * columns + width[1], height[0] * rows + height[1]
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False, sharex="x" in shared, sharey="y" in shared).ravel()
-    for axes in grid[count:]:
-        axes.set_axis_off()
-    return figure, list(grid[:count]), columns
+    ends: list[tuple[float, str, str]] = []
+    out: list[Naming] = []
+    for text, curve in named:
+        u, v = xs.parts(curve.x), ys.parts(curve.y)
+        inside = np.flatnonzero((u >= -0.01) & (u <= 1.01) & (v >= -0.01) & (v <= 1.01))
+        if not len(inside):
+            continue
+        last = int(inside[-1])
+        if u[last] > 0.9:
+            ends.append((float(v[last]), text, curve.group))
+        elif not any(
+            abs(v[last] - one.y) < height and abs(u[last] - one.x) < LETTER * len(text) for one in out
+        ):
+            out.append(
+                Naming(text=text, group=curve.group, x=float(u[last]) + 0.01, y=min(0.9, float(v[last])))
+            )
+    if len(ends) > min(MOST_NAMINGS, int(1 / height)):
+        return []
+    ends.sort()
+    places = [y for y, *_ in ends]
+    for _ in range(200):
+        for i in range(len(places) - 1):
+            short = height - (places[i + 1] - places[i])
+            if short > 0:
+                places[i] -= short / 2
+                places[i + 1] += short / 2
+        places = [min(max(y, height * i), 1 - height * (len(places) - 1 - i)) for i, y in enumerate(places)]
+    beside = [
+        Naming(text=text, group=group, x=1.0, y=y) for y, (_, text, group) in zip(places, ends, strict=True)
+    ]
+    return [*out[:MOST_NAMINGS], *beside]
+
+
+def alone(named: Iterable[tuple[str, Curve]], xs: Frame, ys: Frame) -> list[Naming]:
+    """Names of curves where they are farthest from all others, of those that stand apart somewhere."""
+    points: dict[tuple[str, str], Floats] = {}
+    for text, curve in named:
+        u, v = xs.parts(curve.x), ys.parts(curve.y)
+        inside = (u > 0.02) & (u < 0.98) & (v > 0.03) & (v < 0.95)
+        points[text, curve.group] = np.stack([u[inside], v[inside]], axis=1)
+    out: list[Naming] = []
+    for (text, group), mine in points.items():
+        others = np.concatenate([np.empty((0, 2)), *(x for key, x in points.items() if key != (text, group))])
+        best, found = NAME_AWAY, None
+        for x, y in mine[:: max(1, len(mine) // NAME_PLACES)].tolist():
+            # where its words stand
+            at = np.array(
+                [[x + s * 0.2 * LETTER * len(text) * (1 if x < 0.6 else -1), y + 0.02] for s in range(6)]
+            )
+            room = [float(np.min(np.hypot(*(others - place).T), initial=1.0)) for place in at]
+            taken = any(abs(y - one.y) < NAME_HIGH and abs(x - one.x) < LETTER * len(text) for one in out)
+            if not taken and min(room) > best:
+                best, found = min(room), (x, y)
+        if found is not None and len(out) < MOST_NAMINGS:
+            out.append(Naming(text=text, group=group, x=found[0], y=found[1]))
+    return out
+
+
+def share(x: float) -> str:
+    """A part of a whole as it is read: in percent, or as a power of ten."""
+    return f"{100 * x:.2g} %" if 5e-4 <= x < 1 else f"{100 * x:.0f} %" if 1 <= x < 1000 else f"{x:.0e}"

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.motion import Motion, periods, smooth
-from springcheck.figures.overlay import TRUTH, Frame, Runs
+from springcheck.figures.charts import GUIDE, SEPARATRIX, START, Bank, Chart, Curve, Scale
+from springcheck.figures.motion import Exact, Motion, periods, smooth
+from springcheck.figures.overlay import Frame, Runs, exact_curve, share
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
-from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 EQUAL = 2.5
@@ -23,51 +21,46 @@ EQUAL = 2.5
 PERIODS, SHOWN = 14, 6
 """Periods from which the first and the last ones are shown separately, and how many of each."""
 
-FRAMES = 7
-"""Frames of a period below which lines between them are chords: they are drawn as dots."""
+CHORD = 0.015
+"""Part of a picture by which lines between frames may miss the exact solution: beyond, frames are dots."""
 
-STEEP, START = 30.0, 8.0
+STEEP, START_SHOWN = 30.0, 8.0
 """How many times its median a motion that runs away reaches; of its start, what is shown of it."""
 
-SEPARATRIX = Line2D([], [], color="#666666", linewidth=0.9, linestyle=(0, (2, 2)), label="separatrix")
-_BEGIN = Line2D([], [], color="k", linestyle="none", marker="+", markersize=9, label="start")
+STANDS, SOON = 0.02, 0.1
+"""Part of its way that a motion has left where it has settled, and of the time by when that is soon."""
+
+MOST_CLOUDS = 12
+"""Schemes in a bath that have a panel of their own."""
 
 
-def phase_portraits(
-    runs: Runs, shown: Sequence[View], truth: Motion | None, *, what: str = "phase portrait"
-) -> Figure:
-    """Momentum over position, or what else a view shows: a panel for each."""
-    width, height = ((7.8, 0), (5.2, 0)) if len(shown) == 1 else ((4.9, 0), (3.4, 0.4))
-    figure, grid, _ = overlay.panels(len(shown), 2, width, height)
-    crossed = []
-    for axes, view in zip(grid, shown, strict=True):
-        crossed.append(_phase_portrait(axes, runs, view, truth))
-        if len(shown) > 1:
-            axes.set_title(view.title, fontsize=9, loc="left")
-        if view.what == "path":
-            axes.set_aspect("equal", adjustable="box")
-        elif len(shown) == 1 and runs.scene.units == "reduced" and not view.turn:
-            _equal(axes)
-    overlay.heading(figure, _title(runs.scene, what, shown))
-    runs.legend(figure, *([SEPARATRIX] if any(crossed) else []), _BEGIN, truth=truth is not None)
-    return figure
+def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, said: str = "") -> Bank:
+    """Momentum over position, or what else a view shows: a chart for each; `said`: what was found."""
+    charts = [_portrait(runs, view, truth, alone=len(shown) == 1) for view in shown]
+    what = "path" if shown[0].what == "path" else "phase portrait"
+    return Bank(
+        name=what.replace(" ", "-"), title="Methods drawn", charts=charts, columns=min(2, len(charts)),
+        heading=_heading(runs, f"{what}{_of(runs, shown)}", said),
+        size=(5.6, 5.2) if len(charts) == 1 else (4.9, 3.4),
+    )  # fmt: skip
 
 
-def _title(scene: Scene, what: str, shown: Sequence[View]) -> str:
-    if len(shown) > 1 or not shown[0].title:
-        return f"{scene.title}: {what}"
-    of = f" of {scene.n}" if shown[0].title.startswith("particle") else ""
-    return f"{scene.title}: {what} of {shown[0].title}{of}"
+def _heading(runs: Runs, what: str, said: str) -> str:
+    """What was found of what; what is wrong comes first."""
+    return f"{runs.scene.title}: {runs.wrong}{f'{said} ({what})' if said else what}"
 
 
-def _equal(axes: Axes) -> None:
-    width, height = (abs(b - a) for a, b in (axes.get_xlim(), axes.get_ylim()))
-    if max(width, height) <= EQUAL * min(width, height):
-        axes.set_aspect("equal", adjustable="box")
+def _of(runs: Runs, shown: Sequence[View]) -> str:
+    title = shown[0].title if len(shown) == 1 else ""
+    return f" of {title}" + (f" of {runs.scene.n}" if title.startswith("particle") else "") if title else ""
 
 
-def _phase_portrait(axes: Axes, runs: Runs, view: View, truth: Motion | None) -> bool:
-    """One panel; returns whether it shows a separatrix."""
+def _equal(xs: Frame, ys: Frame) -> bool:
+    return max(xs.half, ys.half) <= EQUAL * min(xs.half, ys.half)
+
+
+def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
+    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     xs, ys = _frames(list(picked.values()), true, view)
@@ -75,35 +68,73 @@ def _phase_portrait(axes: Axes, runs: Runs, view: View, truth: Motion | None) ->
     dy, y_unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.y_unit)
 
     def near(x: Floats, y: Floats) -> State:
-        x, y = view.wrapped(*overlay.nearer(x, y, xs, ys))
-        return dx * x, dy * y
-
-    curves = [(x, y) for x, y in view.separatrices(xs.low, xs.high) if _meets(x, y, xs, ys)]
-    for x, y in curves:
-        for sign in (1, -1):
-            axes.plot(
-                dx * x, sign * dy * y, color="#666666", linewidth=0.9, linestyle=(0, (2, 2)), zorder=1.5,
-                label="separatrix",
-            )  # fmt: skip
-    if true is not None:
-        axes.plot(*near(*true), **TRUTH)
-    runs.draw(axes, lambda run: near(*picked[run.label]), joined=_joined(runs, true))
-    axes.plot(*near(*view.pick(runs.scene.q[None], runs.scene.p[None])), "k+", markersize=10, zorder=4)
-    axes.set_xlim(dx * xs.low, dx * xs.high)
-    axes.set_ylim(dy * ys.low, dy * ys.high)
-    if view.turn:
-        axes.set_xticks([-1, -0.5, 0, 0.5, 1])
-    axes.set_xlabel(with_unit(view.x_name, x_unit))
-    axes.set_ylabel(with_unit(view.y_name, y_unit))
+        return view.wrapped(*overlay.nearer(x, y, xs, ys))
 
     def when(run: Trajectory) -> int | None:
         x, y = picked[run.label]
         return min((i for i in (xs.leaves(x), ys.leaves(y)) if i is not None), default=None)
 
+    parting = [(x, y) for x, y in view.separatrices(xs.low, xs.high) if _meets(x, y, xs, ys)]
+    lines = [
+        Curve(name=SEPARATRIX, group=SEPARATRIX, x=x, y=sign * y) for x, y in parting for sign in (1.0, -1.0)
+    ]
+    if true is not None:
+        lines.append(exact_curve(*near(*true)))
+    dots = _chords(runs.longest, truth, view, xs, ys)
+    curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
+    start = view.pick(runs.scene.q[None], runs.scene.p[None])
+    begin = Curve(name=START, group=START, x=start[0], y=start[1], line=False, marks=True)
+    square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
-    if _steep(picked, true) is None:
-        runs.note(axes, when)
-    return bool(curves)
+    note = runs.leaving(when) if _steep(picked, true) is None else ""
+    named = [*runs.first(curves), *((SEPARATRIX, one) for one in lines[:1] if parting)]
+    return Chart(
+        title=f"{view.y_name} over {view.x_name}{f' of {view.title}' if view.title else ''}.".capitalize(),
+        short="" if alone else view.title,
+        x=Scale(name=with_unit(view.x_name, x_unit), shown=xs.ends, factor=dx),
+        y=Scale(name=with_unit(view.y_name, y_unit), shown=ys.ends, factor=dy),
+        curves=[*lines, *curves, begin],
+        equal=square and (view.what == "path" or _equal(xs, ys)),
+        labels=overlay.alone(named, xs, ys) if alone else (),
+        note=note,
+    )
+
+
+def clouds(runs: Runs, view: View, thermal: float) -> Bank:
+    """States in a bath: a panel for each scheme, with the ring on which the energy is kT above the least."""
+    groups = runs.groups[:MOST_CLOUDS]
+    picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
+    # one that runs away sets the scale of none
+    sizes = sorted(max(float(np.max(np.abs(a))) for a in one) for one in picked.values())
+    usual = [one for one in picked.values() if np.max(np.abs(one[0])) <= 100 * (sizes[len(sizes) // 2] or 1)]
+    xs, ys = (
+        overlay.widened(
+            *(float(f([f(one[j]) for one in usual or picked.values()])) for f in (np.min, np.max))
+        )
+        for j in (0, 1)
+    )
+    dx, x_unit = looks.prefixed(max(abs(xs.low), abs(xs.high)), view.x_unit)
+    dy, y_unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.y_unit)
+    ring = [Curve(name="H = kT", group=GUIDE, x=x, y=y) for x, y in view.ring(xs.low, xs.high, thermal)]
+    charts = []
+    for group in groups:
+        curves = runs.curves(lambda run: picked[run.label], dots=True, groups=[group])
+        charts.append(
+            Chart(
+                title=f"States of {group.title}.",
+                short=group.title,
+                x=Scale(name=with_unit(view.x_name, x_unit), shown=xs.ends, factor=dx),
+                y=Scale(name=with_unit(view.y_name, y_unit), shown=ys.ends, factor=dy),
+                curves=[*(replace(one, marks=False) for one in curves), *ring],
+            )
+        )
+    left = len(runs.groups) - len(groups)
+    more = f"; {left} more are not drawn" if left else ""
+    said = f"states by {len(runs.groups)} thermostats" + ("; on the ring H = kT" if ring else "") + more
+    return Bank(
+        name="phase-portrait", title="Methods drawn", charts=charts, columns=min(4, len(charts)),
+        heading=_heading(runs, f"phase portrait{_of(runs, [view])}", said), size=(2.6, 2.4),
+    )  # fmt: skip
 
 
 def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Frame, Frame]:
@@ -139,7 +170,7 @@ def _steep(picked: Mapping[str, State], true: State | None) -> tuple[Frame, Fram
     start, end = float(size[0]), float(np.max(size))
     if not (end > STEEP * max(float(np.median(size)), start) and end == float(size[-1]) and start > 0):
         return None
-    last = int(np.argmax(size > START * start))
+    last = int(np.argmax(size > START_SHOWN * start))
     return tuple(_beginning(one[: last + 1]) for one in (x, y))  # type: ignore[return-value]
 
 
@@ -149,81 +180,129 @@ def _beginning(x: Floats) -> Frame:
     return Frame(min(edges), max(edges), True)
 
 
-def _joined(runs: Runs, true: State | None) -> bool:
-    """Whether frames stand so close that a line between them follows the motion."""
-    if true is None:
-        return True
-    return len(runs.longest.t) >= FRAMES * periods(true[0])
+def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -> bool:
+    """Whether frames stand so far apart that lines between them miss the exact solution by what is seen."""
+    if truth is None:
+        return False
+    t, *motion = np.abs(truth[0]), *view.pick(truth[1], truth[2])
+    at = np.abs(run.t)
+    inside = (t >= at[0]) & (t <= at[-1])
+    with np.errstate(all="ignore"):
+        missed = [
+            float(np.max(np.abs(np.interp(t, at, np.interp(at, t, x)) - x)[inside], initial=0.0)) / its.half
+            for x, its in zip(motion, frames, strict=False)
+        ]
+    return max(missed) > 2 * CHORD
 
 
-def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Figure:
+def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
     """Positions over time: a row for each view; of many periods the first and the last."""
-    rows = len(shown)
     spans = _spans(runs, shown, truth)
-    size = (8.2 if len(spans) == 1 else 10.6, 4.2 if rows == 1 else 1.75 * rows + 1)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, len(spans), squeeze=False, sharex="col", sharey="row")
-    _, unit = runs.time_unit
-    for row, view in zip(grid, shown, strict=True):
-        for axes, span in zip(row, spans, strict=True):
-            unit_x = _position(axes, runs, view, truth, span)
-        row[0].set_ylabel(with_unit(view.x_name, unit_x))
-        if rows > 1:
-            row[0].set_title(view.title, fontsize=9, loc="left")
-    for axes in grid[-1]:
-        axes.set_xlabel(with_unit("time t", unit))
-    parts = "" if len(spans) == 1 else f" (the first and the last {SHOWN} periods)"
-    overlay.heading(figure, _title(runs.scene, shown[0].what, shown) + parts, 66 if len(spans) == 1 else 90)
-    runs.legend(figure, truth=truth is not None)
-    return figure
+    charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
+    parts = "" if len(spans) == 1 else f"; the first and the last {SHOWN} periods"
+    bath = "every method draws noise of its own; the first periods"
+    off = _off(runs, shown[0]) if runs.scene.bath is None else bath
+    return Bank(
+        name="position", title="Methods drawn", charts=charts, columns=len(spans),
+        heading=_heading(runs, f"{shown[0].what}{_of(runs, shown)}", off) + parts,
+        size=(7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9),
+    )  # fmt: skip
+
+
+def _off(runs: Runs, view: View) -> str:
+    """How far the best and the worst are off the exact solution at most, as parts of its reach."""
+    exact = Exact(runs.scene)
+    if not exact.known:
+        return ""
+    found = {}
+    for group in runs.groups:
+        run = group.members[0]
+        x, true = (view.pick(*one)[0] for one in ((run.q, run.p), exact.at(run)))
+        with np.errstate(all="ignore"):
+            found[group.title] = float(np.max(np.abs(x - true))) / (float(np.ptp(true)) or 1.0)
+    return extremes(found, f"off the exact {view.what} by at most {{}} of its reach")
+
+
+def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:
+    """A text with the smallest and the largest number, and whose they are; what is beyond has left."""
+    stay = {name: x for name, x in found.items() if x <= beyond}
+    left = len(found) - len(stay)
+    gone = f"{left} of {len(found)} leave it" if left > 1 else next(
+        (f"{name} leaves it" for name in found if name not in stay), ""
+    )  # fmt: skip
+    if not stay:
+        return gone
+    small, large = min(stay, key=lambda x: stay[x]), max(stay, key=lambda x: stay[x])
+    numbers = f"{share(stay[small])} ({small})"
+    numbers += f" to {share(stay[large])} ({large})" if share(stay[large]) != share(stay[small]) else ""
+    return "; ".join(filter(None, [text.format(numbers), gone]))
 
 
 def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
     """The times that are shown: all, or the first and the last periods of many."""
     first, last = (float(f([f(np.abs(run.t)) for run in runs.every])) for f in (np.min, np.max))
-    if truth is None:
-        return [(first, last)]
-    count = max(periods(view.pick(truth[1], truth[2])[0]) for view in shown)
+    motion = truth[1:] if truth is not None else (runs.longest.q, runs.longest.p)
+    count = max(periods(view.pick(*motion)[0]) for view in shown)
     if count <= PERIODS:
         return [(first, last)]
     length = SHOWN * (last - first) / count
-    return [(first, first + length), (last - length, last)]
+    # in a bath one part is as good as another
+    return [(first, first + length), (last - length, last)][: 1 if runs.scene.bath else 2]
 
 
-def _position(axes: Axes, runs: Runs, view: View, truth: Motion | None, span: tuple[float, float]) -> str:
-    """One panel; returns the unit of its axis."""
+def _settles(t: Floats, x: Floats) -> float:
+    """When a motion has settled, where that is soon; else its end."""
+    away = np.abs(x - x[-1]) > STANDS * np.ptp(x)
+    last = float(t[np.flatnonzero(away)[-1]]) if away.any() else float(t[-1])
+    return 3 * (last - float(t[0])) + float(t[0]) if last - t[0] < SOON * (t[-1] - t[0]) else float(t[-1])
+
+
+def _position(
+    runs: Runs, view: View, truth: Motion | None, span: tuple[float, float], *, alone: bool
+) -> Chart:
+    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     states = {run.label: view.pick(run.q, run.p) for run in runs.every}
     picked = {label: x for label, (x, _) in states.items()}
     steep = _steep(states, true) is not None
     ys = overlay.frame(list(picked.values()), None if true is None else true[0])
-    dt, _ = runs.time_unit
-    dy, unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
+    if truth is not None and true is not None:
+        span = span[0], min(span[1], _settles(np.abs(truth[0]), true[0]))
+    dt, unit = runs.time_unit
+    dy, unit_x = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
+    of = np.abs if steep else np.asarray
 
     def cut(run: Trajectory) -> State:
-        here = (np.abs(run.t) >= span[0]) & (np.abs(run.t) <= span[1])
-        return dt * run.t[here], dy * ys.within(picked[run.label])[here]
+        y = ys.within(picked[run.label])
+        t = np.abs(run.t[: len(y)])
+        here = (t >= span[0]) & (t <= span[1])
+        return run.t[: len(y)][here], of(y[here])
 
+    lines = []
     # a part of many periods needs a finer line than all of them
-    fine = smooth(runs.scene, *span)
+    fine = smooth(runs.scene, *span, *([] if truth is None else [len(truth[0])]))
     if fine is not None:
-        axes.plot(dt * fine[0], dy * ys.within(view.pick(fine[1], fine[2])[0]), **TRUTH)
-    runs.draw(axes, cut, joined=_joined(runs, true), faint=True)
-    axes.set_ylim(dy * ys.low, dy * ys.high)
+        y = ys.within(view.pick(fine[1], fine[2])[0])
+        lines.append(exact_curve(fine[0][: len(y)], of(y)))
+    dots = _chords(runs.longest, fine, view, ys)
+    curves = runs.curves(cut, dots=dots, faint=True)
     if steep:
-        _logarithmic(axes, dy, [*picked.values(), *([] if true is None else [true[0]])], ys)
-    axes.ticklabel_format(axis="x", useOffset=False)
-    if span[0] == 0:
-        runs.note(axes, lambda run: ys.leaves(picked[run.label]))
-    return unit
+        inside = [np.abs(x) for x in picked.values() if ys.leaves(x) is None]
+        least = min((float(np.min(x[x > 0], initial=ys.high)) for x in inside), default=ys.high / 10)
+        ys = Frame(least / 2, 2 * ys.high, ys.clipped, log=True)
+    last = span[1] if runs.longest.step > 0 else -span[1]
+    xs = Frame(min(span[0], last), max(span[0], last))
+    name = with_unit(view.x_name, unit_x)
+    return Chart(
+        title=f"{view.x_name}{f' of {view.title}' if view.title else ''} over time.".capitalize(),
+        short="" if alone else view.title,
+        x=Scale(name=with_unit("time t", unit), shown=xs.ends, factor=dt),
+        y=Scale(name=f"|{name}|" if steep else name, log=steep, shown=ys.ends, factor=dy),
+        curves=[*lines, *curves],
+        labels=overlay.at_ends(runs.first(curves), xs, ys) if alone and span[1] == _last(runs) else (),
+        note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",
+    )
 
 
-def _logarithmic(axes: Axes, dy: float, found: Sequence[Floats], ys: Frame) -> None:
-    """The scale of a motion that runs away."""
-    inside = [x for x in found if ys.leaves(x) is None]
-    least = min(float(np.min(np.abs(x))) for x in inside)
-    if all(np.min(x) > 0 for x in inside):
-        axes.set_yscale("log")
-        axes.set_ylim(dy * least / 2, 2 * dy * ys.high)
-    else:
-        axes.set_yscale("symlog", linthresh=dy * float(np.abs(inside[0][0])) or 1.0)
+def _last(runs: Runs) -> float:
+    return max(float(np.max(np.abs(run.t))) for run in runs.every)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -14,10 +15,27 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from springcheck.figures import looks, overlay
-from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale
+from springcheck.figures import looks
+from springcheck.figures.charts import (
+    EXACT,
+    GUIDE,
+    SEPARATRIX,
+    START,
+    WRONG,
+    Bank,
+    Chart,
+    Curve,
+    Naming,
+    Rule,
+    Scale,
+)
+from springcheck.physics.arrays import Floats
 
-SHADES = {"good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000"}
+TILE_SHADES = {
+    "good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000",
+    "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
+    "s6": "#4b1250",
+}  # fmt: skip
 """Of the kinds of tiles, as on the page's paper."""
 
 RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#333333", (0, (1, 2))),
@@ -27,14 +45,21 @@ RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#
 NOT_TRIED = ("not tried", "#ffffff")
 """Of a tile without a kind."""
 
-EXACT = "exact"
-"""The group of the exact solution: broad and grey, behind all others."""
+MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
+"""Marks on a curve, at the most and at the least, and on all curves of a picture; a curve of more points than
+are many, and no line, shows them all, small."""
 
-MOST_MARKS, MANY = 14, 200
-"""Marks on a curve; one of more points than are many, and no line, shows them all, small."""
+GOLDEN = 0.618
+"""Multiples of it, modulo 1, stand far from one another, however many: there curves have their marks."""
 
-ENTRY = 0.36
-"""Height of an entry of the legend [in]."""
+DRAWN_UP_TO = 1e6
+"""How many times as far as its picture reaches a line is drawn: farther, drawing it overflows."""
+
+LEGEND_LINE = 0.17
+"""Height of a line of the legend, with its part of the space between entries [in]."""
+
+LETTERS, WIDEST = 11.3, 38
+"""Letters of a title on an inch; those of a line of the legend."""
 
 MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
 """Values of tiles that are written, and upwards; more than so many in even ratios: powers of ten."""
@@ -52,44 +77,77 @@ def picture(bank: Bank) -> Figure:
     small = tiled and not named and len(charts) >= SMALL_MAPS
     if small:
         wide, high = 3.7, 2.2
-    columns = min(3 if small or (len(charts) == 3 and not tiled) else 2, len(charts))
+    columns = bank.columns or min(3 if small or (len(charts) == 3 and not tiled) else 2, len(charts))
+    wide, high = bank.size or (wide, high)
     handles: list[Any] = _entries([curve for chart in charts for curve in chart.curves])
     handles += _kinds(charts)
+    lines = sum(1 + handle.get_label().count("\n") for handle in handles)
+    rows = -(-len(charts) // columns)
     # room for the whole legend
-    high = max(high, ENTRY * len(handles) / -(-len(charts) // columns))
-    figure, grid, _ = overlay.panels(len(charts), columns, (wide, 2.4), (high, 0.6))
-    for axes, chart in zip(grid, charts, strict=True):
-        _chart(axes, chart)
-    for j, axes in enumerate(grid if small else ()):
-        axes.set_ylabel(axes.get_ylabel() if j % columns == 0 else "")
-        axes.set_xlabel(axes.get_xlabel() if j >= len(grid) - columns else "")
-    overlay.heading(figure, bank.heading or charts[0].title, 62 * columns)
+    figure = Figure(
+        figsize=(wide * columns + 2.4, max(high * rows, LEGEND_LINE * lines) + 0.6), layout="constrained"
+    )
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in grid[len(charts) :]:
+        axes.set_axis_off()
+    for axes, chart in zip(grid, charts, strict=False):
+        _chart(axes, chart, round(wide * LETTERS))
+    _shared(list(grid[: len(charts)]), charts, columns)
+    _heading(figure, bank.heading or charts[0].title, min(110, max(60, round(wide * columns * LETTERS))))
     figure.legend(
         handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
     )
     return figure
 
 
+def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None:
+    """Charts with the same axis beside or above one another name it once."""
+    for j, (axes, chart) in enumerate(zip(grid, charts, strict=True)):
+        below = charts[j + columns] if j + columns < len(charts) else None
+        if below and below.x == chart.x:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
+        if j % columns and charts[j - 1].y == chart.y:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+
+
+def _heading(figure: Figure, text: str, width: int) -> None:
+    """A title over all axes of a figure."""
+    figure.suptitle(textwrap.fill(text, width), x=0.02, ha="left", fontsize=10)
+
+
 def _entries(curves: Sequence[Curve]) -> list[Line2D]:
-    """One entry for each group of curves, with the marks of the engines of its methods."""
-    groups: dict[str, list[str]] = {}
+    """One entry for each group of curves, with the marks of the engines of its methods; what is wrong comes
+    first."""
+    groups: dict[tuple[str, str], list[Curve]] = {}
     for curve in curves:
-        names = groups.setdefault(curve.group, [])
-        if curve.name not in names:
-            names.append(curve.name)
+        mine = groups.setdefault((curve.group, curve.name if curve.group == WRONG else ""), [])
+        if curve.name not in [one.name for one in mine]:
+            mine.append(curve)
     found = []
-    for group, names in groups.items():
-        if group == GUIDE:
-            continue
-        if group == EXACT:
-            found.append(Line2D([], [], color="#b3b3b3", linewidth=4, label=names[0]))
-            continue
-        methods = [name for name in names if ":" in name]
-        look = looks.look(group)
-        title = looks.title(group) if methods else names[0]
+    for (group, _), mine in groups.items():
+        name, methods = mine[0].name, [one.name for one in mine if ":" in one.name]
+        title = textwrap.fill((mine[0].title or looks.title(group)) if methods else name, WIDEST)
         label = f"{title}\n{looks.members(methods)}" if methods else title
-        found.append(Line2D([], [], color=look.color, linestyle=look.linestyle, label=label))
-    return found
+        if group == WRONG:
+            sign = looks.mark(looks.engine(name))[1]
+            label = f"FAILED: {name}\n{sign} {textwrap.fill(mine[0].title, 30)}"
+        if group in OTHER_LINES:
+            found.append(Line2D([], [], **OTHER_LINES[group], label=label))
+        elif group != GUIDE:
+            look = looks.look(group)
+            line: Any = look.linestyle if any(one.line or one.dots for one in mine) else "none"
+            found.append(Line2D([], [], color=look.color, linestyle=line, label=label))
+    return sorted(found, key=lambda entry: not str(entry.get_label()).startswith("FAILED"))
+
+
+OTHER_LINES: dict[str, dict[str, Any]] = {
+    EXACT: {"color": "#b3b3b3", "linewidth": 4.0, "alpha": 0.7, "zorder": 1},
+    SEPARATRIX: {"color": "#666666", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5},
+    START: {"color": "k", "linestyle": "none", "marker": "+", "markersize": 9, "zorder": 4},
+}
+"""How what is no scheme's is drawn."""
 
 
 def _kinds(charts: Sequence[Chart]) -> list[Patch]:
@@ -97,52 +155,97 @@ def _kinds(charts: Sequence[Chart]) -> list[Patch]:
     kinds = [chart.tiles.kinds[i] if i >= 0 else NOT_TRIED for chart in charts if chart.tiles
              for row in chart.tiles.rows for i in row]  # fmt: skip
     seen = dict.fromkeys(kinds) if found else {}
+    every = [kind for chart in charts if chart.tiles for kind in chart.tiles.kinds]
     return [
-        Patch(facecolor=SHADES.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
-        for name, shade in seen
+        Patch(facecolor=TILE_SHADES.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
+        for name, shade in dict.fromkeys([*every, NOT_TRIED])
+        if (name, shade) in seen
     ]
 
 
-def _chart(axes: Axes, chart: Chart) -> None:
+def _chart(axes: Axes, chart: Chart, letters: int) -> None:
     if chart.tiles:
         _tiles(axes, chart)
+    most = min(MOST_MARKS, max(FEWEST_MARKS, ALL_MARKS // max(1, len(chart.curves))))
     for number, curve in enumerate(chart.curves):
-        _curve(axes, curve, number)
+        _curve(axes, curve, number, most, chart)
     for number, rule in enumerate(chart.rules):
         _rule(axes, rule, 0.98 - 0.1 * (number % 4))
-    for scale, axis in ((chart.x, "x"), (chart.y, "y")):
-        _scale(axes, scale, axis, tiled=chart.tiles is not None)
+    _scale(axes, chart.x, "x", tiled=chart.tiles is not None)
+    _scale(axes, chart.y, "y", tiled=chart.tiles is not None)
     if chart.equal:
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", adjustable="box")
     if chart.short:
-        axes.set_title(textwrap.fill(chart.short, 56), fontsize=8.5, loc="left")
+        axes.set_title(textwrap.fill(chart.short, letters), fontsize=8.5, loc="left")
+    if chart.note:
+        under = "\n" if chart.short else ""
+        axes.set_title(textwrap.fill(chart.note, letters) + under, loc="right", fontsize=7.5, color="#555555")
+    for label in chart.labels:
+        _label(axes, label)
 
 
-def _curve(axes: Axes, curve: Curve, number: int) -> None:
-    look = looks.look(curve.group)
-    x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
-    if curve.group == EXACT:
-        axes.plot(x, y, color="#b3b3b3", linewidth=4, alpha=0.7, zorder=1)
+def _label(axes: Axes, label: Naming) -> None:
+    """The name of a curve where it stands; white around it, so that lines do not run through it."""
+    color = OTHER_LINES[label.group]["color"] if label.group in OTHER_LINES else looks.look(label.group).color
+    beside, left = label.x >= 1, label.x > 0.6
+    axes.annotate(
+        textwrap.shorten(label.text, 34, placeholder="..."), (label.x, label.y), xycoords="axes fraction",
+        xytext=(4 if beside or not left else -4, 0 if beside else 4), textcoords="offset points",
+        ha="left" if beside or not left else "right", va="center" if beside else "bottom", fontsize=7.5,
+        color=color, zorder=5, annotation_clip=False,
+        path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white")],
+    )  # fmt: skip
+
+
+def _drawable(values: Any, scale: Scale) -> Floats:
+    """Numbers in the unit of their axis; what is far beyond its picture is brought nearer."""
+    x = np.asarray(values, np.float64)
+    if scale.shown is not None:
+        low, high = scale.shown
+        far = DRAWN_UP_TO * max(abs(low), abs(high))
+        x = np.clip(x, -far, far)
+    return x * scale.factor
+
+
+def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> None:
+    scales, tiled = (chart.x, chart.y), chart.tiles is not None
+    look, high = looks.look(curve.group), int(curve.group == WRONG)
+    x, y = (_drawable(one, scale) for one, scale in zip((curve.x, curve.y), scales, strict=True))
+    if curve.group in OTHER_LINES and (curve.line or curve.group == START):
+        axes.plot(x, y, label=curve.name, **OTHER_LINES[curve.group])
         return
     if curve.group == GUIDE:
-        axes.plot(x, y, color="#333333", linewidth=0.9)
+        white = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+        axes.plot(x, y, color="#333333", linewidth=0.9, path_effects=white, zorder=4)
         how: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "#333333"}
-        axes.annotate(curve.name, (x[-1], y[-1]), xytext=(3, -4), **how)
+        # in a map there is nothing beside it
+        at = len(x) // 3 if tiled else -1
+        axes.annotate(curve.name, (x[at], y[at]), xytext=(3, -4), path_effects=white, zorder=5, **how)
         return
-    if curve.line:
-        axes.plot(x, y, color=look.color, linestyle=look.linestyle, linewidth=1.1, zorder=2)
+    drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
+    if curve.band is not None:
+        low, top = (_drawable(one, scales[1]) for one in curve.band)
+        axes.fill_between(x, low, top, color=look.color, alpha=0.2, linewidth=0)
+    if curve.dots and not curve.over:
+        axes.plot(x, y, ".", markersize=3 + 2 * high, **drawn)
+        if curve.line:
+            axes.plot(x, y, color=look.color, linewidth=0.7, alpha=0.4, zorder=1.5)
+    elif curve.line and not curve.over:
+        axes.plot(x, y, linestyle=look.linestyle, linewidth=1.2 + 0.7 * high, **drawn)
     mark = looks.mark(looks.engine(curve.name))[0]
     if curve.marks:
-        many = len(x) > MANY and not curve.line
-        apart = 1 if many else max(1, len(x) // MOST_MARKS)
-        first = round(number * overlay.GOLDEN % 1 * apart) % apart
+        many = len(x) > MANY and not (curve.line or curve.over or curve.dots)
+        apart = 1 if many else max(1, len(x) // most)
+        first = round(number * GOLDEN % 1 * apart) % apart
         estimated = np.asarray(curve.open, bool) if len(curve.open) else np.zeros(len(x), bool)
         for some, face in ((~estimated, look.color if len(curve.open) else "white"), (estimated, "white")):
             here = np.flatnonzero(some)[first::apart]
-            axes.plot(
-                x[here], y[here], linestyle="none", marker=mark, markersize=1.8 if many else 4,
-                markerfacecolor=face, markeredgecolor=look.color, markeredgewidth=0.9, zorder=3,
-            )  # fmt: skip
+            if len(here):
+                axes.plot(
+                    x[here], y[here], linestyle="none", marker=mark, markersize=1.8 if many else 4.1,
+                    markerfacecolor=face, markeredgecolor=look.color, markeredgewidth=0.9, zorder=3 + high,
+                    label=curve.name,
+                )  # fmt: skip
     elif curve.line and ":" in curve.name and len(x):
         # where it ends
         axes.plot(x[-1:], y[-1:], marker=mark, color=look.color, markersize=4, zorder=3)
@@ -165,7 +268,7 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
 def _tiles(axes: Axes, chart: Chart) -> None:
     tiles = chart.tiles
     assert tiles is not None
-    shades = [SHADES.get(shade, shade) for _, shade in tiles.kinds]
+    shades = [TILE_SHADES.get(shade, shade) for _, shade in tiles.kinds]
     plane = np.ma.masked_less(np.asarray(tiles.rows), 0)
     axes.grid(False)
     axes.imshow(
@@ -174,9 +277,10 @@ def _tiles(axes: Axes, chart: Chart) -> None:
     )  # fmt: skip
 
 
-def _scale(axes: Axes, scale: Scale, which: str, *, tiled: bool) -> None:
+def _scale(axes: Axes, scale: Scale, which: Literal["x", "y"], *, tiled: bool) -> None:
     names, values = list(scale.names), np.asarray(scale.values, np.float64)
     put = axes.set_xticks if which == "x" else axes.set_yticks
+    axes.ticklabel_format(axis=which, useOffset=False) if not (scale.log or tiled or names) else None
     if names:
         put(range(len(names)), names, fontsize=7, rotation=90 if which == "x" else 0)
     elif tiled and len(values) > EVEN and np.all(values > 0):
@@ -191,5 +295,5 @@ def _scale(axes: Axes, scale: Scale, which: str, *, tiled: bool) -> None:
             (axes.set_xscale if which == "x" else axes.set_yscale)("log")
             (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(NullFormatter())
         if scale.shown:
-            (axes.set_xlim if which == "x" else axes.set_ylim)(*scale.shown)
+            (axes.set_xlim if which == "x" else axes.set_ylim)(*(scale.factor * x for x in scale.shown))
     (axes.set_xlabel if which == "x" else axes.set_ylabel)(scale.name)

@@ -1,8 +1,8 @@
 """What a study is: a folder with its measure, result, text and figure, and its line in the list of studies.
 
 The folder's `__init__` declares the study and imports nothing heavy; its parts are imported when they are
-used: `measure.perform` and `measure.stored`, `text.lines`, `figure.pictures`, and `page.banks` where there
-are charts for the report page.
+used: `measure.perform` and `measure.stored`, `text.lines`, and `page.banks` or, where matplotlib draws by
+itself, `figure.pictures`.
 """
 
 from __future__ import annotations
@@ -157,13 +157,13 @@ class Study:
             return drawn
         from springcheck.figures import render
 
-        return {bank.name: render.picture(bank) for bank in self.banks(found) if bank.name}
+        return {bank.name: render.picture(bank) for bank in self.banks(found, **chosen) if bank.name}
 
-    def banks(self, found: Result) -> list[Bank]:
-        """Its charts in the report page; none where it has no such part."""
+    def banks(self, found: Result, **chosen: Any) -> list[Bank]:
+        """Its charts in figures and in the report page; none where it has no such part."""
         if not self._has("page"):
             return []
-        banks: list[Bank] = self._part("page").banks(found)
+        banks: list[Bank] = self._part("page").banks(found, **chosen)
         return banks
 
     def _has(self, name: str) -> bool:

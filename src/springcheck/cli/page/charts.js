@@ -5,7 +5,7 @@
 let clips = 0;
 
 class Chart {
-  // spec: {title, x, y, curves, tiles, rules, equal, times, most}; `looks` of its curves by name, `isOn` of a name
+  // spec: {title, x, y, curves, tiles, rules, labels, note, equal}; `looks` of its curves by name, `isOn` of a name
   constructor(place, spec, looks, isOn) {
     Object.assign(this, { spec, looks, isOn, view: null, at: null, dots: [] });
     const figure = html("figure"), caption = html("figcaption", spec.title), tools = html("div");
@@ -47,7 +47,7 @@ class Chart {
   }
 
   prepare() {
-    const way = ({ log }) => (log ? (v) => (v > 0 ? Math.log10(v) : NaN) : (v) => v);
+    const way = ({ log, factor }) => (log ? (v) => (v > 0 ? Math.log10(v * factor) : NaN) : (v) => v * factor);
     const [toX, toY] = [way(this.spec.x), way(this.spec.y)];
     this.points = new Map(this.spec.curves.map((curve) => [curve, [curve.x.map(toX), curve.y.map(toY)]]));
   }
@@ -56,22 +56,19 @@ class Chart {
     return this.spec.curves.filter((curve) => this.isOn(curve.name));
   }
 
-  // The picture that shows everything worth it, as the axes draw.
+  // The picture that is shown at first, as the axes draw.
   whole() {
-    const { x, y, tiles, times, most } = this.spec;
+    const { x, y, tiles } = this.spec;
     if (tiles) return [-0.5, x.values.length - 0.5, -0.5, y.values.length - 0.5];
-    const curves = this.seen();
-    const size = (curve) => Math.max(largest(curve.y), times ? largest(curve.x) : 0);
-    const fits = times ? shown(curves.map(size), times) : curves.map((curve) => !most || size(curve) <= most);
-    this.far = curves.filter((_, i) => !fits[i]).map((curve) => curve.name);
-    const span = (which, scale) => {
-      if (scale.shown) return scale.log ? scale.shown.map(Math.log10) : scale.shown;
+    const span = (which, { shown, log, factor, named, values }) => {
+      if (named) return [-0.5, values.length - 0.5];
+      if (shown) return shown.map((v) => (log ? Math.log10(v * factor) : v * factor));
       let [low, high] = [Infinity, -Infinity];
-      curves.filter((_, i) => fits[i]).forEach((curve) => {
+      for (const curve of this.seen()) {
         for (const v of this.points.get(curve)[which]) {
           if (Number.isFinite(v)) [low, high] = [Math.min(low, v), Math.max(high, v)];
         }
-      });
+      }
       if (!(low <= high)) [low, high] = [-1, 1];
       const room = (high - low) * 0.05 || Math.abs(high) * 0.05 || 1;
       return [low - room, high + room];
@@ -124,12 +121,19 @@ class Chart {
     const inside = element("g", { "clip-path": `url(#${clip})` });
     if (spec.tiles) this.tiles(inside, x, y);
     for (const { axis, at, name, look } of spec.rules) {
-      const v = spec[axis].log ? Math.log10(at) : at;
+      const v = spec[axis].log ? Math.log10(at * spec[axis].factor) : at * spec[axis].factor;
       const ends = axis === "x" ? { x1: x(v), x2: x(v), y1: T, y2: H - B } : { x1: L, x2: W - R, y1: y(v), y2: y(v) };
       inside.append(element("line", { class: look || "limit", ...ends }));
       inside.append(element("text", axis === "x" ? { x: x(v) + 5, y: T + 14 } : { x: W - R - 5, y: y(v) - 5, "text-anchor": "end" }, name));
     }
     for (const curve of this.seen()) this.curve(inside, curve, x, y);
+    const groups = new Set(this.seen().map((curve) => curve.group)), [a, b, c, d] = this.whole();
+    for (const { text, group, x: u, y: v } of spec.labels.filter((one) => groups.has(one.group))) {
+      const place = { x: x(a + u * (b - a)) + (u > 0.6 ? -4 : 4), y: y(c + v * (d - c)) - 4, "text-anchor": u > 0.6 ? "end" : "start" };
+      const name = element("text", { class: "name", ...place }, text);
+      name.style.fill = lookOf(group, 0).colour;
+      inside.append(name);
+    }
     this.ring = element("circle", { class: "ring", r: 6, cx: -99, cy: -99 });
     this.frame = element("rect", { class: "drag", width: 0, height: 0 });
     inside.append(this.ring, this.frame);
@@ -139,11 +143,13 @@ class Chart {
     this.box.replaceChildren(root);
     const names = spec.tiles ? "" : ` Shown: ${this.seen().map((curve) => curve.name).join(", ") || "nothing"}.`;
     this.box.setAttribute("aria-label", `${spec.title} ${spec.y.name} over ${spec.x.name}.${names} Arrow keys read it, plus and minus zoom, 0 shows all.`);
-    this.note.textContent = this.view || !this.far ? "" : beyond(this.far);
+    this.note.textContent = spec.note ? ` ${spec.note}.` : "";
   }
 
   curve(inside, curve, x, y) {
     const [us, vs] = this.points.get(curve), look = this.looks(curve.name);
+    // of a line some points have marks, of dots all
+    const apart = curve.dots || (curve.marks && (!curve.line || us.length < 60)) ? 1 : curve.marks ? Math.ceil(us.length / 14) : Infinity;
     let path = "", marks = "", last = null, ended = null;
     for (let i = 0; i < us.length; i++) {
       const here = Number.isFinite(us[i]) && Number.isFinite(vs[i]) ? [x(us[i]), y(vs[i])] : null;
@@ -155,7 +161,7 @@ class Chart {
           ended = `${c} ${d}`;
         }
       }
-      if (here && curve.marks && Math.abs(here[0]) < 1e4 && Math.abs(here[1]) < 1e4) marks += look.shape(here[0], here[1]);
+      if (here && i % apart === 0 && Math.abs(here[0]) < 1e4 && Math.abs(here[1]) < 1e4) marks += look.shape(here[0], here[1]);
       last = here;
     }
     if (path) inside.append(stroked(path, look));
@@ -174,7 +180,7 @@ class Chart {
       }
     });
     kinds.forEach(([, shade], kind) => {
-      if (paths[kind]) inside.append(element("path", { class: `tile ${shade === "limit" ? "limit-tile" : shade}`, d: paths[kind], "shape-rendering": "crispEdges" }));
+      if (paths[kind]) inside.append(tile("path", shade, { d: paths[kind], "shape-rendering": "crispEdges" }));
     });
   }
 
@@ -191,7 +197,7 @@ class Chart {
     const { x, y } = this.spec, [us, vs] = this.points.get(curve);
     this.where = { curve, i };
     const note = curve.notes && curve.notes[i] ? `; ${curve.notes[i]}` : "";
-    this.say(`${curve.name}: ${x.name} ${curve.x[i]}, ${y.name} ${curve.y[i]}${note}`, us[i], vs[i]);
+    this.say(`${curve.name}: ${x.name} ${curve.x[i] * x.factor}, ${y.name} ${y.named ? y.values[curve.y[i]] : curve.y[i] * y.factor}${note}`, us[i], vs[i]);
   }
 
   readTile(i, j) {
@@ -326,7 +332,7 @@ class Bank {
       key.className = "legend";
       for (const [name, shade] of kinds) {
         const one = html("span"), box = element("svg", { width: 16, height: 16, "aria-hidden": "true" });
-        box.append(element("rect", { class: `tile ${shade === "limit" ? "limit-tile" : shade}`, width: 16, height: 16 }));
+        box.append(tile("rect", shade, { width: 16, height: 16 }));
         one.append(box, name);
         key.append(one);
       }

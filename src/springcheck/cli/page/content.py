@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,20 @@ from springcheck.checks.compare import EXACT, Same
 from springcheck.cli import explain
 from springcheck.cli.page.sections import Section, sections
 from springcheck.errors import SpringcheckError
-from springcheck.figures.charts import numbers
+from springcheck.figures.charts import Bank, numbers
+from springcheck.figures.charts import plain as charts_as_data
+from springcheck.figures.views import MOST_PANELS
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import Damage, Summary
+from springcheck.studies.run.drawable import drawable
+from springcheck.studies.run.page import of_runs
 from springcheck.text.wording import STATES_SHOW
 
-NUMBERS = 15_000
+NUMBERS = 12_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
 FEWEST_SHOWN = 50
 """Frames that are kept of each trajectory however many there are."""
@@ -101,6 +106,13 @@ class Content:
         return checks.summary([verdict for one in self.methods for verdict in one.verdicts])
 
     @property
+    def finding(self) -> str:
+        """What the first of its charts shows, with its title."""
+        banks = iter(self.data["banks"].values())
+        found = str(self.data["banks"].get("motion", next(banks, {})).get("heading", ""))
+        return found.partition(" (phase portrait")[0] or self.title
+
+    @property
     def failed(self) -> tuple[Passed, ...]:
         """The methods that some verdict rejects."""
         return tuple(one for one in self.methods if one.count(False))
@@ -121,12 +133,15 @@ def gather(path: Path) -> Content:
     name = str(summary.root.get("scene_name") or path.stem)
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
     labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
-    most = max(FEWEST_SHOWN, NUMBERS // (4 * max(1, len(labels))))
+    rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
+    most = max(FEWEST_SHOWN, NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
     kept = bool(summary.runs) and path.is_file()
     verdicts = store.verdicts(path) if kept else ()
     comparison = store.comparison(path) if kept else None
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
+    if labels and (motion := _motion(path, wrong, most)):
+        banks["motion"] = motion
     title = (scene.title or scene.name) if scene else path.name
     return Content(
         title=title,
@@ -153,10 +168,37 @@ def gather(path: Path) -> Content:
             "linear": linear(scene) if scene and labels else None,
             "laws": laws(piece.scheme for piece, _ in pieces.values()),
             "steps": scene.steps if scene else 0,
-            "particles": scene.n if scene else 0,
             "equal": scene is not None and scene.units == "reduced",
             "banks": banks,
         },
+    )
+
+
+def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | None:
+    """The charts of the run in one bank: what `plot` draws, the first engine of each scheme on."""
+    shown = drawable(path, most)
+    found = of_runs(shown.scene, shown.runs, shown.followed, failed=wrong, points=most)
+    if not found:
+        return None
+    curves = [curve for bank in found for chart in bank.charts for curve in chart.curves]
+    kept = {x.tobytes() for run in shown.runs.values() for x in (run.t, *run.q.T, *run.p.T)}
+
+    def few(x: Sequence[float] | Floats) -> Sequence[float] | Floats:
+        """What is no number of the file is written with seven digits."""
+        return x if np.asarray(x).tobytes() in kept else [float(f"{value:.7g}") for value in x]
+
+    charts = [
+        replace(
+            chart,
+            title=f"{bank.heading}. {chart.title}" if j == 0 else chart.title,
+            curves=[replace(curve, x=few(curve.x), y=few(curve.y)) for curve in chart.curves],
+        )
+        for bank in found
+        for j, chart in enumerate(bank.charts)
+    ]
+    on = [curve.name for curve in curves if not curve.over] + [chart.title for chart in charts]
+    return charts_as_data(
+        Bank(title="Methods drawn", heading=found[0].heading, charts=charts, on=list(dict.fromkeys(on)))
     )
 
 
@@ -214,7 +256,7 @@ def laws(names: Iterable[str]) -> dict[str, Any]:
 
 
 def drawn(piece: Trajectory, *, failed: bool = False) -> dict[str, Any]:
-    """The first particle of a trajectory, and the energy of all."""
+    """The first particle of a trajectory."""
     how = piece.arithmetic
     return {
         "label": piece.label,
@@ -227,7 +269,6 @@ def drawn(piece: Trajectory, *, failed: bool = False) -> dict[str, Any]:
         "t": numbers(piece.t),
         "q": numbers(piece.q[:, 0]),
         "p": numbers(piece.p[:, 0]),
-        "energy": None if piece.energy is None else numbers(piece.energy),
     }
 
 

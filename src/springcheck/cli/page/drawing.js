@@ -40,9 +40,12 @@ function groupOf(name) {
   return GROUPS.indexOf(name);
 }
 
+// Dashes of what is no scheme's.
+const PLAIN_LOOKS = { exact: "1 5", separatrix: "3 3", guide: "", start: "" };
+
 // Colour, dash, mark and dash on paper of the count-th curve of a group; colour and dash are those of figures.
 function lookOf(group, count) {
-  if (group === "exact") return { colour: "var(--soft)", dash: "1 5", printed: "1 5", shape: SHAPES[0] };
+  if (group in PLAIN_LOOKS) return { shape: SHAPES[4], colour: "var(--soft)", dash: PLAIN_LOOKS[group], printed: PLAIN_LOOKS[group] };
   const which = groupOf(group), [light, dark, line] = DATA.looks[group];
   return {
     colour: DARK.matches ? dark : light,
@@ -63,6 +66,13 @@ function marked(d, { colour }) {
   const marks = element("path", { class: "marks", d });
   marks.style.stroke = colour;
   return marks;
+}
+
+// A tile of a kind: a shade of the style sheet, or a colour.
+function tile(name, shade, attributes) {
+  const made = element(name, { class: "tile", ...attributes });
+  made.style.fill = shade[0] === "#" ? shade : `var(--${/^s\d/.test(shade) ? "" : "t-"}${shade})`;
+  return made;
 }
 
 function sample(look, { line = true, marks = false } = {}) {
@@ -126,19 +136,4 @@ function clipped(a, b, c, d, most) {
     to = Math.min(to, Math.max(u, v));
   }
   return from < to ? [a + from * (c - a), b + from * (d - b), a + to * (c - a), b + to * (d - b)] : null;
-}
-
-// Of curves' largest numbers those that set the scale: an explosion does not.
-function shown(sizes, times) {
-  const sorted = sizes.filter(Number.isFinite).sort((a, b) => a - b);
-  const most = times * (sorted[Math.floor((sorted.length - 1) / 2)] || 0);
-  return sizes.map((size) => size <= most);
-}
-
-function largest(values) {
-  return values.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
-}
-
-function beyond(names) {
-  return names.length ? ` Beyond the picture: ${names.join(", ")}.` : "";
 }

@@ -1,56 +1,37 @@
 "use strict";
 // The stored motion, the loops of loops.js on opening and by the sliders, and the charts of the studies.
 
-const DATA = JSON.parse(document.getElementById("data").textContent);
-for (const run of DATA.runs) {
-  for (const name of ["t", "q", "p", "energy"]) {
-    // infinities and not-a-numbers are words in JSON
-    if (run[name]) run[name] = run[name].map(Number);
-  }
+// rows of numbers stand once: [rows, data], and {"#": i} for the i-th of them, {"$": i} where it is text
+const [ROWS, GIVEN] = JSON.parse(document.getElementById("data").textContent);
+
+function whole(x) {
+  if (!x || typeof x !== "object") return x;
+  if (Array.isArray(x)) return x.map(whole);
+  // infinities and not-a-numbers are words in JSON
+  if ("$" in x) return ROWS[x.$];
+  if ("#" in x) return ROWS[x["#"]].map(Number);
+  return Object.fromEntries(Object.entries(x).map(([name, value]) => [name, whole(value)]));
 }
-const PLAIN = { log: false, values: [], shown: null };
+
+const DATA = whole(GIVEN);
+for (const run of DATA.runs) for (const name of ["t", "q", "p"]) run[name] = run[name].map(Number);
+const PLAIN = { log: false, values: [], shown: null, factor: 1 };
 
 // A chart of curves on linear axes.
 function plain(title, x, y, curves, more) {
-  return { title, x: { ...PLAIN, name: x }, y: { ...PLAIN, name: y }, curves, tiles: null, rules: [], ...more };
+  return { title, x: { ...PLAIN, name: x }, y: { ...PLAIN, name: y }, curves, tiles: null, rules: [], labels: [], note: "", ...more };
 }
 
 function curveOf(name, group, x, y, more) {
   return { name, group, x, y, line: true, marks: false, notes: null, title: "", ...more };
 }
 
-function motion() {
-  const place = document.getElementById("motion");
-  if (!place) return;
-  const seen = new Set(), on = [], first = DATA.runs.map((run) => run.scheme);
-  // what failed is drawn last, on top
-  const runs = [...DATA.runs].sort((a, b) => a.failed - b.failed || first.indexOf(a.scheme) - first.indexOf(b.scheme));
-  for (const run of runs) {
-    if (run.failed || !seen.has(run.scheme)) on.push(run.label);
-    if (!run.failed) seen.add(run.scheme);
-  }
-  const curve = (run, x, y, notes) => curveOf(run.label, run.failed ? "failed" : run.scheme, x, y, { notes, title: run.title });
-  const change = (run) => run.energy.map((e) => (e - run.energy[0]) / (Math.abs(run.energy[0]) || 1));
-  const of = DATA.particles > 1 ? " of particle 0" : "", all = DATA.particles > 1 ? ", all particles" : "";
-  const charts = [
-    plain(`Phase portrait: momentum over position${of}.`, "q", "p",
-      runs.map((run) => curve(run, run.q, run.p, run.t.map((t) => `t ${t}`))), { times: 8, equal: DATA.equal }),
-  ];
-  const kept = runs.filter((run) => run.energy);
-  if (kept.length) {
-    // of energies the one that grows is what is to be seen: only what has left all the others is cut off
-    charts.push(plain(`Energy: change over time, as a fraction of that of the start${all}.`, "t", "(H - H\u2080) / |H\u2080|",
-      kept.map((run) => curve(run, run.t, change(run))), { most: 20 }));
-  }
-  new Bank(place, { title: "Methods drawn", on, charts });
-}
-
-// Of the studies, as they come.
+// Of the run and of the studies, as they come.
 function banks() {
   const numbers = (values) => values.map(Number);
   for (const [name, bank] of Object.entries(DATA.banks)) {
     for (const chart of bank.charts) {
-      for (const curve of chart.curves) Object.assign(curve, { x: numbers(curve.x), y: numbers(curve.y), title: curve.group });
+      for (const curve of chart.curves) Object.assign(curve, { x: numbers(curve.x), y: numbers(curve.y), title: curve.title || curve.group });
       if (chart.tiles) for (const scale of [chart.x, chart.y]) if (!scale.named) scale.values = numbers(scale.values);
     }
     new Bank(document.getElementById(name), bank);
@@ -239,7 +220,7 @@ function tried(s) {
   const radii = TRIED.map(([name, group]) => curveOf(name, group, ws, ws.map((w) => radius(THREE[group], w, zeta))));
   const here = s.k > 0 ? [{ axis: "x", at: Math.abs(s.h) * Math.sqrt(omega2), name: "here", look: "here" }] : [];
   return [
-    plain(`Momentum over position, ${steps} steps.${beyond(far)}`, "q", "p", orbits, {
+    plain(`Momentum over position, ${steps} steps.${far.length ? ` Beyond the picture: ${far.join(", ")}.` : ""}`, "q", "p", orbits, {
       x: { ...range(s.at, a), name: "q" }, y: { ...range(0, b), name: "p" }, equal: DATA.equal && a < 3 * b && b < 3 * a,
     }),
     plain("Factor by which one step multiplies the motion; above 1 it explodes.", "h \u03c9", "factor a step", radii, {
@@ -270,7 +251,6 @@ function said(s, sliders) {
   }
 }
 
-motion();
 selfCheck();
 live();
 banks();

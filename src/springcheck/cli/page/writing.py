@@ -15,6 +15,7 @@ from markupsafe import Markup
 from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
+from springcheck.figures.charts import WRONG
 from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
 from springcheck.text.wording import ordinal
@@ -26,6 +27,9 @@ SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
 """In the order in which they need one another."""
 LOOPS = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
 """Schemes that the page itself carries out, whatever the store holds."""
+NO_NUMBERS = ("Infinity", "-Infinity", "NaN")
+FEWEST_POOLED = 8
+"""Numbers that are written where they stand."""
 HEAD = 1024
 """Bytes in which the mark stands."""
 
@@ -58,7 +62,7 @@ def html(content: Content) -> str:
         style_digest=_digest(style),
         script=Markup(script),
         script_digest=_digest(script),
-        data=_json({**content.data, "looks": _looks(content.data)}),
+        data=_json(pooled({**content.data, "looks": _looks(content.data)})),
     )
 
 
@@ -86,13 +90,33 @@ def _looks(data: Mapping[str, Any]) -> dict[str, tuple[str, str, int]]:
     curves = (
         curve for bank in data["banks"].values() for chart in bank["charts"] for curve in chart["curves"]
     )
-    names = (*LOOPS, *(run["scheme"] for run in data["runs"]), *(curve["group"] for curve in curves))
+    names = (*LOOPS, *(curve["group"] for curve in curves if curve["group"] != WRONG))
     found = {name: looks.look(name) for name in names}
     shown = {
         name: (*looks.ON_SCREEN[look.color], looks.LINES.index(look.linestyle))
         for name, look in found.items()
     }
     return {**shown, "failed": looks.FAILED_ON_SCREEN}
+
+
+def pooled(data: Any) -> list[Any]:
+    """Every row once: [rows, data], where {"#": i} stands for the i-th row of numbers, {"$": i} of text."""
+    rows: dict[str, int] = {}
+
+    def put(x: Any) -> Any:
+        if isinstance(x, Mapping):
+            return {key: put(value) for key, value in x.items()}
+        if not isinstance(x, list | tuple):
+            return x
+        if len(x) > FEWEST_POOLED and all(type(value) is float or value in NO_NUMBERS for value in x):
+            text = json.dumps(x)
+            return {"#": rows.setdefault(text, len(rows))}
+        if len(x) > FEWEST_POOLED and all(type(value) is str for value in x):
+            return {"$": rows.setdefault(json.dumps(x), len(rows))}
+        return [put(value) for value in x]
+
+    found = put(data)
+    return [[json.loads(text) for text in rows], found]
 
 
 def _json(data: Any) -> Markup:

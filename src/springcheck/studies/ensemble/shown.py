@@ -125,18 +125,6 @@ def even_in_logarithm(values: Floats) -> bool:
     return bool(abs(middle - np.log(low * high) / 2) < abs(middle - np.log((low + high) / 2)))
 
 
-def edges(centres: Floats) -> Floats:
-    """Of tiles around these centres that touch each other."""
-    log = even_in_logarithm(centres)
-    x = np.log(centres) if log else np.asarray(centres, np.float64)
-    if len(x) == 1:
-        half = 0.5 * abs(x[0]) or 0.5
-        return np.array([x[0] - half, x[0] + half])
-    between = (x[1:] + x[:-1]) / 2
-    found = np.concatenate([[2 * x[0] - between[0]], between, [2 * x[-1] - between[-1]]])
-    return np.exp(found) if log else found
-
-
 def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> Line:
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]

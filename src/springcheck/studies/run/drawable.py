@@ -41,11 +41,11 @@ class Drawable:
     """What was left out."""
 
 
-def drawable(path: Path) -> Drawable:
-    """Scene and trajectories of a store to draw."""
+def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
+    """Scene and trajectories of a store to draw, of each so many frames at the most."""
     summary = keeper.summary(path)
     scene = keeper.stored_scene(path)
-    frames = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_NUMBERS // scene.n))
+    frames = max(FEWEST_FRAMES, min(most, MOST_NUMBERS // scene.n))
     memory.need(
         scene.n * min(frames, scene.frames) * (FIGURE_BYTES + RUN_BYTES * len(summary.runs)),
         f"the figures of {scene.n} particles",

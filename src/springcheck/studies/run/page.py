@@ -1,0 +1,153 @@
+"""The charts of a run, in figures and in the report page: phase portrait, position, energy and error, the
+engines laid over each other; of a chain also its modes and its wave, of a bath the temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from springcheck.figures import chain, energies, looks, portraits
+from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures.motion import SMOOTH, Exact, true_motion
+from springcheck.figures.overlay import Runs
+from springcheck.figures.views import paths, views
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.run.heat import Heat
+from springcheck.studies.run.result import Report, Stored
+
+POSITIONS_IN_BATH = 4
+"""Schemes in a bath whose positions are drawn: more hide one another."""
+
+TWO = "two standard errors"
+
+
+def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
+    """The charts of trajectories, or of the motion of one particle."""
+    shown = found.drawable
+    failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
+    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed)
+
+
+def of_runs(
+    scene: Scene,
+    runs: Mapping[str, Trajectory],
+    followed: Mapping[str, Trajectory],
+    *,
+    particle: int | None = None,
+    failed: Collection[str] = (),
+    points: int = SMOOTH,
+) -> list[Bank]:
+    """The charts, none where no run has more than its start.
+
+    `followed`: the parts of the runs in which the motion itself is shown; `particle`: this one's motion
+    alone; `failed`: labels of runs that some verdict rejects, drawn in red; `points`: of the exact
+    solution's line.  SpringcheckError where there is no such particle.
+    """
+    if not any(len(run.t) > 1 for run in runs.values()):
+        return []
+    usable, parts = Runs(scene, runs, failed), Runs(scene, followed, failed)
+    exact = Exact(scene)
+    shown = views(scene, particle)
+    if scene.bath is not None:
+        firsts = [group.members[0].label for group in parts.groups[:POSITIONS_IN_BATH]]
+        few = Runs(scene, {label: followed[label] for label in firsts}, failed)
+        out = [
+            portraits.clouds(usable, shown[0], scene.thermal),
+            portraits.positions(few, shown, None),
+            energies.means(usable, scene.thermal),
+            *_temperatures(usable),
+        ]
+        return [_of_particle(one, particle) for one in out[: 2 if particle is not None else None]]
+    truth = true_motion(scene, parts.every, points)
+    out = [
+        portraits.phase_portraits(parts, shown, truth, energies.orbits(parts, exact)),
+        portraits.positions(parts, shown, truth),
+    ]
+    if particle is not None:
+        return [_of_particle(one, particle) for one in out]
+    if planes := paths(scene):
+        out.append(portraits.phase_portraits(parts, planes, truth, energies.orbits(parts, exact)))
+    out.append(energies.energy(usable, exact))
+    if exact.known:
+        out.append(energies.error(usable, exact))
+    return [*out, *chain.banks(usable, exact)]
+
+
+def _of_particle(bank: Bank, particle: int | None) -> Bank:
+    return bank if particle is None else replace(bank, name=f"{bank.name}-particle-{particle}")
+
+
+def _temperatures(runs: Runs) -> list[Bank]:
+    """Configurational and kinetic temperature of each method beside the exact ones of its scheme."""
+    found = []
+    for run in runs.every:
+        heat = Heat(runs.scene)
+        heat.add(run)
+        found.append(heat.line(run.label))
+    found = [one for one in found[::-1] if np.isfinite(one.kinetic)]
+    if not found:
+        return []
+    charts = []
+    for name, what in (
+        ("configurational", "configurational temperature"),
+        ("kinetic", "kinetic temperature"),
+    ):
+        values, errors, laws = (
+            np.array([getattr(one, f"{name}{end}") for one in found]) for end in ("", "_error", "_law")
+        )
+        places = np.arange(float(len(found)))
+        good = np.isfinite(values)
+        if not good.any():
+            continue
+        marks, bars = [], []
+        for j, one in enumerate(found):
+            own: dict[str, Any] = {"group": one.scheme, "title": looks.title(one.scheme)}
+            if np.isfinite(errors[j]):
+                ends = [values[j] - 2 * errors[j], values[j] + 2 * errors[j]]
+                bars.append(Curve(name=TWO, x=ends, y=[float(j)] * 2, **own))
+            if good[j]:
+                marks.append(
+                    Curve(name=one.method, x=[values[j]], y=[float(j)], line=False, marks=True, **own)
+                )
+        some = np.isfinite(laws)
+        law = Curve(
+            name="exact law of its scheme",
+            group="exact",
+            x=laws[some],
+            y=places[some],
+            line=False,
+            marks=True,
+        )
+        every = np.concatenate([values[good], laws[some], [1.0]])
+        middle = every[np.abs(every - np.median(every)) <= 1.0]
+        room = 0.1 * float(np.ptp(middle)) + 0.02
+        charts.append(
+            Chart(
+                title=f"{what.capitalize()}, two standard errors to either side.",
+                short=what,
+                x=Scale(
+                    name=f"{what} / that of the bath",
+                    shown=(float(np.min(middle)) - room, float(np.max(middle)) + room),
+                ),
+                y=Scale(name="method", names=[one.method for one in found]),
+                curves=[*bars, *marks, law],
+                rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
+            )
+        )
+    hot = max(
+        found,
+        key=lambda one: (
+            abs(one.configurational - 1) if np.isfinite(one.configurational) else abs(one.kinetic - 1)
+        ),
+    )
+    which, value = (
+        ("configurational", hot.configurational)
+        if np.isfinite(hot.configurational)
+        else ("kinetic", hot.kinetic)
+    )
+    heading = f"{runs.scene.title}: {hot.method} is farthest from its bath: {value:.3g} of it ({which})"
+    return [Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=2)]
