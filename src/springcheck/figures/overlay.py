@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.figures import looks
-from springcheck.figures.charts import EXACT, WRONG, Curve, Naming
+from springcheck.figures.charts import EXACTLY, WRONG, Curve, Naming
 from springcheck.figures.views import units
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -156,7 +156,7 @@ class Runs:
 
 def exact_curve(x: Floats, y: Floats) -> Curve:
     """The exact solution."""
-    return Curve(name=TRUTH, group=EXACT, x=x, y=y, title=TRUTH)
+    return Curve(name=TRUTH, group=EXACTLY, x=x, y=y, title=TRUTH)
 
 
 @dataclass(frozen=True, slots=True)

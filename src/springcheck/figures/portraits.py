@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.figures import looks, overlay
-from springcheck.figures.charts import GUIDE, SEPARATRIX, START, Bank, Chart, Curve, Scale
+from springcheck.figures.charts import BEGIN, GUIDE, SEPARATRIX, Bank, Chart, Curve, Scale
 from springcheck.figures.motion import Exact, Motion, periods, smooth
 from springcheck.figures.overlay import Frame, Runs, exact_curve, share
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory
 
-EQUAL = 2.5
+ALIKE = 2.5
 """Ratio of two ranges up to which equal scales on both axes help."""
 
-PERIODS, SHOWN = 14, 6
+MANY_PERIODS, PERIODS_SHOWN = 14, 6
 """Periods from which the first and the last ones are shown separately, and how many of each."""
 
 CHORD = 0.015
@@ -56,7 +56,7 @@ def _of(runs: Runs, shown: Sequence[View]) -> str:
 
 
 def _equal(xs: Frame, ys: Frame) -> bool:
-    return max(xs.half, ys.half) <= EQUAL * min(xs.half, ys.half)
+    return max(xs.half, ys.half) <= ALIKE * min(xs.half, ys.half)
 
 
 def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
@@ -83,7 +83,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     dots = _chords(runs.longest, truth, view, xs, ys)
     curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
-    begin = Curve(name=START, group=START, x=start[0], y=start[1], line=False, marks=True)
+    begin = Curve(name=BEGIN, group=BEGIN, x=start[0], y=start[1], line=False, marks=True)
     square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked, true) is None else ""
@@ -199,7 +199,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
     """Positions over time: a row for each view; of many periods the first and the last."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
-    parts = "" if len(spans) == 1 else f"; the first and the last {SHOWN} periods"
+    parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
     bath = "every method draws noise of its own; the first periods"
     off = _off(runs, shown[0]) if runs.scene.bath is None else bath
     return Bank(
@@ -243,9 +243,9 @@ def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tupl
     first, last = (float(f([f(np.abs(run.t)) for run in runs.every])) for f in (np.min, np.max))
     motion = truth[1:] if truth is not None else (runs.longest.q, runs.longest.p)
     count = max(periods(view.pick(*motion)[0]) for view in shown)
-    if count <= PERIODS:
+    if count <= MANY_PERIODS:
         return [(first, last)]
-    length = SHOWN * (last - first) / count
+    length = PERIODS_SHOWN * (last - first) / count
     # in a bath one part is as good as another
     return [(first, first + length), (last - length, last)][: 1 if runs.scene.bath else 2]
 

@@ -17,10 +17,10 @@ from matplotlib.ticker import NullFormatter
 
 from springcheck.figures import looks
 from springcheck.figures.charts import (
-    EXACT,
+    BEGIN,
+    EXACTLY,
     GUIDE,
     SEPARATRIX,
-    START,
     WRONG,
     Bank,
     Chart,
@@ -31,7 +31,7 @@ from springcheck.figures.charts import (
 )
 from springcheck.physics.arrays import Floats
 
-TILE_SHADES = {
+TILES_SHADED = {
     "good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000",
     "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
     "s6": "#4b1250",
@@ -42,7 +42,7 @@ RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#
          "floor": ("#666666", (0, (1, 3)))}  # fmt: skip
 """Colour and line of each look of a rule."""
 
-NOT_TRIED = ("not tried", "#ffffff")
+NO_KIND = ("not tried", "#ffffff")
 """Of a tile without a kind."""
 
 MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
@@ -143,22 +143,22 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
 
 
 OTHER_LINES: dict[str, dict[str, Any]] = {
-    EXACT: {"color": "#b3b3b3", "linewidth": 4.0, "alpha": 0.7, "zorder": 1},
+    EXACTLY: {"color": "#b3b3b3", "linewidth": 4.0, "alpha": 0.7, "zorder": 1},
     SEPARATRIX: {"color": "#666666", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5},
-    START: {"color": "k", "linestyle": "none", "marker": "+", "markersize": 9, "zorder": 4},
+    BEGIN: {"color": "k", "linestyle": "none", "marker": "+", "markersize": 9, "zorder": 4},
 }
 """How what is no scheme's is drawn."""
 
 
 def _kinds(charts: Sequence[Chart]) -> list[Patch]:
     found = {kind for chart in charts if chart.tiles for kind in chart.tiles.kinds}
-    kinds = [chart.tiles.kinds[i] if i >= 0 else NOT_TRIED for chart in charts if chart.tiles
+    kinds = [chart.tiles.kinds[i] if i >= 0 else NO_KIND for chart in charts if chart.tiles
              for row in chart.tiles.rows for i in row]  # fmt: skip
     seen = dict.fromkeys(kinds) if found else {}
     every = [kind for chart in charts if chart.tiles for kind in chart.tiles.kinds]
     return [
-        Patch(facecolor=TILE_SHADES.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
-        for name, shade in dict.fromkeys([*every, NOT_TRIED])
+        Patch(facecolor=TILES_SHADED.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
+        for name, shade in dict.fromkeys([*every, NO_KIND])
         if (name, shade) in seen
     ]
 
@@ -211,7 +211,7 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     scales, tiled = (chart.x, chart.y), chart.tiles is not None
     look, high = looks.look(curve.group), int(curve.group == WRONG)
     x, y = (_drawable(one, scale) for one, scale in zip((curve.x, curve.y), scales, strict=True))
-    if curve.group in OTHER_LINES and (curve.line or curve.group == START):
+    if curve.group in OTHER_LINES and (curve.line or curve.group == BEGIN):
         axes.plot(x, y, label=curve.name, **OTHER_LINES[curve.group])
         return
     if curve.group == GUIDE:
@@ -268,7 +268,7 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
 def _tiles(axes: Axes, chart: Chart) -> None:
     tiles = chart.tiles
     assert tiles is not None
-    shades = [TILE_SHADES.get(shade, shade) for _, shade in tiles.kinds]
+    shades = [TILES_SHADED.get(shade, shade) for _, shade in tiles.kinds]
     plane = np.ma.masked_less(np.asarray(tiles.rows), 0)
     axes.grid(False)
     axes.imshow(
