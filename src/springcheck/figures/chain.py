@@ -32,7 +32,7 @@ PANELS = 6
 DECADES = 20.0
 """Ratio of energies from which their scale is logarithmic."""
 
-BLOCKS, MOST_ROWS = 100, 120
+BLOCKS, IMAGE_ROWS = 100, 120
 """Of neighbours, over which errors are averaged, and of frames: no picture resolves the short waves of a long
 chain."""
 
@@ -182,7 +182,7 @@ def _wave(runs: Runs, exact: Exact) -> Bank:
 
 def _few(image: Floats, *, signed: bool = False) -> Floats:
     """An image (f, n) of few frames: of errors the root mean square over blocks of neighbours."""
-    image = image[np.linspace(0, len(image) - 1, min(MOST_ROWS, len(image))).round().astype(np.int64)]
+    image = image[np.linspace(0, len(image) - 1, min(IMAGE_ROWS, len(image))).round().astype(np.int64)]
     if signed:
         columns = min(2 * BLOCKS, image.shape[1])
         return image[:, np.linspace(0, image.shape[1] - 1, columns).round().astype(np.int64)]

@@ -30,7 +30,7 @@ LEAST = 1e-4
 MOST_TURNING = 8
 """Of which some must turn where an orbit is one."""
 
-CHANGED, EVENLY, MOST_FINDINGS = 0.05, 0.99, 3
+CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
 """Part of an energy, or logarithm of it over the start's, from which it has changed; part of its change that
 is even, which what wavers has not; schemes that a title names."""
 
@@ -120,7 +120,7 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
                     f"{group.title} {'gains' if each > 0 else 'loses'} {100 * abs(each):.2g} % a step"
                 )
                 del largest[group.title]
-        said = said[:MOST_FINDINGS]
+        said = said[:FINDINGS_SAID]
     if largest:
         said.append(extremes(largest, "energy off by at most {}", beyond=LARGE))
     return "; ".join(said)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.figures import looks
-from springcheck.figures.charts import EXACTLY, WRONG, Curve, Naming
+from springcheck.figures.charts import EXACTLY, REJECTED, Curve, Naming
 from springcheck.figures.views import units
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -121,7 +121,7 @@ class Runs:
                 found.append(
                     Curve(
                         name=run.label,
-                        group=WRONG if group.failed else group.scheme,
+                        group=REJECTED if group.failed else group.scheme,
                         title=("is not " if group.failed else "") + looks.title(group.scheme),
                         x=x,
                         y=y,

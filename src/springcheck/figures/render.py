@@ -20,8 +20,8 @@ from springcheck.figures.charts import (
     BEGIN,
     EXACTLY,
     GUIDE,
+    REJECTED,
     SEPARATRIX,
-    WRONG,
     Bank,
     Chart,
     Curve,
@@ -49,7 +49,7 @@ MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
 """Marks on a curve, at the most and at the least, and on all curves of a picture; a curve of more points than
 are many, and no line, shows them all, small."""
 
-GOLDEN = 0.618
+GOLDEN_PART = 0.618
 """Multiples of it, modulo 1, stand far from one another, however many: there curves have their marks."""
 
 DRAWN_UP_TO = 1e6
@@ -122,7 +122,7 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
     first."""
     groups: dict[tuple[str, str], list[Curve]] = {}
     for curve in curves:
-        mine = groups.setdefault((curve.group, curve.name if curve.group == WRONG else ""), [])
+        mine = groups.setdefault((curve.group, curve.name if curve.group == REJECTED else ""), [])
         if curve.name not in [one.name for one in mine]:
             mine.append(curve)
     found = []
@@ -130,7 +130,7 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
         name, methods = mine[0].name, [one.name for one in mine if ":" in one.name]
         title = textwrap.fill((mine[0].title or looks.title(group)) if methods else name, WIDEST)
         label = f"{title}\n{looks.members(methods)}" if methods else title
-        if group == WRONG:
+        if group == REJECTED:
             sign = looks.mark(looks.engine(name))[1]
             label = f"FAILED: {name}\n{sign} {textwrap.fill(mine[0].title, 30)}"
         if group in OTHER_LINES:
@@ -209,7 +209,7 @@ def _drawable(values: Any, scale: Scale) -> Floats:
 
 def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> None:
     scales, tiled = (chart.x, chart.y), chart.tiles is not None
-    look, high = looks.look(curve.group), int(curve.group == WRONG)
+    look, high = looks.look(curve.group), int(curve.group == REJECTED)
     x, y = (_drawable(one, scale) for one, scale in zip((curve.x, curve.y), scales, strict=True))
     if curve.group in OTHER_LINES and (curve.line or curve.group == BEGIN):
         axes.plot(x, y, label=curve.name, **OTHER_LINES[curve.group])
@@ -236,7 +236,7 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     if curve.marks:
         many = len(x) > MANY and not (curve.line or curve.over or curve.dots)
         apart = 1 if many else max(1, len(x) // most)
-        first = round(number * GOLDEN % 1 * apart) % apart
+        first = round(number * GOLDEN_PART % 1 * apart) % apart
         estimated = np.asarray(curve.open, bool) if len(curve.open) else np.zeros(len(x), bool)
         for some, face in ((~estimated, look.color if len(curve.open) else "white"), (estimated, "white")):
             here = np.flatnonzero(some)[first::apart]

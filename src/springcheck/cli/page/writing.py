@@ -15,7 +15,7 @@ from markupsafe import Markup
 from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
-from springcheck.figures.charts import WRONG
+from springcheck.figures.charts import REJECTED
 from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
 from springcheck.text.wording import ordinal
@@ -27,7 +27,7 @@ SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
 """In the order in which they need one another."""
 LOOPS = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
 """Schemes that the page itself carries out, whatever the store holds."""
-NO_NUMBERS = ("Infinity", "-Infinity", "NaN")
+JSON_WORDS = ("Infinity", "-Infinity", "NaN")
 FEWEST_POOLED = 8
 """Numbers that are written where they stand."""
 HEAD = 1024
@@ -90,7 +90,7 @@ def _looks(data: Mapping[str, Any]) -> dict[str, tuple[str, str, int]]:
     curves = (
         curve for bank in data["banks"].values() for chart in bank["charts"] for curve in chart["curves"]
     )
-    names = (*LOOPS, *(curve["group"] for curve in curves if curve["group"] != WRONG))
+    names = (*LOOPS, *(curve["group"] for curve in curves if curve["group"] != REJECTED))
     found = {name: looks.look(name) for name in names}
     shown = {
         name: (*looks.ON_SCREEN[look.color], looks.LINES.index(look.linestyle))
@@ -108,7 +108,7 @@ def pooled(data: Any) -> list[Any]:
             return {key: put(value) for key, value in x.items()}
         if not isinstance(x, list | tuple):
             return x
-        if len(x) > FEWEST_POOLED and all(type(value) is float or value in NO_NUMBERS for value in x):
+        if len(x) > FEWEST_POOLED and all(type(value) is float or value in JSON_WORDS for value in x):
             text = json.dumps(x)
             return {"#": rows.setdefault(text, len(rows))}
         if len(x) > FEWEST_POOLED and all(type(value) is str for value in x):

@@ -22,7 +22,7 @@ from springcheck.studies.run.result import Report, Stored
 POSITIONS_IN_BATH = 4
 """Schemes in a bath whose positions are drawn: more hide one another."""
 
-TWO = "two standard errors"
+TWO_ERRORS = "two standard errors"
 
 
 def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
@@ -108,7 +108,7 @@ def _temperatures(runs: Runs) -> list[Bank]:
             own: dict[str, Any] = {"group": one.scheme, "title": looks.title(one.scheme)}
             if np.isfinite(errors[j]):
                 ends = [values[j] - 2 * errors[j], values[j] + 2 * errors[j]]
-                bars.append(Curve(name=TWO, x=ends, y=[float(j)] * 2, **own))
+                bars.append(Curve(name=TWO_ERRORS, x=ends, y=[float(j)] * 2, **own))
             if good[j]:
                 marks.append(
                     Curve(name=one.method, x=[values[j]], y=[float(j)], line=False, marks=True, **own)
