@@ -18,6 +18,7 @@ from springcheck.physics import scenefile
 from springcheck.studies.census import result as census_result
 from springcheck.studies.census import text as census_text
 from springcheck.studies.choose import LeftOut
+from springcheck.studies.faults import measure as faults
 from springcheck.studies.faults import result as faults_result
 from springcheck.studies.faults import text as faults_text
 from springcheck.studies.faults.table import FAULTS
@@ -209,6 +210,8 @@ def test_a_store_is_named_as_it_is(folder: Path) -> None:
 
 @pytest.mark.parametrize("width", [40, 80])
 def test_explanations_break_between_words(width: int, monkeypatch: Patch, capsys: Captured) -> None:
+    # what a check sees of each fault is measured elsewhere
+    monkeypatch.setattr(faults, "probe", lambda fault: lambda check, size: True)
     whole = shown(["explain", "step-defect"], None, monkeypatch, capsys)
     assert max(map(len, whole.splitlines())) > 200
     folded = shown(["explain", "step-defect"], width, monkeypatch, capsys)
