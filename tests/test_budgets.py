@@ -17,12 +17,12 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
     ("engines",): 2521,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4230,
+    ("checks",): 4249,
     ("identify",): 7708,
     ("formats", "store"): 4952,
     ("studies",): 1602,
     ("studies/*",): 10464,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6220,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6225,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -270,10 +270,15 @@ def test_mistakes_in_rods_are_said_in_a_line(momentum: str, rod: str, said: str)
     assert "\n" not in str(caught.value)
 
 
-def test_a_run_says_that_it_exercises_constraints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_and_its_page_say_what_a_pass_does_not_cover(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     given = ["--method", "own:velocity-verlet", "--steps", "9"]
     assert main(["run", "dumbbell", *given, "-o", str(tmp_path / "a.h5")]) == 0
-    assert "Not exercised here: axis z, periodic boxes, friction" in capsys.readouterr().out
+    left = "Not exercised here: axis z, periodic boxes, friction, drives, magnetic fields"
+    assert left in capsys.readouterr().out
+    assert main(["report", str(tmp_path / "a.h5"), "-o", str(tmp_path / "a.html")]) == 0
+    assert left in (tmp_path / "a.html").read_text()
     assert main(["run", "orbit", *given, "-o", str(tmp_path / "b.h5")]) == 0
     assert "constraints" in capsys.readouterr().out
 

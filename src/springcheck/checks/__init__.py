@@ -203,6 +203,25 @@ def judge(
     return shared([one(case) for one in checks])
 
 
+def not_exercised(scene: Scene) -> str:
+    """What an engine that passes here may still have wrong: a scene of particles does not exercise it.
+
+    Empty of circuits and rotors.
+    """
+    if scene.kind != "particles":
+        return ""
+    missing, system = [axis for axis in "xyz" if axis not in scene.axes], scene.system
+    facts = {
+        f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
+        "periodic boxes": bool(scene.box),
+        "constraints": bool(system.rods),
+        "friction": bool(system.is_damped or scene.bath),
+        "drives": system.is_driven,
+        "magnetic fields": "magnetic" in system.acting,
+    }
+    return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
+
+
 def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
     """Of the verdicts on the pieces of one trajectory, the worst of each check."""
     out: list[Verdict] = []

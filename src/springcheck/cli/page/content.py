@@ -113,6 +113,11 @@ class Content:
         return found.partition(" (phase portrait")[0] or self.title
 
     @property
+    def not_exercised(self) -> str:
+        """What a pass does not cover; empty of a study without a scene."""
+        return checks.not_exercised(self.scene) if self.scene and self.methods else ""
+
+    @property
     def failed(self) -> tuple[Passed, ...]:
         """The methods that some verdict rejects."""
         return tuple(one for one in self.methods if one.count(False))

@@ -345,7 +345,7 @@ def _summary(report: Report) -> Lines:
         names = " and ".join(report.broke)
         return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
     return [
-        *([] if failed else _not_covered(report.scene)),
+        *([plain(left, "dim")] if not failed and (left := checks.not_exercised(report.scene)) else []),
         plain(f"{report.counts}{taken}", look),
         *(
             []
@@ -356,19 +356,6 @@ def _summary(report: Report) -> Lines:
             ]
         ),
     ]
-
-
-def _not_covered(scene: Scene) -> Lines:
-    """What an engine that passes here may still have wrong, because this scene does not exercise it."""
-    if scene.kind != "particles":
-        return []
-    missing = [axis for axis in "xyz" if axis not in scene.axes]
-    left = [f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}"] if missing else []
-    left += [] if scene.box else ["periodic boxes"]
-    left += [] if scene.system.rods else ["constraints"]
-    left += [] if scene.system.is_damped or scene.bath else ["friction"]
-    left += [] if scene.system.is_driven else ["drives"]
-    return [plain(f"Not exercised here: {', '.join(left)}", "dim")]
 
 
 def _comparison(comparison: Comparison) -> TextTable:
