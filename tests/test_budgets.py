@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
     ("engines",): 2521,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4249,
+    ("checks",): 4291,
     ("identify",): 7708,
     ("formats", "store"): 4952,
     ("studies",): 1602,

@@ -135,3 +135,18 @@ def test_a_single_stiff_spring_is_seen_as_well_as_before() -> None:
             wrong = written(replace(scene, terms=(wall.scaled(1 + 1e-12),)), name, form)
             rebuilds = form in forms.REBUILDS
             assert alarms(scene, replace(wrong, energy=None, rebuilds_velocity=rebuilds)), (name, form)
+
+
+@pytest.mark.parametrize("name", ["implicit-euler", "implicit-midpoint"])
+def test_a_momentum_that_belongs_to_no_position_is_seen_below_what_the_solver_may_leave(name: str) -> None:
+    """q' = q + x P/m has no force in it, and holds to the rounding of q however stiff the springs are."""
+    stiff = WallSpring(i=np.arange(2), k=np.array([2.9, 1.7]), at=np.array([-6.5, 455.3]))
+    start = np.array([-4.9, 455.4]), np.array([0.8, -0.7])
+    scene = clean.scene(np.array([0.4, 0.9]), (stiff,), *start, step=7e3, steps=20)
+    scene = replace(scene, quantities=("q", "p"))
+    for form in WRITTEN:
+        assert alarms(scene, written(scene, name, form)) == []
+    run = written(scene, name, "textbook")
+    p = run.p.copy()
+    p[1, 1] *= 1 + 1e-9
+    assert "step-defect" in {v.check for v in checks.judge(scene, replace(run, p=p)) if v.passed is False}

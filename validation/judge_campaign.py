@@ -4,10 +4,11 @@
 
 Scenes of every term and of several at once, one to four particles, steps from h w = 1e-3 to 1.2, linear
 ones of implicit schemes up to 1e4; two in five are hard ones: stiffnesses 10 decades apart, walls 1e9
-amplitudes away, hubs, 33 to 48 particles; every scheme with a step of its own; every 1 to 2000 steps; ten
+amplitudes away, hubs, 33 to 48 particles; every scheme with a step of its own; every 1 to 2000 steps; twelve
 legal orders of operation (as written, in extended precision and rounded once a step or never, velocities
 instead of momenta, terms in another order, row by row, fused products, the one-step matrix less 1 and
-whole, velocities rebuilt from positions), and four forms of an implicit step (`implicit_forms.py`); and
+whole, the force as f0 - K q, positions counted from where particles rest, velocities rebuilt from positions),
+and four forms of an implicit step (`implicit_forms.py`); and
 faults of more than a hundred kinds: every parameter of every term and of the grid, coefficients of the
 schemes, every other scheme, and what happens to states on their way.
 
@@ -16,10 +17,11 @@ alarm is a failed verdict on a legal engine.
 
 How large a fault is follows from no allowance of the judge.  The defect of a coordinate is how far recorded
 frames are from the scheme's own steps, in extended precision, from the frame before; its noise is the
-largest defect that any legal engine has in it on that scene, all forms tried, and half an ulp of it at
-least.  A fault counts where its defect in some coordinate is more than 20 times the noise.  It is told where
-a verdict fails, or where each such coordinate is named as one that cannot be judged, or the step defect says
-that it cannot tell; else it is missed, and by which factor of the noise is counted in decades.
+largest defect that any legal engine has in it on that scene, all forms tried, of few frames also from starts
+beside the scene's, and half an ulp of it at least.  A fault counts where its defect in some coordinate is
+more than 20 times the noise.  It is told where a verdict fails, or where each such coordinate is named as one
+that cannot be judged, or the step defect says that it cannot tell; else it is missed, and by which factor of
+the noise is counted in decades.
 
 With `thorough` a set is all experiments of `run --thorough` with one own method on one such scene; FILE,
 which holds blocks of one kind, may be - for none.
@@ -52,6 +54,11 @@ from springcheck.studies.faults import clean, steppers
 FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow"))
 COUNTED = 20.0
 """Times the noise of right engines from which a fault counts."""
+
+FRAMES = 12
+"""Fewer of them tell little of what the noise is: then there are more runs."""
+STARTS = 6
+"""So many, from starts beside the scene's."""
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]
@@ -316,6 +323,42 @@ def whole_matrix(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator)
     return step
 
 
+def matrix_force(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """The force of a linear scene as f0 - K q - C v, as finite elements have it."""
+    if not scene.system.is_linear or scheme.has("mixes"):
+        return written(scene, scheme, rng)
+    parts = implicit_forms.parts(scene, per_row=False)
+    return steppers.textbook(
+        scene, scheme, force=lambda q, p: parts.force(np.asarray(q), np.asarray(p / scene.m))
+    )
+
+
+def from_rest(scene: Scene, scheme: schemes.Scheme, rng: np.random.Generator) -> Step:
+    """Positions counted from where each particle rests: from its wall, or along springs of their rest
+    lengths."""
+    rest = scene.system.rest_positions
+    o = np.zeros(scene.n) if rest is None else rest.copy()
+    for term in scene.terms:
+        if isinstance(term, WallSpring | Quartic | Cosine):
+            o[term.i] = term.at
+    moved: list[Term] = []
+    for term in scene.terms:
+        if isinstance(term, WallSpring | Quartic | Cosine):
+            moved.append(replace(term, at=term.at - o[term.i]))
+        elif isinstance(term, Spring | Morse):
+            moved.append(replace(term, rest=term.rest - (o[term.b] - o[term.a])))
+        else:
+            moved.append(term)
+    right = steppers.textbook(replace(scene, terms=tuple(moved)), scheme)
+    kept: list[Any] = [scene.q - o, scene.p]
+
+    def step(i: int, q: Floats, p: Floats) -> State:
+        kept[:] = right(i, *kept)
+        return kept[0] + o, kept[1]
+
+    return step
+
+
 def form(name: str) -> Callable[[Scene, schemes.Scheme, np.random.Generator], Step]:
     """An implicit step of a linear scene as some engines write it."""
 
@@ -338,6 +381,8 @@ LEGAL: dict[str, Callable[[Scene, schemes.Scheme, np.random.Generator], Step]] =
     "compensated": compensated,
     "rebuilt": rebuilt,
     "whole matrix": whole_matrix,
+    "matrix force": matrix_force,
+    "from rest": from_rest,
     **{name: form(name) for name in implicit_forms.FORMS},
 }
 
@@ -673,8 +718,6 @@ def one(seed: int, counts: Counts) -> None:
     with np.errstate(all="ignore"):
         noise: Floats | None = None
         for order in mine:
-            if order not in (*chosen, "as written", "matrix", *implicit_forms.FORMS):
-                continue
             try:
                 right = run(scene, scheme, LEGAL[order](scene, scheme, rng))
             except np.linalg.LinAlgError:
@@ -689,6 +732,12 @@ def one(seed: int, counts: Counts) -> None:
             if order in chosen:
                 what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
                 _legal(counts, checks.judge(scene, right), what)
+        near = np.random.default_rng([14, seed])
+        for _ in range(STARTS if len(right.t) < FRAMES else 0):
+            start = tuple(x * (1 + 1e-6 * near.normal(size=scene.n)) for x in (scene.q, scene.p))
+            found = _defect(scene, run(scene, scheme, written(scene, scheme, rng), (start[0], start[1])))
+            if found is not None:
+                noise = found if noise is None else np.maximum(noise, found)
         for name in rng.choice(list(FAULTS), 2, replace=False):
             eps = float(10 ** rng.uniform(-16, -0.3))
             wrong = FAULTS[str(name)](scene, scheme, eps, rng)

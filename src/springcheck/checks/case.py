@@ -95,6 +95,30 @@ class Case(Claim):
             return None
         return follow(self, *self._starts, every)
 
+    @cached_property
+    def residual(self) -> tuple[Extended, Extended] | None:
+        """x/m of Q = q + x P/m, the equation of an implicit step that has no force in it (n,), and one
+        rounding of what it adds up after each frame but the last (f-1, n); None where there is none.
+
+        Whichever way an engine solves for a step, and however far A^-1 carries what its solver leaves, it
+        takes the position from the momentum by this or the momentum from the position.
+        """
+        run, stages = self.trajectory, self.scheme.a
+        # of two stages p + x F is not the momentum that moves q, where rounding of large forces tells them
+        if not (self.ahead and run.every == 1 and self.law.has("implicit") and len(stages) == 1):
+            return None
+        part = np.longdouble(float(stages[0][0]))
+        way = part * run.step / self.judged.m
+        (q, p), (end_q, end_p) = self._starts, self.ahead.end
+        pulls = self.system.friction_rates * np.abs(p + part * (end_p - p))
+        for term in self.judged.terms:
+            if term.kind == "potential":
+                term.scatter(np.abs(term.pull(q + part * (end_q - q))), pulls)
+        # what an engine adds to p may be rounded as the forces that it sums up, another time than for P
+        moved = np.abs(p) + np.abs(end_p) + abs(run.step) * pulls
+        sizes = np.abs(q) + np.abs(end_q) + np.abs(way) * moved + self.origins
+        return way, np.asarray(run.arithmetic.state * sizes + rounding.SMALLEST)
+
     @property
     def _starts(self) -> tuple[Extended, Extended]:
         return self.trajectory.q[:-1].astype(np.longdouble), self.trajectory.p[:-1].astype(np.longdouble)

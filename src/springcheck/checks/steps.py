@@ -14,7 +14,7 @@ from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
 from springcheck.checks.requires import CLOSED, MAP, missing
 from springcheck.checks.stretch import Stretch, known
-from springcheck.physics.arrays import Arithmetic, Floats, Reals
+from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
@@ -49,6 +49,8 @@ def _step_defect(case: Case) -> Finding | str:
         return f"{STILL} any step"
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / bound, np.inf)))
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
+    if case.residual is not None:
+        why += "; of the step itself, and of the equation of its positions"
     if case.ahead is None:
         why = f"roundings along {run.every} steps, each enlarged as the map can; does not grow with the run"
     elif run.every > 1:
@@ -105,7 +107,12 @@ def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> tuple[Limits, s
         unit = case.allowance_of_stretches * bound
         return sight.of_steps(case, told, lambda at, change: case.system.norm.size(*change) / unit[at])
     most = case.roundings * ahead.allowance
-    return sight.of_steps(case, told, lambda at, change: np.asarray(change) / most[:, at])
+
+    def part(at: Integers, change: sight.States) -> Reals:
+        left = _left(case, *change, at) / case.roundings
+        return np.stack([change[0] / most[0, at], change[1] / most[1, at], left])
+
+    return sight.of_steps(case, told, part)
 
 
 def first_off(case: Case) -> int | None:
@@ -134,11 +141,22 @@ STILL = "standing still would pass: rounding may be as large as"
 def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
     """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
     if case.ahead is not None:
-        return _off(case.ahead, to_q, to_p)
+        left = np.max(_left(case, to_q - case.ahead.end[0], to_p - case.ahead.end[1]), axis=1)
+        return np.asarray(np.maximum(_off(case.ahead, to_q, to_p), left))
     q, p = case.next_states
     with np.errstate(all="ignore"):
         size = case.system.norm.size(q - to_q, p - to_p)
         return np.asarray(size / case.allowance_of_stretches)
+
+
+def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(None)) -> Reals:
+    """What states that are off by so much (r, n) leave of the equation of positions of an implicit step after
+    these frames, in roundings of that; 0 where there is none."""
+    if case.residual is None:
+        return np.zeros_like(off_q)
+    way, added = case.residual
+    with np.errstate(all="ignore"):
+        return np.asarray(np.abs(off_q - way * off_p) / added[at], dtype=np.longdouble)
 
 
 def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
