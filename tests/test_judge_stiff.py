@@ -90,7 +90,7 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("form", WRITTEN)
 def test_every_way_to_write_an_implicit_step_of_a_stiff_pair_passes(name: str, form: str) -> None:
-    for seed in range(3):
+    for seed in range(2):
         rng = np.random.default_rng([5, seed])
         for ratio in (1.0, 1e2, 1e4, 1e6, 1e8, 1e10):
             scene = pair(ratio, rng, float(10 ** rng.uniform(-1, 0.5)))

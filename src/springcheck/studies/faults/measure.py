@@ -119,6 +119,14 @@ def probe(fault: Fault) -> Passed:
     return passed
 
 
+def passes(fault: Fault, check: str) -> bool | None:
+    """Whether a check of recorded states passes a fault of its size; None where it does not apply."""
+    known = checks.RANDOM if fault.random else checks.CHECKS
+    if check not in {one.name for one in known}:
+        return None
+    return probe(fault)(check, fault.size)
+
+
 def smallest(passed: Passed, check: str, size: float) -> float | None:
     """The smallest size that the check rejects, by bisection from one on; None where it rejects none."""
     seen = passed(check, size) is False
