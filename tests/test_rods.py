@@ -415,6 +415,15 @@ def test_settle_in_openmm_keeps_lengths_in_single_precision_and_is_told(need: Ne
     assert np.max(np.abs(rods(scene).strain(run.q[1:]) - kept)) < 1e-13
 
 
+def test_settle_in_openmm_takes_unlike_masses_for_alike_and_is_told(need: Need) -> None:
+    need("openmm:verlet-rods")
+    scene = turning([[0.125, 0.25], [0.125 - 3 / 64, 0.1875], [0.125 + 3 / 64, 0.1875]], (16.0, 1.1, 2.3))
+    for label, right in (("own:velocity-verlet", True), ("openmm:verlet-rods", False)):
+        run = driver.run(replace(scene, steps=2), label)
+        failed = {v.check for v in checks.judge(replace(scene, steps=2), run) if v.passed is False}
+        assert failed == set() if right else failed >= {"step-defect", "momentum", "angular-momentum"}
+
+
 @pytest.mark.parametrize("label", ["own:velocity-verlet", "openmm:verlet-rods"])
 def test_where_a_rod_comes_to_turn_too_fast_that_is_said_whatever_the_engine_does(
     label: str, need: Need
