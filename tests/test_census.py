@@ -320,3 +320,11 @@ def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.Monkey
     monkeypatch.setattr(thermal, "THERMOSTATS", {**THERMOSTATS, "aboba": THERMOSTATS["baoa"]})
     found = baths.entry(engines.parse("own:aboba"))
     assert (found.claimed, found.found, found.agrees) == ("aboba", "baoa", False)
+
+
+@pytest.mark.parametrize("label", ["mujoco:hinge", "dart:hinge"])
+def test_a_hinge_is_named_on_springs_of_rotors(label: str, need: Callable[[str], None]) -> None:
+    need(label)
+    one = census.entry(engines.parse(label))
+    assert (one.found, one.constraint) == ("semi-implicit-euler", "hinge: turns by h w a step to rounding")
+    assert one.agrees

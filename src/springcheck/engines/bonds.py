@@ -13,7 +13,7 @@ from springcheck.errors import MethodError
 from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import Cosine, Spring, WallSpring
 from springcheck.schemes import scheme
 
 ANCHOR_MASS = 2.0**100
@@ -186,6 +186,30 @@ def far(scene: Scene) -> float:
     q, _ = scene.system.amplitudes
     reach = float(np.max(np.abs(scene.q)) + np.max(q))
     return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
+
+
+def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float, float, float], float]]:
+    """Rotors as bodies on hinges along z, in a gravity of 1 along x: number, mass, centre of mass, and moment
+    of inertia about that.  Half of the rotor's inertia is that of the mass in its centre.
+
+    Raises MethodError where a potential is no pendulum's, or a rotor has two.
+    """
+    depth, at = np.zeros((2, scene.n))
+    for term in scene.terms:
+        if isinstance(term, Cosine):
+            if (
+                np.any(depth[term.i])
+                or len(set(term.i.tolist())) < len(term)
+                or np.any((term.wave != 1) | (term.depth < 0))
+            ):
+                raise MethodError(f"{label}: gravity makes one pendulum of a rotor, of wave 1")
+            depth[term.i], at[term.i] = term.depth, term.at
+    for i, (inertia, pull, angle) in enumerate(
+        zip(scene.m.tolist(), depth.tolist(), at.tolist(), strict=True)
+    ):
+        away = inertia / (2 * pull) if pull else 0.0
+        mass = pull / away if pull else 1.0
+        yield i, mass, (away * np.cos(angle), -away * np.sin(angle), 0.0), inertia / 2 if pull else inertia
 
 
 def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:

@@ -1,4 +1,5 @@
-"""MuJoCo: bodies on slide joints along x, their springs given to joints, to tendons or to a motor.
+"""MuJoCo: bodies on slide joints along x, their springs given to joints, to tendons or to a motor; rotors on
+hinges, in gravity.
 
 How a spring is attached decides the scheme.  Joint and tendon springs are evaluated by MuJoCo at the
 positions of each step; a motor's force is ours, and it stays what it is until it is set again: over the
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.engines.bonds import hinges
 from springcheck.engines.contract import (
     EVERY_FORCE,
     SPRINGS,
@@ -43,6 +45,7 @@ class _How:
     substeps: int = 1
     motor: bool = False
     explicit_damping: bool = False
+    hinge: bool = False
 
 
 HOW = {
@@ -53,27 +56,32 @@ HOW = {
     "joint-damping": _How(),
     "joint-damping-implicitfast": _How(integrator="IMPLICITFAST"),
     "joint-damping-explicit": _How(explicit_damping=True),
+    "hinge": _How(hinge=True),
     "motor": _How(motor=True),
     "motor-rk4": _How(integrator="RK4", motor=True),
     "motor-frame-skip-5": _How(motor=True, substeps=5),
 }
 
 
-def _model(mujoco: Any, scene: Scene, how: _How, step: float) -> Any:
+def _model(mujoco: Any, scene: Scene, how: _How, step: float, label: Label) -> Any:
     spec = mujoco.MjSpec()
     spec.option.timestep = step / how.substeps
-    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.gravity = [float(how.hinge), 0.0, 0.0]
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{how.integrator}")
     # beyond 1e10 MuJoCo would set the state back to the start of the model, and go on
     flags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if how.explicit_damping:
         flags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     spec.option.disableflags = int(flags)
+    slide = ((i, m, (0.0, 0.0, 0.0), 1.0) for i, m in enumerate(scene.m.tolist()))
+    kind, axis = (mujoco.mjtJoint.mjJNT_SLIDE, [1.0, 0.0, 0.0])
+    if how.hinge:
+        kind, axis = (mujoco.mjtJoint.mjJNT_HINGE, [0.0, 0.0, 1.0])
     joints = []
-    for i, mass in enumerate(scene.m):
-        body = spec.worldbody.add_body(name=f"b{i}", mass=mass, inertia=[1.0, 1.0, 1.0])
+    for i, mass, centre, inertia in hinges(scene, label) if how.hinge else slide:
+        body = spec.worldbody.add_body(name=f"b{i}", mass=mass, ipos=centre, inertia=[inertia] * 3)
         body.explicitinertial = True
-        joints.append(body.add_joint(name=f"j{i}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0]))
+        joints.append(body.add_joint(name=f"j{i}", type=kind, axis=axis))
         if how.motor:
             motor = spec.add_actuator(name=f"m{i}", target=f"j{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
             motor.set_to_motor()
@@ -127,7 +135,7 @@ class _Steps:
         self._step = mujoco.mj_step
         # it would write its warnings to a file in the current folder
         mujoco.set_mju_user_warning(_unheard)
-        self._model = _model(mujoco, scene, how, step)
+        self._model = _model(mujoco, scene, how, step, label)
         self._data = mujoco.MjData(self._model)
         self._q, self._v, self._control = self._data.qpos, self._data.qvel, self._data.ctrl
         self._q[:], self._v[:] = scene.q, scene.p / scene.m
@@ -192,6 +200,10 @@ ENGINE = Engine(
             "joint damping, eulerdamp off",
             DAMPED,
             Need.DAMPING,
+        ),
+        by_name(
+            "hinge", "semi-implicit-euler", "hinge, its stiffness and gravity, Euler",
+            frozenset({"wall-spring", "cosine"}), kinds=frozenset({"rotor"}),
         ),
         by_name("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
         by_name("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Need
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
@@ -61,16 +61,27 @@ def is_rigid(label: Label) -> bool:
     return Need.RODS in engines.method(label).requires
 
 
+def is_hinge(label: Label) -> bool:
+    """Whether a method moves rotors alone: the angle is its coordinate."""
+    return engines.method(label).kinds == {"rotor"}
+
+
+def _given(scene: Scene, label: Label) -> Scene:
+    if is_hinge(label):
+        return scene.derived(kind="rotor")
+    return split(scene) if is_rigid(label) else scene
+
+
 def refusal(scene: Scene, label: Label) -> str | None:
     """Why a method cannot move this spring, as `engines.refusal`."""
-    return engines.refusal(split(scene) if is_rigid(label) else scene, label)
+    return engines.refusal(_given(scene, label), label)
 
 
 def run(scene: Scene, label: Label) -> Trajectory:
     """A run of one mass; of a method for rods that of the two parts, as the one mass that they are."""
+    both = driver.run(_given(scene, label), label)
     if not is_rigid(label):
-        return driver.run(scene, label)
-    both = driver.run(split(scene), label)
+        return both
     return replace(both, q=both.q[:, :1], p=np.sum(both.p, axis=1, keepdims=True), energy=None)
 
 
@@ -99,7 +110,12 @@ def name(scene: Scene, found: Trajectory) -> str:
 
 
 def constraint(label: Label) -> str:
-    """What a method holds rigid, as the states of `dumbbell` show it; "" where it serves no such scene."""
+    """What a method holds rigid, as the states of `dumbbell` show it, or of a rotor on which nothing acts; ""
+    where it serves no such scene."""
+    if is_hinge(label):
+        free = load_scene("hinged-pendulum").derived(terms=())
+        each, h_w = np.diff(driver.run(free, label).q[:, 0]), free.step * free.p / free.m
+        return f"hinge: {_named(each, h_w)}"
     scene = load_scene("dumbbell")
     if engines.refusal(scene, label):
         return ""
@@ -113,6 +129,11 @@ def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
     sine = r[:-1, 0] * r[1:, 1] - r[:-1, 1] * r[1:, 0]
     each = np.abs(np.arctan2(sine, rods.dot(r[:-1], r[1:])[:, 0]))
     h_w = np.asarray(scene.step * rods.rates(scene.q, scene.p), np.float64)
+    return _named(each, h_w)
+
+
+def _named(each: Reals, h_w: Floats) -> str:
+    """The turns of every step, as a law of h w (1,) [rad]."""
     off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in TURNS.items()}
     name = min(off, key=lambda one: off[one])
     if not off[name] < UNLIKE:
