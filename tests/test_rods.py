@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import gromacs
 import springcheck
 from springcheck import checks, driver, engines, schemes, store
 from springcheck.checks import Case, stretch
@@ -508,3 +509,24 @@ def test_rods_that_lammps_cannot_hold_are_refused_in_its_words(need: Need) -> No
     scene = Scene(m=np.full(5, 1.3), q=q, p=np.full(5, 0.26), terms=(rod,), step=0.1, steps=3)
     with pytest.raises(MethodError, match=r"lammps:shake: .*cluster"):
         driver.run(scene, "lammps:shake")
+
+
+@pytest.mark.parametrize("name", gromacs.CASES)
+def test_what_gromacs_has_written_is_judged_from_its_file(name: str) -> None:
+    found = gromacs.judged(name)
+    assert {check for check, one in found.items() if one["passed"] is False} == gromacs.CASES[name]
+    assert {check for check, one in found.items() if one["passed"]} >= {"momentum", "angular-momentum"}
+    if not gromacs.CASES[name]:
+        assert found["rod-length"]["value"] < 1e-13
+        assert found["turn"]["passed"]
+
+
+def test_a_trr_file_that_is_cut_off_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = (gromacs.FOLDER / "dumbbell-shake.trr").read_bytes()
+    for kept, said in ((700, "cut off or damaged in frame 2"), (-20, "cut off or damaged in frame 40")):
+        (tmp_path / "x.trr").write_bytes(whole[:kept])
+        assert main(["identify", str(tmp_path / "x.trr")]) == 2
+        assert said in capsys.readouterr().err
+    (tmp_path / "x.trr").write_bytes(whole[:260] + bytes(8) + whole[268:])
+    assert main(["identify", str(tmp_path / "x.trr")]) == 2
+    assert "is no .trr file from byte 260 on" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from ase.md.verlet import VelocityVerlet
 class Nothing(Calculator):
     """No force acts."""
 
-    implemented_properties = ["energy", "forces"]
+    implemented_properties = ("energy", "forces")
 
     def calculate(self, *arguments, **options):
         super().calculate(*arguments, **options)

@@ -18,7 +18,7 @@ import numpy as np
 
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.formats import libraries, molecular, numbers, tables
+from springcheck.formats import libraries, molecular, numbers, tables, trr
 from springcheck.formats.columns import ALONE, States, kind
 from springcheck.formats.numbers import states_of
 from springcheck.store import apart
@@ -123,8 +123,7 @@ FORMATS: tuple[Format, ...] = (
     Format(
         name=".trr",
         recognise=_starts(b"\x00\x00\x07\xc9"),
-        read=lambda path, columns, step: libraries.read_trr(path),
-        library=True,
+        read=lambda path, columns, step: trr.read_trr(path),
     ),
     Format(
         name=".gro",

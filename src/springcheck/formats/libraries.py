@@ -82,17 +82,6 @@ def _written(lines: list[str]) -> float:
     return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell])
 
 
-def read_trr(path: Path) -> States:
-    """A GROMACS .trr file, in single precision, by MDAnalysis."""
-    with _analysed(path, "lib.formats.libmdaxdr", "TRRFile") as file:
-        both = (frame for frame in file if frame.hasx and frame.hasv)
-        found = [(frame.time, np.array(frame.x), np.array(frame.v)) for frame in islice(both, MOST_FRAMES)]
-    if not found:
-        raise StoreError(f"{path}: has no frame with both positions and velocities")
-    t, q, v = zip(*found, strict=True)
-    return of_frames(path, t, q, v, None, 2.0**-24)
-
-
 def read_xtc(path: Path) -> States:
     """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
     with _analysed(path, "lib.formats.libmdaxdr", "XTCFile") as file:

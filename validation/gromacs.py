@@ -1,0 +1,153 @@
+"""GROMACS' SHAKE, LINCS and SETTLE beside their law, from trajectories of its double precision.
+
+Claim: md-vv with any of the three turns a rigid dumbbell, or a rigid triangle, by asin(h w) a step and keeps
+lengths to rounding where it is asked for as much; `springcheck judge` reads the .trr files and says so.  What
+SHAKE and LINCS leave by default is told.
+
+Command: python validation/gromacs.py             (judges what is stored; 5 s)
+         python validation/gromacs.py --write     (runs `gmx_d` anew, of Debian's gromacs)
+
+Trajectories and their scenes are in data/reference/gromacs: 40 steps of 0.1, far from the border of a box of
+20 nm.  Expected with GROMACS 2022.5 (step-defect and turn in their own units, length relative):
+
+  dumbbell-shake           step-defect 1.3e+00  rod-length 5.2e-16  turn 3.7e-16  passed
+  dumbbell-lincs           step-defect 1.2e+00  rod-length 4.7e-16  turn 9.2e-16  passed
+  dumbbell-lincs-as-it-is  step-defect 1.1e+00  rod-length 5.9e-16  turn 6.0e-16  passed
+  dumbbell-shake-as-it-is  step-defect 8.3e+10  rod-length 6.4e-05  turn 4.8e-05  rejected
+  triangle-shake           step-defect 4.4e+01  rod-length 4.8e-14  turn 3.5e-14  passed
+  triangle-lincs           step-defect 4.8e+07  rod-length 1.2e-13  turn 9.8e-14  rejected
+  triangle-settle          step-defect 1.9e+00  rod-length 8.2e-15  turn 4.8e-15  passed
+  triangle-lincs-as-it-is  step-defect 1.1e+10  rod-length 6.1e-05  turn 2.1e-05  rejected
+
+One rod takes no expansion of LINCS; velocities of a triangle, which it does not iterate, keep what order 8
+leaves.
+
+Exit status 0 while the claim holds, 1 otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+from springcheck.cli import main as springcheck
+from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+
+FOLDER = Path(__file__).parents[1] / "data" / "reference" / "gromacs"
+
+ALGORITHMS = {
+    "shake": "constraint-algorithm = shake\nshake-tol = 1e-13",
+    "shake-as-it-is": "constraint-algorithm = shake",
+    "lincs": "constraint-algorithm = lincs\nlincs-order = 8\nlincs-iter = 8",
+    "lincs-as-it-is": "constraint-algorithm = lincs",
+    "settle": "",
+}
+
+TOLD = {"step-defect", "rod-length", "rod-velocity"}
+
+CASES: dict[str, set[str]] = {
+    **{f"dumbbell-{name}": set() for name in ("shake", "lincs", "lincs-as-it-is")},
+    "dumbbell-shake-as-it-is": TOLD | {"turn"},
+    **{f"triangle-{name}": set() for name in ("shake", "settle")},
+    "triangle-lincs": TOLD,
+    "triangle-lincs-as-it-is": TOLD | {"turn"},
+}
+"""Each trajectory, and the checks that reject it: what no tolerance declares is an error."""
+
+RUN = """integrator = md-vv
+dt = {step!r}
+nsteps = {steps}
+nstxout = 1
+nstvout = 1
+nstcalcenergy = 1
+comm-mode = none
+cutoff-scheme = verlet
+verlet-buffer-tolerance = -1
+rlist = 1.2
+"""
+
+
+def topology(scene: Scene, settle: bool) -> str:
+    """The molecule of a scene, without any force."""
+    rods = scene.system.rods
+    assert rods is not None
+    masses, n = scene.masses.tolist(), scene.particles
+    lines = ["[ defaults ]", "1 1 no 1.0 1.0", "[ atomtypes ]"]
+    lines += [f"T{i} 0 {m!r} 0.0 A 0.0 0.0" for i, m in enumerate(masses, 1)]
+    lines += ["[ moleculetype ]", "M 3", "[ atoms ]"]
+    lines += [f"{i} T{i} 1 M A{i} {i} 0.0 {m!r}" for i, m in enumerate(masses, 1)]
+    if settle:
+        lines += ["[ settles ]", f"1 1 {float(rods.length[0])!r} {float(rods.length[2])!r}"]
+    else:
+        joints = rods.joints()
+        lines += ["[ constraints ]", *(f"{ends[0] + 1} {ends[1] + 1} 2 {x!r}" for ends, x, _ in joints)]
+    lines += ["[ exclusions ]"]
+    lines += [" ".join(map(str, [i, *(j for j in range(1, n + 1) if j != i)])) for i in range(1, n + 1)]
+    return "\n".join([*lines, "[ system ]", "one", "[ molecules ]", "M 1", ""])
+
+
+def start(scene: Scene) -> str:
+    """A .gro file of the start, with all digits."""
+    q, v = scene.q.reshape(-1, 3), (scene.p / scene.m).reshape(-1, 3)
+    rows = [
+        f"{1:5d}{'M':<5s}{f'A{i + 1}':>5s}{i + 1:5d}" + "".join(f"{x:25.17f}" for x in q[i])
+        + "".join(f"{x:25.18f}" for x in v[i])
+        for i in range(len(q))
+    ]  # fmt: skip
+    return "\n".join(["start", str(len(q)), *rows, "20.0 20.0 20.0", ""])
+
+
+def write(name: str) -> None:
+    """Run GROMACS in double precision and keep its trajectory."""
+    which, _, algorithm = name.partition("-")
+    scene = scenefile.load_scene(FOLDER / f"{which}.toml")
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "x.top").write_text(topology(scene, algorithm == "settle"))
+        (folder / "x.gro").write_text(start(scene))
+        settings = RUN.format(step=scene.step, steps=scene.steps) + ALGORITHMS[algorithm]
+        (folder / "x.mdp").write_text(settings + "\n")
+        for command in (
+            "gmx_d grompp -f x.mdp -c x.gro -p x.top -o x.tpr -maxwarn 5",
+            "gmx_d mdrun -s x.tpr -o x.trr -nt 1",
+        ):
+            subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
+        (FOLDER / f"{name}.trr").write_bytes((folder / "x.trr").read_bytes())
+
+
+def judged(name: str) -> dict[str, dict[str, float]]:
+    """The verdicts of `springcheck judge` by check."""
+    scene, out = FOLDER / f"{name.partition('-')[0]}.toml", StringIO()
+    with redirect_stdout(out):
+        of = ["--scene", str(scene), "--scheme", "velocity-verlet", "--json"]
+        springcheck(["judge", str(FOLDER / f"{name}.trr"), *of])
+    return {one["check"]: one for one in json.loads(out.getvalue())["verdicts"]}
+
+
+def main() -> int:
+    """Judge what is stored; returns the exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="run GROMACS anew")
+    options = parser.parse_args()
+    right = True
+    for name, rejected in CASES.items():
+        if options.write:
+            write(name)
+        found = judged(name)
+        failed = {check for check, one in found.items() if one["passed"] is False}
+        right &= failed == rejected
+        said = " rejected by " + " ".join(sorted(failed)) if failed else " passed"
+        shown = (f"{check} {found[check]['value']:.1e}" for check in ("step-defect", "rod-length", "turn"))
+        print(f"{name:24}", "  ".join(shown), said)
+    return 0 if right else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
