@@ -162,7 +162,7 @@ class _Part:
     piece: int
     progress: Progress | None
     told: int = 0
-    """Steps that progress has heard of within frames."""
+    """Steps within frames that were reported to `progress`."""
 
     def advance(self, q: Floats, p: Floats) -> tuple[Ending, int, str, float]:
         """Fill q and p (f, n): how it ended, how many rows are good, why, and the seconds it took."""

@@ -20,7 +20,7 @@ from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
 from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, SMALLEST, law_of, read
 
 FEW = 8
-"""Particles up to which each is pushed by itself."""
+"""Number of particles up to which each is perturbed by itself."""
 
 LONGEST_WAIT, NONE_LEFT = 10_000, 1e-9
 """Steps in which a collision is waited for at most, and the chance of none that is left."""

@@ -35,7 +35,7 @@ ROUNDING = np.longdouble(64 * ROUNDOFF)
 """Of a motion in extended precision: a change that is not well above it is not known."""
 
 LARGEST = 2.0**-5
-"""Relative change up to which effects are as large as it is small."""
+"""Relative change up to which its effect is taken to be proportional to it."""
 
 LOOKED_AT = 64
 """Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""

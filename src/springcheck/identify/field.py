@@ -1,7 +1,7 @@
 """Two coordinates that turn into each other: a magnetic field across their plane, or a turning frame.
 
 With z = x + i y, on springs alike along both axes, a frame takes (z, z') to A (z, z') with a complex A, where
-without a field A is real.  Its determinant is turned by the angle at which the field turns a velocity.
+without a field A is real.  The phase of its determinant is the angle by which the field turns a velocity.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ Repair = tuple[Record, str, str]
 
 
 def misplaced(e: Evidence) -> list[Explanation]:
-    """What is wrong where numbers stand in the wrong place."""
+    """The cause, where one map fits as soon as numbers stand in another column, row or unit; else none."""
     before = _left(e.record, e.j)
     if not before:
         return []

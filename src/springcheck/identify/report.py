@@ -64,7 +64,7 @@ VELOCITY_OFFSET = {
 """Time of the velocities after that of the positions, in steps: where the map is of second order."""
 
 AS_NEAR = 1.5
-"""Factor by which one scheme may miss the states by more than another that is explained."""
+"""Factor by which the residual of one scheme may exceed that of another for which a cause was found."""
 
 UNTOLD = "cannot tell"
 """Arithmetic where the candidates' are several."""

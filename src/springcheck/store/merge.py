@@ -126,7 +126,7 @@ def _extents(file: Any) -> list[seal.Extent]:
 
 
 def _digests(file: Any, path: Path) -> dict[str, str]:
-    """What the file holds, under sha256; the tables that were copied have theirs, the others are given it."""
+    """Name and sha256 of all that the file holds; copied tables keep their digests, the others get one."""
     names = tables.all_names(file)
     found = digests.contents(file, names)
     for name in names:

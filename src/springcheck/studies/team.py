@@ -89,7 +89,7 @@ def arguments(default: int = 1) -> tuple[Argument, ...]:
 
 
 def of(options: Namespace) -> Team:
-    """Those that the command line asks for."""
+    """The team that the command line asks for."""
     if not options.cluster:
         return Processes(options.workers, getattr(options, "brought", None))
     from springcheck.studies.cluster import Cluster

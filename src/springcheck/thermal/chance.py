@@ -57,7 +57,7 @@ def _quadrature() -> tuple[Floats, Floats]:
 
 
 def _saddlepoint(value: float, n: int) -> float:
-    """Of a mean of n values of the fourth Legendre polynomial at uniform numbers, two-sided."""
+    """Two-sided chance of a mean of n values of the fourth Legendre polynomial at uniform numbers."""
     if not -3 / 7 < value < 1 or n < 8:
         return 1.0 if n < 8 else 0.0
 

@@ -1,4 +1,4 @@
-"""What schemes leave of a momentum in a step, as functions of x = gamma h, the friction rate times h."""
+"""Decay factors of a momentum over a step, by scheme, as functions of x = gamma h, friction rate times h."""
 
 from __future__ import annotations
 

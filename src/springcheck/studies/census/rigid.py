@@ -142,5 +142,5 @@ def _named(each: Reals, h_w: Floats) -> str:
 
 
 def _to(off: float) -> str:
-    """How near, to the next power of ten: a column that is compared is not to change with a rounding."""
+    """The distance, rounded up to a power of ten, so that no rounding changes a column that is compared."""
     return "to rounding" if off < ROUNDED else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"

@@ -41,7 +41,7 @@ class MethodSummary:
     """The same with every step read."""
     start_seconds: float | None
     first_start_seconds: float | None
-    """Of the first start in this process, with import and compilation, and its first short run."""
+    """The first start in this process and its first short run, with import and compilation [s]."""
 
     @property
     def floor_ratio(self) -> float | None:
