@@ -17,6 +17,7 @@ from springcheck import checks, driver, engines
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults import baths
+from springcheck.studies.faults.measure import clean_bath
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, Stepper
 
@@ -118,3 +119,9 @@ def test_a_chain_starts_from_rest_which_a_factor_of_all_momenta_cannot() -> None
     assert driver.run(scene, "own:nose-hoover", seed=1).outcome.status == "complete"
     with pytest.raises(MethodError, match="are all 0"):
         driver.run(scene, "own:bussi", seed=1)
+
+
+@pytest.mark.parametrize("case", [710, 1270])
+def test_a_chain_that_stops_a_motion_too_hot_for_it_is_no_alarm(case: int) -> None:
+    """Random baths of 10,000, whose kinetic energy is 1e17 kT and more."""
+    assert clean_bath(case).alarms == ()

@@ -30,6 +30,7 @@ from springcheck.studies.faults import measure as faults
 from springcheck.studies.faults.result import Clean, FaultReport
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
+from springcheck.studies.sampling import measure as sampling
 from springcheck.text.lines import TextTable, plain, table
 
 pytestmark = pytest.mark.slow
@@ -247,7 +248,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults")
+NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults", "sampling")
 FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
 
 
@@ -261,10 +262,13 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "stability": ["stability", "rlc-circuit", *methods[2:]],
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],
+        "sampling": ["sampling", "--method", "own:baoab"],
         "ensemble": ["ensemble", "spring", "--vary", "time.step=0.01:1:5:log", *methods],
     }
-    for name, call in calls.items():
-        assert main([*call, "-o", str(folder / f"{name}.h5"), "--quiet"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampling, "WIDE", 50)
+        for name, call in calls.items():
+            assert main([*call, "-o", str(folder / f"{name}.h5"), "--quiet"]) == 0
     with keeper.kept(folder / "faults.h5", "faults") as kept:
         found = tuple(
             replace(faults.examine(fault, limits=False), limits={"step-defect": 5e-15}) for fault in FEW
@@ -294,7 +298,7 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     assert all(
         attributes.get("scope") in {"row", "col", "rowgroup"} for tag, attributes in tags.tags if tag == "th"
     )
-    known = "friction" if name == "faults" else "own:semi-implicit-euler"
+    known = {"faults": "friction", "sampling": "own:baoab"}.get(name, "own:semi-implicit-euler")
     assert known in {str(cell).strip() for table in tables for row in table.rows for cell in row[:1]}
 
 

@@ -20,7 +20,7 @@ from springcheck.physics.trajectory import Comparison
 NAMES = [
     "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "ensemble", "exact",
     "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
-    "read", "report", "run", "simulate", "spring", "stability",
+    "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip
 
 

@@ -242,3 +242,23 @@ def test_a_deterministic_run_imports_no_generator() -> None:
     code += "s.simulate('spring', 'own:euler'); print('numpy.random' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_a_bath_of_temperature_zero_is_friction_without_noise() -> None:
+    from argparse import Namespace
+
+    from springcheck.errors import SpringcheckError
+    from springcheck.studies.run.changes import bathed
+
+    scene = scenefile.load_scene("bath-uneven")
+    cold = bathed(scene, Namespace(temperature="0K", friction=None))
+    assert cold.bath is None
+    assert cold.system.friction_rates == pytest.approx(20.0, rel=1e-15)
+    assert cold.title.endswith("at temperature 0: friction 20 without noise")
+    short = replace(cold, steps=100)
+    verdicts = springcheck.judge(short, driver.run(short, "own:langevin-middle"))
+    assert not [v for v in verdicts if v.passed is False]
+    with pytest.raises(SpringcheckError, match="a number > 0 is needed"):
+        bathed(scene, Namespace(temperature="0", friction=-1.0))
+    with pytest.raises(SpringcheckError, match="has a friction of its own"):
+        bathed(cold, Namespace(temperature="0", friction=1.0))

@@ -8,19 +8,19 @@ Command: python validation/thermostats.py [figure]        (some minutes; `figure
 * false alarms: verdicts of right thermostats over seeds 1, 2, ... in their order, none left out;
 * files: random springs, steps, frictions and temperatures, 1,000 frames each, identified with nothing stated.
 
-Printed by `thermostats.py 40` on two cores that others used as well:
+Printed by `thermostats.py 40` on two cores that many others used as well, hence two times for each:
 
     draws
-      own:baoab                      2e+07 draws: mean -3.4e-04 +- 2e-04, variance 1 -9.8e-05 +- 3e-04,
-        fourth 2.9991 +- 0.0022, 5 s
-      openmm:langevin-middle-bath    2e+07 draws: mean +1.4e-04 +- 2e-04, variance 1 +2.7e-04 +- 3e-04,
-        fourth 3.0013 +- 0.0022, 10 s
-      openmm:brownian                2e+07 draws: mean +3.7e-04 +- 2e-04, variance 1 -3.7e-04 +- 3e-04,
-        fourth 2.9995 +- 0.0022, 10 s
-      ase:langevin-baoab             2e+07 draws: mean -3.9e-04 +- 2e-04, variance 1 +6.5e-05 +- 3e-04,
-        fourth 3.0019 +- 0.0022, 28 s
-      lammps:gjf-1                   4e+06 draws: mean +5.8e-04 +- 5e-04, variance 1 +1.5e-04 +- 7e-04,
-        fourth 3.0037 +- 0.0049, 2 s
+      own:baoab                      2.0e+08 draws: mean -1.3e-04 +- 7e-05, variance 1 +2.8e-05 +- 1e-04,
+        fourth 3.0004 +- 0.0007, 67 s, 5 s of a processor
+      openmm:langevin-middle-bath    2.0e+08 draws: mean +1.3e-05 +- 7e-05, variance 1 -1.2e-05 +- 1e-04,
+        fourth 2.9996 +- 0.0007, 125 s, 9 s of a processor
+      openmm:brownian                2.0e+08 draws: mean +1.3e-05 +- 7e-05, variance 1 -1.2e-05 +- 1e-04,
+        fourth 2.9996 +- 0.0007, 120 s, 10 s of a processor
+      ase:langevin-baoab             2.0e+08 draws: mean -1.3e-04 +- 7e-05, variance 1 +2.8e-05 +- 1e-04,
+        fourth 3.0004 +- 0.0007, 53 s, 10 s of a processor
+      lammps:gjf-1                   2.0e+08 draws: mean -2.1e-05 +- 7e-05, variance 1 +1.3e-04 +- 1e-04,
+        fourth 3.0015 +- 0.0007, 62 s, 9 s of a processor
     false alarms
       40 seeds of 8 schemes: 0 runs failed; 1600 chances,
         the smallest 3.0e-03; below a level lie 1.06 of 0.1, 0.88 of 0.01, 0.00 of 0.001
@@ -33,10 +33,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
+import springcheck
 from springcheck import checks, driver, engines
 from springcheck.engines.contract import Label
 from springcheck.physics.bath import Bath
@@ -46,15 +47,27 @@ from springcheck.thermal import THERMOSTATS, Law
 from springcheck.thermal.states import identify_thermal
 
 H, M, K, RATE, THERMAL = 0.35, 3.7, 2.9, 0.8, 1.7
+MANY_DRAWS = 200_000_000
+"""Their variance has a standard error of 1e-4."""
 FIGURE = Path(__file__).parents[1] / "data" / "figures" / "thermostats.png"
 
 
-def springs(n: int, steps: int, *, h: float = H, m: float = M, k: float = K, rate: float = RATE) -> Scene:
-    """So many equal springs in a bath, none of whose numbers is 1."""
+def springs(
+    n: int,
+    steps: int,
+    *,
+    h: float = H,
+    m: float = M,
+    k: float = K,
+    rate: float = RATE,
+    in_space: bool = False,
+) -> Scene:
+    """So many equal springs in a bath, none of whose numbers is 1; in space three of each particle."""
     walls = WallSpring(i=np.arange(n), k=np.full(n, k), at=np.zeros(n))
     return Scene(
         m=np.full(n, m), q=np.full(n, 0.3), p=np.full(n, 0.2), terms=(walls,), step=h, steps=steps,
         bath=Bath(temperature=THERMAL, friction=rate), name="springs",
+        places=np.arange(n) if in_space else None,
     )  # fmt: skip
 
 
@@ -64,28 +77,29 @@ def law(scheme: str, h: float = H, rate: float = RATE) -> Law:
 
 
 def draws(label: str, n: int, steps: int) -> None:
-    """Moments of the draws of a method of one draw a step, from its positions."""
+    """Moments of the draws of a method of one draw a step, from its positions along all three axes."""
     method = engines.method(engines.parse(label))
     known = law(method.scheme)
     A, g = known.A[0].astype(float), float(known.G[0, 0, 0])
-    began = perf_counter()
-    simulation = engines.start(springs(n, steps), engines.parse(label), 7)
-    q, p = np.empty((2, 1, n))
-    old = np.full(n, 0.3), np.full(n, 0.2)
-    sums = np.zeros(3)
-    for _ in range(steps):
-        simulation.advance(1, q, p)
-        xi = (q[0] - A[0, 0] * old[0] - A[0, 1] * old[1]) / g
+    began, of_processor = perf_counter(), process_time()
+    simulation = engines.start(springs(n, steps, in_space=True), engines.parse(label), 7)
+    rows = max(1, 300_000 // n)
+    q, p = np.empty((2, rows + 1, n))
+    q[0], p[0], sums = 0.3, 0.2, np.zeros(3)
+    for _ in range(0, steps, rows):
+        simulation.advance(1, q[1:], p[1:])
+        xi = (q[1:] - A[0, 0] * q[:-1] - A[0, 1] * p[:-1]) / g
         square = xi * xi
-        sums += xi.sum(), square.sum(), (square * square).sum()
-        old = q[0].copy(), p[0].copy()
-    total = n * steps
+        sums += xi.sum(), square.sum(), np.vdot(square, square)
+        q[0], p[0] = q[-1], p[-1]
+    total = n * rows * -(-steps // rows)
     mean, variance, fourth = sums / total
     print(
-        f"  {label:30} {total:.0e} draws: mean {mean:+.1e} +- {total**-0.5:.0e}, "
+        f"  {label:30} {total:.1e} draws: mean {mean:+.1e} +- {total**-0.5:.0e}, "
         f"variance 1 {variance - 1:+.1e} "
         f"+- {(2 / total) ** 0.5:.0e}, fourth {fourth:.4f} +- {(96 / total) ** 0.5:.4f}, "
-        f"{perf_counter() - began:.0f} s"
+        f"{perf_counter() - began:.0f} s, {process_time() - of_processor:.0f} s of a processor",
+        flush=True,
     )
 
 
@@ -135,62 +149,21 @@ def files(number: int) -> None:
     print(f"  omega of BAOAB and BAOA: off by {np.median(digits):.0e} (median), {max(digits):.0e} at most")
 
 
-MARKS = (
-    ("own:baoab", "o"), ("own:obabo", "o"), ("own:oabao", "o"), ("own:aboba", "o"), ("own:bbk", "o"),
-    ("openmm:langevin-middle-bath", "s"), ("openmm:andersen", "s"), ("ase:langevin", "^"),
-    ("ase:langevin-baoab", "^"), ("ase:andersen", "^"), ("lammps:langevin", "D"), ("lammps:gjf-1", "D"),
+METHODS = (
+    "own:baoab", "own:obabo", "own:oabao", "own:aboba", "own:bbk", "openmm:langevin-middle-bath",
+    "openmm:andersen", "ase:langevin", "ase:langevin-baoab", "ase:andersen", "lammps:langevin",
+    "lammps:gjf-1",
 )  # fmt: skip
 
 
 def figure() -> None:
     """Configurational and kinetic temperature against h w: laws as lines, engines as marks."""
-    import matplotlib as mpl
+    from springcheck.figures.style import style
 
-    mpl.use("agg")
-    import matplotlib.pyplot as plt
-    from matplotlib.lines import Line2D
-
-    w = np.sqrt(K / M)
-    turns = np.linspace(0.02, 1.5, 120)
-    schemes = list(dict.fromkeys(engines.method(engines.parse(label)).scheme for label, _ in MARKS))
-    colours = dict(zip(schemes, plt.colormaps["tab20"](np.linspace(0, 1, len(schemes))), strict=True))
-    panels, axes = plt.subplots(1, 2, figsize=(11, 5.2), sharex=True, sharey=True)
-    rate = 0.4 * w
-    for scheme in schemes:
-        laws = [law(scheme, h=x / w, rate=rate) for x in turns]
-        style = ("-", "--", "-.", ":")[schemes.index(scheme) % 4]
-        for axis, values in zip(axes, ("configurational", "kinetic"), strict=True):
-            heights = [getattr(one, values)[0] for one in laws]
-            axis.plot(turns, heights, style, color=colours[scheme], lw=1.4, label=scheme)
-    n, steps = 4000, 300
-    for label, mark in MARKS:
-        if engines.absence(label.partition(":")[0]):
-            continue
-        scheme = engines.method(engines.parse(label)).scheme
-        for turn in (0.4, 0.8, 1.2):
-            scene = springs(n, steps, h=turn / w, rate=rate)
-            simulation = engines.start(scene, engines.parse(label), 7)
-            q, p = np.empty((2, 40, n))
-            simulation.advance(2, q, p)
-            simulation.advance(5, q, p)
-            found = K * np.mean(q * q) / THERMAL, np.mean(p * p) / (M * THERMAL)
-            for axis, value in zip(axes, found, strict=True):
-                axis.plot(turn, value, mark, color=colours[scheme], ms=6, mfc="none", mew=1.2)
-    for axis, title in zip(axes, ("configurational: k<q$^2$>/kT", "kinetic: <p$^2$>/m kT"), strict=True):
-        axis.set(title=title, xlabel="h $\\omega$", ylim=(0.4, 1.8), xlim=(0, 1.5))
-        axis.axhline(1, color="0.6", lw=0.6, zorder=0)
-    axes[0].set_ylabel("temperature over that of the bath")
-    marks = {"own": "o", "OpenMM": "s", "ASE": "^", "LAMMPS": "D"}
-    handles = [Line2D([], [], marker=m, color="0.3", mfc="none", ls="") for m in marks.values()]
-    axes[1].legend(handles, list(marks), fontsize=8, frameon=False, loc="upper left")
-    panels.suptitle(
-        "Thermostats on a spring: laws as lines, engines as marks (friction 0.4 $\\omega$)", fontsize=11
-    )
-    panels.tight_layout(rect=(0, 0.1, 1, 1))
-    panels.legend(
-        *axes[0].get_legend_handles_labels(), fontsize=8, frameon=False, ncols=6, loc="lower center"
-    )
-    panels.savefig(FIGURE, dpi=110)
+    here = [label for label in METHODS if not engines.absence(label.partition(":")[0])]
+    with style():
+        drawn = springcheck.sampling(here).figures()["sampling-temperatures"]
+        drawn.savefig(FIGURE, dpi=110)
     print(f"  {FIGURE.name} written")
 
 
@@ -199,11 +172,11 @@ def main() -> None:
     if sys.argv[1:] != ["figure"]:
         print("draws")
         for label, n in (
-            ("own:baoab", 20000), ("openmm:langevin-middle-bath", 20000), ("openmm:brownian", 20000),
-            ("ase:langevin-baoab", 20000), ("lammps:gjf-1", 4000),
+            ("own:baoab", 30000), ("openmm:langevin-middle-bath", 30000), ("openmm:brownian", 30000),
+            ("ase:langevin-baoab", 30000), ("lammps:gjf-1", 6000),
         ):  # fmt: skip
             if not engines.absence(label.partition(":")[0]):
-                draws(label, n, 1000)
+                draws(label, n, MANY_DRAWS // n)
         print("false alarms")
         false_alarms(int(sys.argv[1]) if len(sys.argv) > 1 else 60)
         print("files")

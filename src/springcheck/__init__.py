@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         read,
         report,
         run,
+        sampling,
         simulate,
         stability,
     )
@@ -48,7 +49,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "ensemble", "exact",
     "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
-    "read", "report", "run", "simulate", "spring", "stability",
+    "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip
 
 _HOMES = {

@@ -11,10 +11,12 @@ from springcheck.api.studies import (
     methods,
     precision,
     report,
+    sampling,
     stability,
 )
 
 __all__ = [
     "Said", "Shelf", "Verdicts", "census", "compare", "ensemble", "exact", "explain", "extremes", "faults",
-    "identify", "judge", "methods", "precision", "read", "report", "run", "simulate", "stability",
+    "identify", "judge", "methods", "precision", "read", "report", "run", "sampling", "simulate",
+    "stability",
 ]  # fmt: skip

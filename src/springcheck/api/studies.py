@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from springcheck.studies.extremes.result import Atlas
     from springcheck.studies.faults.result import FaultReport
     from springcheck.studies.precision.result import PrecisionStudy
+    from springcheck.studies.sampling.result import Sampling
     from springcheck.studies.stability.result import Stability
 
 
@@ -82,11 +83,25 @@ def faults(*, path: str | Path | None = None, force: bool = False, workers: int 
 
 
 def census(
+    methods: str | Sequence[str] = (), *, thermostats: bool = False, path: str | Path | None = None,
+    force: bool = False, workers: int = 1,
+) -> Census:  # fmt: skip
+    """Which integrator every installed engine really runs, by its states; by these labels or globs alone.
+
+    With `thermostats` globs name those too, on springs in a bath.
+    """
+    from springcheck.studies.census import measure
+
+    with spoken(), labels_of(methods) as named:
+        return measure.record(path, named, thermostats=thermostats, **how(methods, force, workers))
+
+
+def sampling(
     methods: str | Sequence[str] = (), *, path: str | Path | None = None, force: bool = False,
     workers: int = 1,
-) -> Census:  # fmt: skip
-    """Which integrator every installed engine really runs, by its states; by these labels or globs alone."""
-    from springcheck.studies.census import measure
+) -> Sampling:  # fmt: skip
+    """How well thermostats sample a spring: temperatures, precision and limits, each beside its law."""
+    from springcheck.studies.sampling import measure
 
     with spoken(), labels_of(methods) as named:
         return measure.record(path, named, **how(methods, force, workers))

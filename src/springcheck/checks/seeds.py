@@ -153,7 +153,7 @@ def noise_size(subject: Seeded) -> Finding | str:
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
         expected = of_q * one.q[-1], of_p * one.p[-1]
         worst = max(worst, _off((other.q[-1], other.p[-1]), expected, (allowed[0], allowed[1])))
-    if not np.any(one.p[-1]):
+    if scheme.draws and not np.any(one.p[-1]):
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")

@@ -18,6 +18,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
     "census": ("--method 'own:*' --page engines.html",),
+    "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
     "plot": ("spring.h5 -o figures", "orbit.csv"),
     "report": ("spring.h5 -o spring.html",),

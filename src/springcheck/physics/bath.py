@@ -23,7 +23,7 @@ class Bath:
 
     def __post_init__(self) -> None:
         for name, remedy in (
-            ("temperature", "friction without noise is [[damping]]"),
+            ("temperature", "at 0 it is friction without noise: [[damping]], c = friction * mass"),
             ("friction", "without friction there is no bath: leave [bath] out"),
         ):
             try:

@@ -1,0 +1,13 @@
+"""How well thermostats sample: temperatures against the step, what an error costs, where they are stable."""
+
+from __future__ import annotations
+
+from springcheck.studies import team
+from springcheck.studies.arguments import store_arguments
+from springcheck.studies.study import Study
+
+STUDY = Study(
+    name="sampling",
+    about="temperatures, precision and limits of thermostats on a spring, beside their laws",
+    arguments=(*team.arguments(), *store_arguments("sampling.h5")),
+)

@@ -1,0 +1,204 @@
+"""Thermostats on a thousand springs: temperatures, precision, and limits, each beside its law."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from math import nan
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+
+from springcheck import driver, engines, schemes
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.studies import keeper
+from springcheck.studies.arguments import Progress
+from springcheck.studies.census.baths import KT, MASS, STIFFNESS, springs, temperatures
+from springcheck.studies.choose import choose
+from springcheck.studies.keeper import How, Keeper, each
+from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
+from springcheck.thermal import THERMOSTATS, Law
+
+OMEGA = float(np.sqrt(STIFFNESS / MASS))
+
+TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
+"""h omega of the temperatures."""
+
+RATE = 0.4
+"""Friction over omega there."""
+
+FRAMES = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
+"""Steps over which <q**2> is taken, at the second h omega."""
+
+FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
+"""Friction over omega of the limits."""
+
+WIDE, WAIT = 1000, 5.0
+"""Springs side by side, and times over which the motion has decayed before frames count."""
+
+LONGEST = 8.0
+"""h omega above which no limit is looked for."""
+
+HOTTEST_LAW = 100.0
+"""Over the bath's: above it, and at a limit, motion is not bounded within these steps."""
+
+SEED_OF_ALL = 27
+"""None is chosen."""
+
+
+def bathed(scene: Scene, turn: float, friction: float) -> Scene:
+    """Springs at another h omega and friction over omega."""
+    return replace(scene, step=turn / OMEGA, bath=Bath(temperature=KT, friction=friction * OMEGA), every=1)
+
+
+def law_at(scheme: str, turn: float, friction: float) -> Law:
+    """Of one of these springs."""
+    return Law(
+        scheme=THERMOSTATS[scheme], h=turn / OMEGA, m=np.array([MASS]), k=np.array([STIFFNESS]),
+        rate=friction * OMEGA, thermal=KT,
+    )  # fmt: skip
+
+
+def measured(label: Label) -> Sampled:
+    """One thermostat."""
+    method = engines.method(label)
+    linear = not THERMOSTATS[method.scheme].rescales
+    rows, run, q = [], None, np.empty(0)
+    for i, turn in enumerate(TURNS):
+        law = law_at(method.scheme, turn, RATE) if linear else None
+        exact = (nan, nan) if law is None else (float(law.configurational[0]), float(law.kinetic[0]))
+        if linear and not max(exact) < HOTTEST_LAW:
+            rows.append((nan,) * 6)
+            continue
+        wait = round(WAIT / _memory(law)) if law else 100
+        made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
+        found = temperatures(made.q[wait:], made.p[wait:])
+        rows.append((*found[0], exact[0], *found[1], exact[1]))
+        if i <= 1:
+            run, q = made, STIFFNESS * made.q[wait:] ** 2 / KT
+    if run is None:
+        raise MethodError(f"{label}: no step is stable from h omega {TURNS[0]} on")
+    law = law_at(method.scheme, TURNS[1], RATE) if linear else None
+    columns = np.array(rows).T
+    steps = max(run.outcome.step, 1)
+    return Sampled(
+        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=TURNS,
+        configurational=columns[0], configurational_error=columns[1], configurational_law=columns[2],
+        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=FRAMES,
+        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in FRAMES]),
+        off_law=np.array([_off(law, int(n)) for n in FRAMES]), friction=FRICTIONS,
+        limit=np.array([_last_stable(partial(_radius_of_engine, label, x)) for x in FRICTIONS])
+        if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
+        limit_law=np.array([_last_stable(partial(_radius, method.scheme, x)) for x in FRICTIONS])
+        if linear else np.full(len(FRICTIONS), nan),
+        force_calls=run.force_calls / steps, seconds=run.timing.run / steps / WIDE,
+    )  # fmt: skip
+
+
+def _memory(law: Law) -> float:
+    """What the slowest part of the motion decays by in a step, as its logarithm."""
+    radius = float(np.max(np.abs(np.linalg.eigvals(law.A.astype(np.float64)))))
+    return max(-np.log(radius), 0.02) if radius > 0 else 1.0
+
+
+def _off(law: Law | None, frames: int) -> float:
+    """What k <q**2>/kT over so many frames is off from 1: a systematic error and a statistical one."""
+    if law is None or law.scheme.collides:
+        # of collisions the motion is a mixture, and not Gaussian
+        return nan
+    ratio = float(law.configurational[0])
+    return float(np.hypot(ratio - 1, ratio * law.error_of_variances(frames)[0, 0]))
+
+
+def _radius(scheme: str, friction: float, turn: float) -> float:
+    """Spectral radius of the law's map of second moments."""
+    with np.errstate(all="ignore"):
+        total = sum(c * np.kron(A[0], A[0]) for c, A, _ in law_at(scheme, turn, friction)._state)
+    return float(np.max(np.abs(np.linalg.eigvals(total)))) if np.isfinite(total).all() else np.inf
+
+
+def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
+    """The same of an engine's own map, which one seed and three starts leave without any noise."""
+    one = bathed(springs(1, 1), turn, friction)
+    rest = np.zeros(1)
+    runs = [
+        driver.run(replace(one, q=q, p=p, steps=2), label, seed=SEED_OF_ALL)
+        for q, p in ((rest, rest), (rest + 1, rest), (rest, rest + MASS * OMEGA))
+    ]
+    # from the first step to the second, as some begin otherwise than they go on
+    (q0, p0), *moved = [(run.q[1:, 0], run.p[1:, 0]) for run in runs]
+    if not all(len(q) == 2 for q, _ in moved) or len(q0) != 2:
+        return np.inf
+    both = np.array([[q - q0, (p - p0) / (MASS * OMEGA)] for q, p in moved])
+    if not np.isfinite(both).all():
+        return np.inf
+    A = np.linalg.lstsq(both[:, :, 0], both[:, :, 1])[0].T
+    return float(np.max(np.abs(np.linalg.eigvals(A)))) ** 2
+
+
+def _last_stable(radius: Callable[[float], float]) -> float:
+    """The largest h omega up to which no map grows, to a part in 1e4; infinity where none up to 8 does.
+
+    The rounding of a map is 1e-15, and where both its eigenvalues coincide, the root of that.
+    """
+    slack = 1 + 1e-7
+
+    def grows(turn: float) -> bool:
+        return not radius(turn) <= slack
+
+    try:
+        tried = np.geomspace(0.02, LONGEST, 25)
+        first = next((i for i, turn in enumerate(tried) if grows(float(turn))), None)
+        if first is None:
+            return float("inf")
+        low, high = (float(tried[first - 1]), float(tried[first])) if first else (0.0, float(tried[0]))
+        while high - low > 1e-4 * high and high > 1e-3:
+            middle = (low + high) / 2
+            low, high = (low, middle) if grows(middle) else (middle, high)
+    except MethodError:
+        return nan
+    return (low + high) / 2 if high > 1e-3 else 0.0
+
+
+def measure(labels: Sequence[Label], *, kept: Keeper | None = None, left: Sequence[Any] = ()) -> Sampling:
+    """Every thermostat of these."""
+    kept = kept or Keeper()
+    found = kept.results(each(labels, "", lambda label: partial(measured, label), SAMPLED))
+    return Sampling(methods=tuple(found), left_out=tuple(left), resumed=kept.resumed, path=kept.path)
+
+
+def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
+    """Like `measure`, of these labels or globs, kept in a store; the default thermostats where left out."""
+    labels, left = choose(replace(springs(1, 1), include=("*",)), methods)
+    with keeper.kept(path, keeper.command("sampling", labels), **how) as kept:
+        found = measure(labels, kept=kept, left=left)
+        kept.commit("sampling", found.document())
+    return found
+
+
+def perform(options: Namespace, progress: Progress | None) -> Sampling:
+    """What `springcheck sampling` does."""
+    return record(options.output or "sampling.h5", options.method, **keeper.how(options, progress))
+
+
+@keeper.restoring("sampling")
+def stored(kept: keeper.Kept) -> Sampling:
+    """The study that `record` has kept.  StoreError where the file holds none."""
+    return Sampling(
+        methods=tuple(kept.found(SAMPLED, one["method"]) for one in kept.document["methods"]),
+        left_out=kept.left_out, path=kept.path,
+    )  # fmt: skip
+
+
+def curve(scheme: str, turns: Floats, of: str) -> Floats:
+    """The law's temperature over these h omega, NaN where the step is not stable."""
+    with np.errstate(all="ignore"):
+        found = np.array([float(getattr(law_at(scheme, x, RATE), of)[0]) for x in turns])
+    return np.where(np.isfinite(found), found, nan)

@@ -1,0 +1,97 @@
+"""What the study of sampling has found: one record for each thermostat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats
+from springcheck.studies import keeper
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.study import Shown
+from springcheck.studies.tables import RecordForm
+from springcheck.text.wording import count
+
+APART = 6.0
+"""Standard errors from which on a measured number is not its law's: chance 2e-9."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sampled:
+    """One thermostat on springs.  Numbers without a law, and those of motion that is not bounded, are NaN."""
+
+    method: str
+    scheme: str
+    title: str
+    turn: Floats
+    """h omega, ascending (g,), at friction 0.4 omega."""
+    configurational: Floats
+    """k <q**2>/kT as measured (g,)."""
+    configurational_error: Floats
+    configurational_law: Floats
+    kinetic: Floats
+    """<p**2>/m kT of the momenta as they are stored (g,)."""
+    kinetic_error: Floats
+    kinetic_law: Floats
+    frames: Floats
+    """Steps over which <q**2> is taken, at the second h omega (g,)."""
+    off: Floats
+    """Root of the mean square of what k <q**2>/kT is off from 1 (g,)."""
+    off_law: Floats
+    friction: Floats
+    """gamma/omega (g,)."""
+    limit: Floats
+    """The largest h omega of stable steps, by the engine's own map, at each friction (g,)."""
+    limit_law: Floats
+    force_calls: float
+    """A step."""
+    seconds: float
+    """A step and spring, of a thousand side by side."""
+
+    @property
+    def departs(self) -> bool:
+        """Whether a temperature is not the law's."""
+        pairs = (
+            (self.configurational, self.configurational_law, self.configurational_error),
+            (self.kinetic, self.kinetic_law, self.kinetic_error),
+        )
+        with np.errstate(all="ignore"):
+            return any(bool(np.any(np.abs(x - law) > APART * error)) for x, law, error in pairs)
+
+
+SAMPLED: RecordForm[Sampled] = RecordForm(
+    kind=Sampled, beginning="sampling/", signal="configurational", axes=("turn",)
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Sampling(Shown):
+    """The whole study; a row of its table is a thermostat."""
+
+    table_of: ClassVar[str] = "methods"
+
+    methods: tuple[Sampled, ...]
+    left_out: tuple[LeftOut, ...] = ()
+    resumed: int = 0
+    path: Path | None = None
+
+    def __repr__(self) -> str:
+        apart = sum(x.departs for x in self.methods)
+        return f"Sampling({count(len(self.methods), 'thermostat')}, {apart} not as their laws)"
+
+    @property
+    def status(self) -> int:
+        """1: a temperature is not its law's; 2: nothing was run."""
+        if not self.methods:
+            return 2
+        return 1 if any(x.departs for x in self.methods) else 0
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        names = [field.name for field in fields(Sampled)]
+        return keeper.document(
+            methods=[{name: getattr(x, name) for name in names} for x in self.methods], left_out=self.left_out
+        )

@@ -1,0 +1,73 @@
+"""The study of sampling: temperatures, precision and limits of thermostats, each beside its law."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springcheck import engines
+from springcheck.cli import main
+from springcheck.engines.own import thermal
+from springcheck.studies.sampling import measure, page
+from springcheck.studies.sampling.result import Sampling
+from springcheck.thermal import THERMOSTATS
+
+
+@pytest.fixture(autouse=True)
+def _smaller(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(measure, "WIDE", 100)
+    monkeypatch.setattr(measure, "TURNS", np.array([0.2, 0.5, 1.2]))
+    monkeypatch.setattr(measure, "FRAMES", np.array([10.0, 100.0, 500.0]))
+    monkeypatch.setattr(measure, "FRICTIONS", np.array([0.3, 1.0, 3.0]))
+
+
+def test_temperatures_errors_and_limits_lie_on_their_laws() -> None:
+    one = measure.measured(engines.parse("own:obabo"))
+    a = one.turn**2
+    assert one.configurational_law == pytest.approx(1 / (1 - a / 4))
+    assert one.kinetic_law == pytest.approx(np.ones(3))
+    assert not one.departs
+    # a root of a mean square of a hundred
+    assert np.abs(one.off / one.off_law - 1).max() < 5 / np.sqrt(2 * 100)
+    assert one.limit == pytest.approx([2, 2, 2], abs=1e-3)
+    assert one.limit_law == pytest.approx([2, 2, 2], abs=1e-3)
+    assert one.force_calls == 2
+
+
+def test_a_friction_of_the_half_step_shortens_the_stable_step() -> None:
+    """LAMMPS' fix langevin: 1 - x/2 = a/4, whose root at friction omega is sqrt(5) - 1."""
+    x = np.array([0.3, 1.0, 3.0])
+    expected = np.sqrt(x * x + 4) - x
+    one = measure.measured(engines.parse("own:lammps-langevin"))
+    assert one.limit_law == pytest.approx(expected, abs=1e-3)
+    assert one.limit == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_thermostat_that_is_not_its_law_fails_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(thermal, "THERMOSTATS", {**THERMOSTATS, "baoab": THERMOSTATS["obabo"]})
+    one = measure.measured(engines.parse("own:baoab"))
+    assert one.departs
+    assert Sampling(methods=(one,)).status == 1
+    assert Sampling(methods=()).status == 2
+
+
+def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sampling", "--method", "own:baoa", "--method", "own:bussi", "-o", "s.h5"]) == 0
+    said = capsys.readouterr().out
+    assert main(["inspect", "s.h5"]) == 0
+    assert "own:baoa " in said
+    assert "own:baoa " in capsys.readouterr().out
+    found = measure.stored("s.h5")
+    assert [x.method for x in found.methods] == ["own:baoa", "own:bussi"]
+    temperatures, costs, limits = page.banks(found)
+    assert [chart.short.split(",")[0] for chart in temperatures.charts] == ["Configurational", "Kinetic"]
+    names = [x.name for x in temperatures.charts[0].curves]
+    # a factor of all momenta has no such law, and no line
+    assert names == ["BAOA", "own:baoa", "own:bussi"]
+    assert len(costs.charts) == 2
+    assert [x.name for x in limits.charts[0].curves] == ["BAOA", "own:baoa"]
+    assert main(["plot", "s.h5"]) == 0
+    assert Path("figures/s/sampling-temperatures.png").stat().st_size > 10_000
