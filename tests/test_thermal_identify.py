@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -140,3 +141,13 @@ def test_one_spring_whose_momentum_is_rescaled_lists_it(scheme: str) -> None:
     assert found is not None
     assert scheme in [one.scheme for one in found.candidates]
     assert found.candidates[0].omega == pytest.approx(OMEGA, rel=1e-9)
+
+
+def test_gromacs_sd_names_itself_in_single_precision() -> None:
+    """Frames of GROMACS 2022.5: BAOA, its velocities half a step early (`validation/gromacs_sd.py`)."""
+    path = Path(__file__).parents[1] / "data" / "reference" / "thermostats" / "gromacs-sd.csv"
+    named: Any = springcheck.identify(path, mass=12.011)
+    (found,) = named.values()
+    assert (found.verdict, found.scheme, found.velocity_offset) == ("named", "baoa", -0.5)
+    assert found.omega[0] == pytest.approx(np.sqrt(20000 / 12.011), rel=2e-5)
+    assert found.friction[0] == pytest.approx(10, rel=0.5)
