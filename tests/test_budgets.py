@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2570,
     ("driver", "conformance", "doors"): 1179,
     ("checks",): 4291,
-    ("identify",): 7708,
+    ("identify",): 7767,
     ("formats", "store"): 4992,
     ("studies",): 1603,
     ("studies/*",): 10943,

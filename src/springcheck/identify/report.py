@@ -42,16 +42,17 @@ from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, of_size, read, stated_stride
 from springcheck.identify.result import Candidate, Explanation, Identification, nothing
 from springcheck.identify.search import (
-    SINGLE,
+    determinants,
     difference,
     disagreements,
     find,
     numbers,
+    terms_of,
     visible,
-)
+)  # fmt: skip
 from springcheck.identify.shortened import single_parameters
 from springcheck.identify.thermal import of_bath
-from springcheck.identify.together import of_a_bond, of_rotation
+from springcheck.identify.together import OF_A_PAIR, distance, of_a_bond, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import ELSEWHERE, SCHEMES
@@ -123,6 +124,16 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
 def _of_record(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
+    found = _of_coordinates(record, stiffness, friction, step)
+    if found.fits or stiffness is not None or (pair := distance(record)) is None:
+        return found
+    other = _of_coordinates(pair, None, friction, step)
+    return replace(other, notes=(*other.notes, OF_A_PAIR)) if other.fits else found
+
+
+def _of_coordinates(
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
+) -> Identification:
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
     given = record
@@ -130,7 +141,7 @@ def _of_record(
     if record is not given:
         stated = None
     stride = stated_stride(record, step, notes)
-    base = [_terms(record, j, stated) for j in moving]
+    base = [terms_of(record, j, stated) for j in moving]
     if record.momenta and stated is None:
         notes.append(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
@@ -213,15 +224,6 @@ def _of_positions(
     return identify_positions(record, stated, stride, friction, notes)
 
 
-def _terms(record: Record, j: int, stated: Floats | None) -> Terms:
-    log_stiffness = None
-    if record.momenta and stated is not None and stated[j] > 0:
-        log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
-    # in a coarse file a step or a mass may be in single precision as well
-    jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
-    return Terms(mass_unknown=record.momenta, jitter=jitter, log_stiffness=log_stiffness)
-
-
 def _explained(
     record: Record, moving: list[int], maps: list[Map], accepted: list[Joint], terms: list[Terms]
 ) -> dict[Joint, list[arithmetic.Defect]]:
@@ -243,12 +245,6 @@ def _explained(
         defects = [[*defects[k], new[k]] for k in explained]
         left = [left[k] for k in explained]
     return dict(zip(left, defects, strict=True))
-
-
-def _determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
-    between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
-    each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
-    return each, max(abs(d - 1) for d in between)
 
 
 def _known(
@@ -273,7 +269,7 @@ def _known(
     candidates = tuple(x for joint in joints for x in candidates_of(record, moving, joint, friction))
     scheme = common([x.scheme for x in candidates])
     stride = common([x.stride for x in candidates])
-    determinant, symplectic = _determinants(maps, stride or 1)
+    determinant, symplectic = determinants(maps, stride or 1)
     unknown = tuple(math.nan for _ in moving)
     offset = common([VELOCITY_OFFSET.get(x.scheme, 0.0) for x in candidates])
     damped = any(joint.damped for joint in joints)
@@ -381,7 +377,7 @@ def _unknown(
         return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
     tried = nearest(maps, terms, distinct(damped=False), strides)
-    determinant, symplectic = _determinants(maps, 1)
+    determinant, symplectic = determinants(maps, 1)
     near: dict[str, Any] = {}
     if tried:
         least = min(distance(x) for x in tried)

@@ -229,3 +229,20 @@ def difference(found: Map, part: Match) -> tuple[float, ...]:
     off = found.entries.reshape(4) - np.array(part.predicted, dtype=np.longdouble)
     ratio = float(found.size[0] / found.size[1])
     return tuple(float(x) * y for x, y in zip(off, (1, ratio, 1 / ratio, 1), strict=True))
+
+
+def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
+    """On what terms the map of oscillator j of a record is compared."""
+    log_stiffness = None
+    if record.momenta and stated is not None and stated[j] > 0:
+        log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
+    # in a coarse file a step or a mass may be in single precision as well
+    jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
+    return Terms(mass_unknown=record.momenta, jitter=jitter, log_stiffness=log_stiffness)
+
+
+def determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
+    """Those of a step of each map, of so many steps, and how far one of a map is from 1 at most."""
+    between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
+    each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
+    return each, max(abs(d - 1) for d in between)

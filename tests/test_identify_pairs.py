@@ -1,0 +1,80 @@
+"""Two particles on a bond in space: named by their distance, where their middle moves, walks or rests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from springcheck.identify import identify
+
+M, K, REST, H, N = (3.7, 1.9), 2.9, 1.1, 0.1, 300
+WAY = np.array([1.0, 2.0, -2.0]) / 3
+
+
+def swing(
+    width: Any = np.float64,
+    *,
+    drift: Any = (0.0, 0.0, 0.0),
+    more: float = 0.0,
+    centre: float = 0.0,
+    late: bool = False,
+) -> tuple[np.ndarray, ...]:
+    """Times, positions (f, 6) and velocities of velocity Verlet in the width of a float; `more` ties the
+    second particle to the origin, `late` takes the force of the step before."""
+    m = np.array(M)
+    q = np.stack(
+        [centre - WAY * REST * 1.1 * m[1] / m.sum(), centre + WAY * REST * 1.1 * m[0] / m.sum()]
+    ).astype(width)
+    v = (np.array(drift) + np.outer([-0.2 * m[1] / m.sum(), 0.2 * m[0] / m.sum()], WAY)).astype(width)
+    h, m = width(H), m.astype(width)[:, None]
+
+    def force(q: Any) -> Any:
+        d = q[1] - q[0]
+        r = np.sqrt(np.sum(d * d))
+        pull = width(K) * (r - width(REST)) / r * d
+        return np.stack([pull, -pull - width(more) * q[1]])
+
+    rows_q, rows_v, f = [q], [v], force(q)
+    old = f
+    for _ in range(N):
+        v = v + h / 2 * (old if late else f) / m
+        q = q + h * v
+        old, f = f, force(q)
+        v = v + h / 2 * f / m
+        rows_q.append(q)
+        rows_v.append(v)
+    return H * np.arange(N + 1), *(np.array(x).reshape(N + 1, 6) for x in (rows_q, rows_v))
+
+
+def named(t: Any, q: Any, v: Any, **stated: Any) -> Any:
+    return identify(t, q, v=v, **stated)
+
+
+def test_a_pair_that_drifts_through_space_is_named_by_its_distance() -> None:
+    """It was said to be driven or anharmonic."""
+    found = named(*swing(drift=(0.031, -0.017, 0.023)), step=H)
+    assert found.scheme == "velocity-verlet"
+    assert any("their distance is judged" in note for note in found.notes)
+
+
+def test_a_pair_in_single_precision_away_from_the_origin_is_named_with_its_arithmetic() -> None:
+    """As GROMACS writes it: each coordinate swings about a place that walks."""
+    t, q, v = swing(np.float32, centre=9.0)
+    found = named(t, q.astype(np.float32), v.astype(np.float32), step=H)
+    assert found.scheme == "velocity-verlet"
+    assert "single" in str(found)
+
+
+def test_a_force_from_outside_or_one_that_is_late_is_no_scheme() -> None:
+    drift = (0.031, -0.017, 0.023)
+    assert named(*swing(drift=drift, more=1e-3), step=H).scheme is None
+    assert named(*swing(drift=drift, late=True), step=H).scheme is None
+    assert named(*swing(np.float32, centre=9.0, late=True), step=H).scheme is None
+
+
+def test_a_pair_whose_line_turns_is_not_named_by_its_distance() -> None:
+    t, q, v = swing()
+    v = v + 0.05 * np.array([0, 1, 1, 0, -1, -1]) / np.array([3.7] * 3 + [1.9] * 3)
+    found = named(t, q, v, step=H)
+    assert not any("their distance is judged" in note for note in found.notes)
