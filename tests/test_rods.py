@@ -6,6 +6,7 @@ one rod solves a quadratic.
 
 from __future__ import annotations
 
+import csv
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import constraints
 import gromacs
 import springcheck
 from springcheck import checks, driver, engines, schemes, store
@@ -131,6 +133,23 @@ def test_a_tolerance_is_not_the_error_of_lengths(need: Need) -> None:
         # pushes along the rod cancel and turn nothing, however large they are: to rounding at every tolerance
         assert all(v.passed and v.value < v.bound < 1e4 for v in momenta)
     assert off[1e-13] < 1e-14 < off[1e-8] < 1e-8 < off[1e-5] < 1e-6
+
+
+def test_the_error_falls_with_the_tolerance_in_steps_of_whole_iterations() -> None:
+    """What `validation/constraints.py` has measured: its claim, row by row, and what a tolerance does."""
+    with constraints.TABLE.open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert [row for row in table if not constraints.holds(row)] == []
+    for key in (("openmm", "one"), ("openmm", "triangle"), ("lammps", "triangle")):
+        rows = [row for row in table if (row["engine"], row["rods"]) == key and row["h w"] == "0.15"]
+        off = {float(row["tolerance"]): float(row["length"]) for row in rows}
+        ordered = [off[tolerance] for tolerance in sorted(off, reverse=True)]
+        assert len(ordered) >= 9
+        assert ordered == sorted(ordered, reverse=True)
+        # it is not the error: several tolerances have one in common
+        assert len(set(ordered)) < len(ordered)
+        assert ordered[-1] < 1e-14
+        assert ordered[0] > 1e-7
 
 
 def test_the_tolerance_of_lengths_is_stored_and_read(tmp_path: Path, need: Need) -> None:
