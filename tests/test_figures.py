@@ -378,3 +378,44 @@ def test_the_title_of_errors_says_who_is_nearest_and_who_is_farthest() -> None:
         r"exact solution by at most 4\.9 % \(semi-implicit Euler, kick-drift\) to 171 % \(explicit Euler\)$",
         title,
     ), title
+
+
+def test_a_file_of_any_program_says_what_it_does_and_joins_no_frames_too_far_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from springcheck.cli import drawing
+
+    said: list[Any] = []
+    drawn = render.picture
+    monkeypatch.setattr(render, "picture", lambda bank: said.append(bank) or drawn(bank))
+    monkeypatch.chdir(tmp_path)
+    for step, dots in ((0.1, False), (1.7, True)):
+        t = step * np.arange(400)
+        rows = np.stack([t, np.exp(0.01 * t) * np.cos(t), -np.exp(0.01 * t) * np.sin(t)], axis=1)
+        np.savetxt("mine.csv", rows, delimiter=",", header="t,q,p", comments="", fmt="%.17g")
+        drawing.draw_foreign(Path("mine.csv"), Path(f"figures-{dots}"))
+        portrait, motion = said[-1].charts
+        assert portrait.curves[0].dots == dots
+        assert portrait.curves[0].line != dots
+        assert motion.curves[0].line
+    # 6 periods of 2 pi at 1 % each time: one quarter to the last is exp(0.3) farther
+    assert re.search(
+        r"mine.csv: goes round 6\S* times in 400 frames and reaches \d+ % farther", said[0].heading
+    )
+
+
+def test_a_fault_is_named_by_the_check_that_sees_it_first() -> None:
+    from springcheck.studies.faults import page
+    from springcheck.studies.faults.result import Clean, FaultReport, Result
+
+    def one(name: str, **limits: float) -> Result:
+        return Result(name=name, about="", size=1e-3, rejected_by=tuple(limits), missed_by=(), limits=limits)
+
+    found = FaultReport(
+        results=(one("a", x=1e-9, y=1e-12), one("b", x=1e-6)), clean=Clean(runs=1, verdicts=1, alarms=())
+    )
+    chart = page.banks(found)[1].charts[0]
+    first = chart.curves[0]
+    assert dict(zip(first.y, first.notes, strict=True)) == {0.0: "x", 1.0: "y"}
+    assert [label.text for label in chart.labels] == ["x", "y"]
+    assert page.banks(found)[0].heading == "2 engines broken on purpose: each is rejected; 2 checks"

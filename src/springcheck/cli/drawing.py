@@ -11,13 +11,16 @@ import numpy as np
 
 from springcheck import interrupts, store
 from springcheck.cli import inspect
-from springcheck.errors import SpringcheckError, plain
+from springcheck.errors import SpringcheckError
 from springcheck.figures import folder
 from springcheck.studies import STUDIES
 from springcheck.text.wording import count
 
 MOST_COORDINATES = 8
 """Coordinates of a file of other programs that are drawn."""
+
+FRAMES, SAME = 12, 0.02
+"""Frames of a period below which lines between them are chords; relative change of a reach that is none."""
 
 
 def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
@@ -63,9 +66,10 @@ def draw_foreign(
     trajectory: str | None = None,
 ) -> tuple[list[Path], list[str]]:
     """Draw the states in a file of any program, as `draw`; `particle` counts coordinates from 0 on."""
-    from matplotlib.figure import Figure
-
     from springcheck.cli.file import states_in
+    from springcheck.figures import looks, render
+    from springcheck.figures.charts import Bank, Chart, Curve, Scale
+    from springcheck.figures.motion import periods
     from springcheck.figures.style import save, style
 
     found = states_in(path, columns, step, trajectory)
@@ -81,16 +85,49 @@ def draw_foreign(
         if particle is None and left
         else []
     )
+    chosen = chosen if len(chosen) else np.array([0])
+    # fewer frames of a period are chords
+    few = any(len(found.t) < FRAMES * periods(found.q[:, i]) for i in chosen)
+
+    def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
+        names = [(f"coordinate {i}", i) for i in chosen.tolist()]
+        return [
+            Curve(
+                name=name,
+                group=solid[i % len(solid)],
+                x=x[:, i % x.shape[1]],
+                y=y[:, i],
+                dots=few,
+                line=joined or not few,
+            )
+            for name, i in names
+        ]
+
+    solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]
+    q, t = Scale(name="q"), Scale(name="t")
+    charts = [
+        Chart(title=f"{name} over q.", x=q, y=Scale(name=name), curves=curves(found.q, other, joined=False)),
+        Chart(title="q over time.", x=t, y=q, curves=curves(found.t[:, None], found.q, joined=True)),
+    ]
+    heading = f"{path.name}: {_found(found.q[:, chosen[0]], len(found.t))}"
+    bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
     with style(), interrupts.folder() as made:
-        figure = Figure(figsize=(9.2, 4.2), layout="constrained")
-        portrait, motion = figure.subplots(1, 2)
-        for i in chosen.tolist() or [0]:
-            portrait.plot(found.q[:, i], other[:, i], label=f"coordinate {i}")
-            motion.plot(found.t, found.q[:, i])
-        portrait.set_xlabel("q")
-        portrait.set_ylabel(name)
-        portrait.legend()
-        motion.set_xlabel("t")
-        motion.set_ylabel("q")
-        figure.suptitle(plain(f"{path.name}: {count(len(found.t), 'frame')}"))
-        return folder.put(save(figure, made, "states"), into, path), notes
+        return folder.put(save(render.picture(bank), made, bank.name), into, path), notes
+
+
+def _found(q: Any, frames: int) -> str:
+    """How often a coordinate goes round, and how its reach changes."""
+    from springcheck.figures.motion import periods
+
+    rounds = periods(q)
+    if rounds < 2 or not np.isfinite(q).all():
+        return count(frames, "frame")
+    quarter = len(q) // min(4, int(rounds))
+    first, last = (float(np.ptp(part)) for part in (q[:quarter], q[-quarter:]))
+    change = last / first - 1
+    reach = "reaches as far at the end"
+    if abs(change) >= SAME:
+        way = "less far" if change < 0 else "farther" if change < 1 else "as far"
+        times = f"{100 * abs(change):.0f} %" if change < 1 else f"{last / first:.3g} times"
+        reach = f"reaches {times} {way} at the end"
+    return f"goes round {rounds:.3g} times in {count(frames, 'frame')} and {reach}"

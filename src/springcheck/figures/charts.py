@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
-GUIDE, EXACTLY, SEPARATRIX, BEGIN, REJECTED = "guide", "exact", "separatrix", "start", "failed"
+GUIDE, EXACTLY, SEPARATRIX, BEGIN, REJECTED = "guide", "exact", "separatrix", "beginning", "failed"
 """Groups that are no scheme's: lines that show a slope or a limit, the exact solution, what parts motions of
 two kinds, where all begin, and what some verdict rejects."""
 

@@ -6,12 +6,12 @@ Right engines of one scheme move alike and share a line; one that failed has its
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from springcheck.figures import looks
-from springcheck.figures.charts import EXACTLY, REJECTED, Curve, Naming
+from springcheck.figures.charts import EXACTLY, GUIDE, REJECTED, Chart, Curve, Naming
 from springcheck.figures.views import units
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -283,9 +283,12 @@ def at_ends(
             out.append(
                 Naming(text=text, group=curve.group, x=float(u[last]) + 0.01, y=min(0.9, float(v[last])))
             )
-    if len(ends) > min(MOST_NAMINGS, int(1 / height)):
-        return []
     ends.sort()
+    most = min(MOST_NAMINGS, int(1 / height))
+    if len(ends) > most:
+        # what is wrong, and the outermost
+        inner = [one for one in ends[most // 3 : -(most // 3)] if one[2] != REJECTED]
+        ends = [one for one in ends if one not in inner][:most]
     places = [y for y, *_ in ends]
     for _ in range(200):
         for i in range(len(places) - 1):
@@ -308,7 +311,7 @@ def alone(named: Iterable[tuple[str, Curve]], xs: Frame, ys: Frame) -> list[Nami
         inside = (u > 0.02) & (u < 0.98) & (v > 0.03) & (v < 0.95)
         points[text, curve.group] = np.stack([u[inside], v[inside]], axis=1)
     out: list[Naming] = []
-    for (text, group), mine in points.items():
+    for (text, group), mine in sorted(points.items(), key=lambda x: x[0][1] != REJECTED):
         others = np.concatenate([np.empty((0, 2)), *(x for key, x in points.items() if key != (text, group))])
         best, found = NAME_AWAY, None
         for x, y in mine[:: max(1, len(mine) // NAME_PLACES)].tolist():
@@ -323,6 +326,22 @@ def alone(named: Iterable[tuple[str, Curve]], xs: Frame, ys: Frame) -> list[Nami
         if found is not None and len(out) < MOST_NAMINGS:
             out.append(Naming(text=text, group=group, x=found[0], y=found[1]))
     return out
+
+
+def labelled(chart: Chart) -> Chart:
+    """A chart with the names of its schemes' curves where they stand apart."""
+    firsts: dict[str, Curve] = {}
+    for curve in chart.curves:
+        if (curve.line or curve.dots) and curve.group not in (EXACTLY, GUIDE) and len(curve.x):
+            firsts.setdefault(curve.group, curve)
+    sides = []
+    for scale, which in ((chart.x, "x"), (chart.y, "y")):
+        every = np.concatenate([np.asarray(getattr(one, which), np.float64) for one in chart.curves])
+        every = every[np.isfinite(every) & ((every > 0) | (not scale.log))]
+        ends = scale.shown or (float(np.min(every)), float(np.max(every)))
+        sides.append(Frame(*ends, log=scale.log))
+    named = [(looks.title(group), curve) for group, curve in firsts.items()]
+    return replace(chart, labels=alone(named, *sides))
 
 
 def share(x: float) -> str:

@@ -83,7 +83,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     dots = _chords(runs.longest, truth, view, xs, ys)
     curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
-    begin = Curve(name=BEGIN, group=BEGIN, x=start[0], y=start[1], line=False, marks=True)
+    begin = Curve(name="start", group=BEGIN, x=start[0], y=start[1], line=False, marks=True)
     square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked, true) is None else ""

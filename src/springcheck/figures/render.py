@@ -138,7 +138,18 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
         elif group != GUIDE:
             look = looks.look(group)
             line: Any = look.linestyle if any(one.line or one.dots for one in mine) else "none"
-            found.append(Line2D([], [], color=look.color, linestyle=line, label=label))
+            mark = looks.mark(looks.engine(name))[0] if line == "none" and not methods else None
+            found.append(
+                Line2D(
+                    [],
+                    [],
+                    color=look.color,
+                    linestyle=line,
+                    marker=mark,
+                    markerfacecolor="white",
+                    label=label,
+                )
+            )
     return sorted(found, key=lambda entry: not str(entry.get_label()).startswith("FAILED"))
 
 
@@ -283,6 +294,8 @@ def _scale(axes: Axes, scale: Scale, which: Literal["x", "y"], *, tiled: bool) -
     axes.ticklabel_format(axis=which, useOffset=False) if not (scale.log or tiled or names) else None
     if names:
         put(range(len(names)), names, fontsize=7, rotation=90 if which == "x" else 0)
+        if scale.shown:
+            (axes.set_xlim if which == "x" else axes.set_ylim)(*scale.shown)
     elif tiled and len(values) > EVEN and np.all(values > 0):
         decades = np.arange(np.ceil(np.log10(values[0])), np.log10(values[-1]) + 1e-9)
         at = np.interp(decades, np.log10(values), np.arange(len(values)))

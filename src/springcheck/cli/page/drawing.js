@@ -41,7 +41,7 @@ function groupOf(name) {
 }
 
 // Dashes of what is no scheme's.
-const PLAIN_LOOKS = { exact: "1 5", separatrix: "3 3", guide: "", start: "" };
+const PLAIN_LOOKS = { exact: "1 5", separatrix: "3 3", guide: "", beginning: "" };
 
 // Colour, dash, mark and dash on paper of the count-th curve of a group; colour and dash are those of figures.
 function lookOf(group, count) {

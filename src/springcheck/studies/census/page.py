@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
+from springcheck.figures.overlay import labelled
 from springcheck.studies.census.result import Census, Entry
 from springcheck.text.wording import few
 
@@ -41,4 +42,8 @@ def banks(census: Census) -> list[Bank]:
         f"The blog's spring by {len(census.entries)} methods: how it is attached decides the scheme "
         "(m = k = 1, h = 0.1, 200 steps)"
     )
-    return [Bank(name="census", title="Orbits drawn", heading=heading, charts=[chart], on=["exact", *on])]
+    return [
+        Bank(
+            name="census", title="Orbits drawn", heading=heading, charts=[labelled(chart)], on=["exact", *on]
+        )
+    ]

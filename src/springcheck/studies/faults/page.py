@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles
+from springcheck.figures.charts import Bank, Chart, Curve, Naming, Scale, Tiles
+from springcheck.figures.overlay import Frame
 from springcheck.studies.faults.result import FaultReport, Result
 
 KINDS = (
@@ -35,33 +36,58 @@ def banks(found: FaultReport) -> list[Bank]:
         ),
     )
     return [
-        Bank(name="faults-checks", title="Faults and checks", charts=[chart]),
+        Bank(
+            name="faults-checks",
+            title="Faults and checks",
+            charts=[chart],
+            heading=_heading(found, len(checks)),
+        ),
         *([_limits(results)] if any(one.limits for one in results) else []),
     ]
 
 
+def _heading(found: FaultReport, checks: int) -> str:
+    missed = [one.name for one in found.results if one.missed_by or not one.rejected_by]
+    said = "each is rejected" if not missed else f"{len(missed)} are missed, {missed[0]} first"
+    return f"{len(found.results)} engines broken on purpose: {said}; {checks} checks"
+
+
 def _limits(results: Sequence[Result]) -> Bank:
-    """A row a fault, a mark for each check that sees it, where it begins to."""
+    """A row a fault, a mark for each check that sees it, where it begins to; the sharpest is named."""
     shown = [one for one in results if one.limits]
-    checks = dict.fromkeys(name for one in shown[::-1] for name in one.limits)
+    points = [
+        (size, float(j), name)
+        for j, one in enumerate(shown)
+        for name, size in sorted(one.limits.items(), key=lambda x: x[1])
+    ]
+    first = [next(x for x in points if x[1] == j) for j in range(len(shown))]
+    others = [x for x in points if x not in first]
+    xs = Frame(min(x for x, *_ in points) / 3, max(x for x, *_ in points) * 300, log=True)
+    ys = Frame(-0.5, len(shown) - 0.5)
     curves = [
         Curve(
-            name=name,
-            group=name,
-            x=[one.limits[name] for one in shown if name in one.limits],
-            y=[float(j) for j, one in enumerate(shown) if name in one.limits],
-            line=False,
-            marks=True,
+            name=name, group=name, x=[x for x, *_ in some], y=[y for _, y, _ in some], line=False, marks=True,
+            notes=[check for *_, check in some],
         )
-        for name in checks
-    ]
+        for name, some in (("its sharpest check", first), ("other checks", others)) if some
+    ]  # fmt: skip
+    places = xs.parts([x for x, *_ in first]), ys.parts([y for _, y, _ in first])
     chart = Chart(
         title="How small a fault is seen: one spring, h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps.",
-        x=Scale(name="smallest relative size that the check rejects", log=True),
-        y=Scale(name="fault", names=[one.name for one in shown]),
+        x=Scale(name="smallest relative size that the check rejects", log=True, shown=xs.ends),
+        y=Scale(name="fault", names=[one.name for one in shown], shown=ys.ends),
         curves=curves,
+        labels=[
+            Naming(text=check, group=curves[0].name, x=min(0.6, float(u) + 0.01), y=float(v) - 0.009)
+            for (*_, check), u, v in zip(first, *places, strict=True)
+        ],
     )
-    return Bank(name="faults", title="Checks", charts=[chart])
+    middle = sorted(x for x, *_ in first)[len(first) // 2]
+    heading = (
+        f"Half of {len(shown)} faults are seen from {middle:.0e} on: one spring, "
+        "h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps"
+    )
+    return Bank(name="faults", title="Checks", charts=[chart], heading=heading)
 
 
 def _kind(one: Result, check: str) -> int:

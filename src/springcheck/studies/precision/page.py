@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
+from springcheck.figures.overlay import labelled
 from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.text.wording import seconds
@@ -50,7 +51,14 @@ def banks(study: PrecisionStudy) -> list[Bank]:
         if (known := [x for x in points if cost(x) > 0])
     ]
     return (
-        [Bank(name="precision", heading=_heading(study), title="Methods drawn", charts=charts)]
+        [
+            Bank(
+                name="precision",
+                heading=_heading(study),
+                title="Methods drawn",
+                charts=[*map(labelled, charts)],
+            )
+        ]
         if charts
         else []
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
+from springcheck.figures.overlay import labelled
 from springcheck.studies.stability.costs import RATIO_NAMES, Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest
@@ -29,7 +30,7 @@ def banks(study: Stability) -> list[Bank]:
             Bank(
                 name="stability-limits",
                 title="Schemes (lines) and methods (marks)",
-                heading="Stable where the spectral radius of one step is at most 1",
+                heading=_limits_said(study.limits),
                 charts=[chart],
             )
         )
@@ -61,6 +62,18 @@ def banks(study: Stability) -> list[Bank]:
     return found
 
 
+def _limits_said(limits: Sequence[Limit]) -> str:
+    """How many methods are stable up to where."""
+    count: dict[float, int] = {}
+    for x in limits:
+        count[x.theory] = count.get(x.theory, 0) + 1
+    said = [
+        f"{n} never" if x <= 0 else f"{n} always" if not np.isfinite(x) else f"{n} up to {x:.4g}"
+        for x, n in sorted(count.items())
+    ]
+    return f"Stable in h \N{GREEK SMALL LETTER OMEGA}: of {len(limits)} methods {', '.join(said)}"
+
+
 def _limits(limits: Sequence[Limit], here: float) -> Chart:
     theories: dict[str, Curve] = {}
     measured = []
@@ -75,16 +88,22 @@ def _limits(limits: Sequence[Limit], here: float) -> Chart:
             Curve(name=x.method, group=group, x=x.h_w, y=x.radius, line=False, marks=True, notes=notes)
         )
     edges = sorted({x.theory for x in limits if 0 < x.theory < np.inf})
-    return Chart(
-        title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
-        x=Scale(name=TURN, log=True),
-        y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
-        curves=[*theories.values(), *measured],
-        rules=[
-            Rule(axis="y", at=1.0, look="one"),
-            *(Rule(axis="x", at=x, name=f"{x:.4g}") for x in edges),
-            *([Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here")] if here > 0.05 else []),
-        ],
+    return labelled(
+        Chart(
+            title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
+            x=Scale(name=TURN, log=True),
+            y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
+            curves=[*theories.values(), *measured],
+            rules=[
+                Rule(axis="y", at=1.0, look="one"),
+                *(Rule(axis="x", at=x, name=f"limit {x:.4g}") for x in edges),
+                *(
+                    [Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here")]
+                    if here > 0.05
+                    else []
+                ),
+            ],
+        )
     )
 
 
@@ -114,7 +133,7 @@ def _resonance(x: Resonance) -> Chart:
     group = scheme_of(x.method)
     bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in x.bands)
     return Chart(
-        title=f"{x.scene}: one step of {x.method} grows at h \N{GREEK SMALL LETTER OMEGA} from {bands}.",
+        title=f"{x.scene}: {x.method} resonates, it grows at h \N{GREEK SMALL LETTER OMEGA} from {bands}.",
         x=Scale(name="outer step times fast frequency"),
         y=Scale(name="growth of one step"),
         curves=[
