@@ -341,6 +341,12 @@ def test_no_decade_of_an_error_is_empty_and_every_run_is_in_one_panel() -> None:
     assert {"explicit Euler", "CVODE Adams-Moulton"} <= named
 
 
+def test_an_orbit_that_has_collapsed_at_once_has_spiralled_in() -> None:
+    scene = scenefile.load_scene("stiff-spring")
+    made = runs(scene, "own:implicit-euler", "own:velocity-verlet", "own:semi-implicit-euler")
+    assert "implicit Euler spirals in; 2 keep to their orbits" in of_runs(scene, made, made)[0].heading
+
+
 def test_frames_too_far_apart_to_be_joined_are_dots() -> None:
     for name, dots in (("spring", False), ("ch-bond", True)):
         scene = scenefile.load_scene(name)

@@ -157,7 +157,8 @@ def orbits(runs: Runs, exact: Exact) -> str:
             unit = CHANGED * float(scene.system.norm.unit) ** 2
             # what ran away did not turn
             out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
-            inwards = not out and np.max(last) < np.min(first) - unit
+            # at once, or more and more
+            inwards = not out and np.max(last) < max(np.min(first), e[0] / 2) - unit
             way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
             said[way].append(group.title)
     turns = max(periods(x) for x in runs.longest.q.T[:MOST_TURNING])

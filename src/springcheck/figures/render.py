@@ -246,7 +246,7 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     mark = looks.mark(looks.engine(curve.name))[0]
     if curve.marks:
         many = len(x) > MANY and not (curve.line or curve.over or curve.dots)
-        apart = 1 if many else max(1, len(x) // most)
+        apart = 1 if many or chart.y.names else max(1, len(x) // most)
         first = round(number * GOLDEN_PART % 1 * apart) % apart
         estimated = np.asarray(curve.open, bool) if len(curve.open) else np.zeros(len(x), bool)
         for some, face in ((~estimated, look.color if len(curve.open) else "white"), (estimated, "white")):
