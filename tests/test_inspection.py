@@ -6,6 +6,7 @@ import errno
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 from argparse import Namespace
@@ -100,14 +101,23 @@ def test_the_atlas_is_read_back_as_it_was(tmp_path: Path) -> None:
     assert kept.windows == fresh.windows
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for the stores of `stores`, which are measured once."""
+    return tmp_path_factory.mktemp("stores")
+
+
 @pytest.fixture
-def stores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steady_clock: object) -> Path:
+def stores(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steady_clock: object) -> Path:
     """A folder with a store of every study."""
+    if not any(made.iterdir()):
+        monkeypatch.chdir(made)
+        main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "stability.h5"])
+        main(["extremes", "--quick", "--method", "own:implicit-euler", "--quiet", "-o", "extremes.h5"])
+        scene = scenes.load_scene("spring-uneven")
+        precision.record(scene, [engines.parse("own:implicit-euler")], "precision.h5", budget=0.5)
     monkeypatch.chdir(tmp_path)
-    main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "stability.h5"])
-    main(["extremes", "--quick", "--method", "own:implicit-euler", "--quiet", "-o", "extremes.h5"])
-    scene = scenes.load_scene("spring-uneven")
-    precision.record(scene, [engines.parse("own:implicit-euler")], "precision.h5", budget=0.5)
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     return tmp_path
 
 
