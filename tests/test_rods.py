@@ -184,6 +184,17 @@ def test_from_h_w_1_on_there_is_no_step_and_that_is_said(capsys: pytest.CaptureF
     assert [v for v in checks.judge(near, run) if v.passed is False] == []
 
 
+@pytest.mark.parametrize(("label", "order"), [("own:forest-ruth", 2), ("own:yoshida4", 4)])
+def test_a_splitting_whose_substeps_meet_in_drifts_loses_its_order_to_rods(label: str, order: int) -> None:
+    scene = dumbbell()
+    q, _ = exact.true_motion(scene, np.array([5]), 0.1)
+    off = []
+    for parts in (1, 2):
+        run = driver.run(replace(scene, step=0.1 / parts, steps=5 * parts, every=5 * parts), label)
+        off.append(float(np.max(np.abs(run.q[-1] - q[0]))))
+    assert np.log2(off[0] / off[1]) == pytest.approx(order, abs=0.1)
+
+
 def test_methods_without_rods_say_so() -> None:
     for label in ("own:euler", "ase:velocity-verlet", "openmm:verlet", "sundials:adams"):
         assert engines.refusal(dumbbell(), engines.parse(label)) == "it has no rod term"
