@@ -232,3 +232,19 @@ def test_the_path_of_a_particle_is_drawn_in_each_plane(tmp_path: Path) -> None:
     q = np.arange(6.0).reshape(3, 2)
     x, y = views[0].pick(q, q)
     assert (x.tolist(), y.tolist()) == ([0, 2, 4], [1, 3, 5])
+
+
+def test_momentum_is_judged_along_each_axis_by_itself() -> None:
+    """What leaks into one axis and out of another was no change of the sum over all."""
+    between = Spring(a=[0, 1], b=[2, 3], k=[2.9, 2.9], rest=[0.0, 0.0])
+    scene = Scene(
+        m=[1.3, 1.3, 3.7, 3.7], q=[0.3, -0.2, 0.5, 0.1], p=[0.4, 0.1, -0.2, 0.3], places=[0, 1, 3, 4],
+        terms=(between,), step=0.1, steps=100,
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    found = {v.check: v for v in checks.judge(scene, run)}["momentum"]
+    assert found.passed is True
+    leaks = np.outer(np.arange(101), [1e-12, -1e-12, 0, 0])
+    wrong = {v.check: v for v in checks.judge(scene, replace(run, p=run.p + leaks))}["momentum"]
+    assert wrong.passed is False
+    assert "along x" in wrong.why or "along y" in wrong.why

@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
     ("engines",): 2570,
     ("driver", "conformance", "doors"): 1179,
-    ("checks",): 4291,
+    ("checks",): 4303,
     ("identify",): 7767,
     ("formats", "store"): 4992,
     ("studies",): 1603,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -200,38 +202,48 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
 
 @check("moment", family="motion", requires=MAP | {"unheld"})
 def momentum(case: Case) -> Finding | str:
-    """Nothing outside pulls, so the total momentum stays."""
-    run = case.trajectory
-    total = np.sum(run.p.astype(np.longdouble), axis=1)
+    """Nothing outside pulls, so the total momentum along every axis stays."""
+    run, places = case.trajectory, case.scene.all_places % 3
+    axes = np.unique(places)
+    # along one axis all that there is, in its order: sums round by that
+    each: list[Any] = [slice(None)] if len(axes) == 1 else [np.flatnonzero(places == axis) for axis in axes]
+
+    def summed(x: Reals) -> Reals:
+        return np.stack([np.sum(x[..., one], axis=-1) for one in each], axis=-1)
+
+    total = summed(run.p.astype(np.longdouble))
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
     with np.errstate(over="ignore", invalid="ignore"):
         _, of_p = case.allowance_at(run.q, run.p, paired=True)
-    unit = np.maximum.accumulate(np.sum(of_p, axis=1))[1:]
+    unit = np.maximum.accumulate(summed(of_p))[1:]
     if steps[0] != 0 and case.linear:
-        unit = np.maximum(unit, np.sum(case.allowance_at(*case.envelope)[1]))
+        unit = np.maximum(unit, summed(case.allowance_at(*case.envelope)[1]))
     elif steps[0] != 0:
         # nothing bounds the motion before this piece: it is judged from its own first frame on
         steps, first = steps - steps[0], run.p[0].astype(np.longdouble)
-    off = np.abs(total - np.sum(first))[1:]
-    limit = case.roundings * steps[1:].astype(np.float64)
+    off = np.abs(total - summed(first))[1:]
+    limit = (case.roundings * steps[1:].astype(np.float64))[:, None]
     # a step from a state near the end of all numbers may leave even the range of its own bound
     finite = np.all(np.isfinite(run.q) & np.isfinite(run.p), axis=1)
-    beyond = np.asarray(finite)[1:] & ~np.isfinite(unit)
+    beyond = np.asarray(finite)[1:, None] & ~np.isfinite(unit)
     seen = np.asarray(off / np.where(beyond, np.inf, unit), np.float64)
-    worst = int(np.argmax(seen / limit))
-    size = np.maximum.accumulate(np.sum(np.abs(run.p), axis=1))[1:]
-    if seen[worst] <= limit[worst] and np.any(size > 0) and not np.any(~beyond & (size > limit * unit)):
+    worst, axis = np.unravel_index(int(np.argmax(seen / limit)), seen.shape)
+    size = np.maximum.accumulate(summed(np.abs(run.p)))[1:]
+    told = ~beyond & (size > limit * unit)
+    if seen[worst, axis] <= limit[worst, 0] and np.any(size > 0) and not np.any(told):
         return "rounding may be as large as all momenta together"
     # a force too large by x gains x times what its particle has gained
-    gained = np.max(np.abs(run.p[1:] - first), axis=1)
+    change = np.abs(run.p[1:] - first)
+    gained = np.stack([np.max(change[:, one], axis=1) for one in each], axis=1)
     known = gained > limit * unit
     off_by = np.min((limit * unit)[known] / gained[known], initial=np.inf)
+    along = "" if len(axes) == 1 else f" along {'xyz'[axes[axis]]}"
     return Finding(
-        seen[worst],
-        limit[worst],
+        float(seen[worst, axis]),
+        float(limit[worst, 0]),
         "roundings",
-        f"forces cancel in pairs; {count(int(steps[worst + 1]), 'step')}, each rounded, all of one sign",
+        f"forces cancel in pairs{along}; {count(int(steps[worst + 1]), 'step')}, each rounded, of one sign",
         Limits(reaction=float(off_by) if np.isfinite(off_by) else None),
     )
 
