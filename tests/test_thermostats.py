@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import driver, engines
+from springcheck import checks, driver, engines
 from springcheck.cli import main
 from springcheck.engines import Label
 from springcheck.errors import MethodError, SceneError
@@ -262,3 +262,16 @@ def test_a_bath_of_temperature_zero_is_friction_without_noise() -> None:
         bathed(scene, Namespace(temperature="0", friction=-1.0))
     with pytest.raises(SpringcheckError, match="has a friction of its own"):
         bathed(cold, Namespace(temperature="0", friction=1.0))
+
+
+def test_splittings_of_openmmtools_are_those_of_their_letters() -> None:
+    found = engines.from_file(Path(__file__).parents[1] / "validation" / "engines" / "openmmtools_.py")
+    assert found is not None
+    if reason := engines.absence("openmmtools"):
+        pytest.skip(reason)
+    scene = pair(steps=100)
+    for name in found.thermostats:
+        run = driver.run(scene, f"openmmtools:{name}", seed=3)
+        verdicts = springcheck.judge(scene, run) + checks.judge_seeds(scene, f"openmmtools:{name}", 3)
+        assert [f"{name} {v.check}: {v.why}" for v in verdicts if v.passed is False] == []
+        assert sum(v.passed is True for v in verdicts) >= 9
