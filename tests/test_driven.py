@@ -15,6 +15,7 @@ from springcheck.doors import function
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Drive, ModulatedSpring, Spring, Term, WallSpring
 from springcheck.studies.faults import drives, measure, steppers, table
@@ -342,3 +343,21 @@ def test_openmm_with_its_time_held_over_a_step_of_four_stages_is_told(need: Any)
     assert "the start of the step, held over it, where classical Runge-Kutta (RK4) takes it at" in sentence(
         scene, run
     )
+
+
+@pytest.mark.parametrize(("name", "grown"), [("mathieu-tongue", True), ("mathieu-stable", False)])
+def test_a_study_of_stability_says_how_the_exact_motion_grows_in_a_period(name: str, grown: bool) -> None:
+    scene = scenes.load_scene(name)
+    found = floquet(scene.system)
+    assert found is not None
+    factor, period = found
+    many = exact.true_motion(scene, np.array([0, 40, 41]), period)[0][:, 0]
+    if grown:
+        # far from the start only the growing solution is left
+        assert abs(many[2] / many[1]) == pytest.approx(factor, rel=1e-6)
+        # to first order in the depth of 0.3: exp(e w T/4)
+        assert factor == pytest.approx(np.exp(0.3 * np.sqrt(2.9 / 3.7) / 4 * period), rel=0.02)
+    else:
+        assert factor == 1
+    assert floquet(scenes.load_scene("driven-spring").system) is None
+    assert "(Floquet)" in str(springcheck.stability(scene, "own:rk4"))

@@ -141,5 +141,16 @@ def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> St
     return u, v * system.m
 
 
+def floquet(system: System[Any]) -> tuple[float, float] | None:
+    """The factor by which the exact motion grows in a period of the modulation, its larger Floquet multiplier
+    where that is above 1 and else 1, and the period [T], of what grows fastest; None of other scenes."""
+    each = []
+    for mode in prepare(system) or () if "modulated-spring" in system.acting else ():
+        half = float(np.abs(np.trace(mode.nodes[-1]))) / 2
+        # the matrix of a period has the determinant 1
+        each.append((half + float(np.sqrt(max(half * half - 1, 0))), float(2 * PI / np.abs(mode.turn))))
+    return max(((max(grown, 1.0), period) for grown, period in each), default=None)
+
+
 MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
 """A whole scene of springs of modulated stiffness, one on each particle."""

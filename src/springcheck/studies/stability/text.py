@@ -7,6 +7,7 @@ from argparse import Namespace
 import numpy as np
 
 from springcheck.physics.exact import has_true_motion
+from springcheck.physics.exact.mathieu import floquet
 from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
@@ -77,7 +78,13 @@ def _of_scene(study: Stability) -> Lines:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
     elif any(study.largest(x) >= abs(scene.step) for x in study.limits):
         out.append(plain("  within the limit of every method measured here"))
-    if not scene.system.is_linear:
+    if modulated := floquet(scene.system):
+        grown, period = modulated
+        bounded = "stays bounded" if grown == 1 else f"grows by a factor of {grown:.6g}"
+        out.append(
+            plain(f"  in each period of its modulation, {period:.4g}, the exact motion {bounded} (Floquet)")
+        )
+    elif not scene.system.is_linear:
         out.append(
             plain("  limits of small oscillations there; an anharmonic motion may be lost below them", "dim")
         )
