@@ -156,3 +156,34 @@ def test_a_wrong_trajectory_is_told_in_words() -> None:
 def test_an_engine_of_ours(check: conformance.Check, need: Any) -> None:
     need("ase:velocity-verlet")
     check()
+
+
+BARE = """
+import sys
+from dataclasses import replace
+
+class Nothing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in "scipy h5py matplotlib numba openmm ase rich jinja2".split():
+            raise ModuleNotFoundError(f"no {name}", name=name)
+
+sys.meta_path.insert(0, Nothing())
+from springcheck import driver
+from springcheck.conformance import assert_right
+from springcheck.physics.scenefile import load_scene
+
+scene = load_scene("spring-uneven")
+run = driver.run(scene, "own:velocity-verlet")
+assert_right(scene, run)
+try:
+    assert_right(scene, replace(run, scheme="semi-implicit-euler"))
+except AssertionError as error:
+    print(error)
+"""
+
+
+def test_one_s_own_engine_is_judged_where_neither_scipy_nor_h5py_are_installed() -> None:
+    done = subprocess.run([sys.executable, "-c", BARE], capture_output=True, text=True, check=True)
+    assert "own:velocity-verlet is not semi-implicit-euler on spring-uneven" in done.stdout
+    assert "with SciPy installed, this line says what they are" in done.stdout
+    assert "step-defect" in done.stdout

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import formats, interrupts, schemes
+from springcheck import interrupts, schemes
 from springcheck.doors.function import UNKNOWN
 from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
@@ -153,6 +153,9 @@ class _Command:
 
     def _read(self, out: Path, every: int) -> tuple[Floats, Floats]:
         try:
+            # a function that is judged needs no reader of files, and so no h5py
+            from springcheck import formats
+
             states = formats.read(out)
         except StoreError as error:
             raise MethodError(
