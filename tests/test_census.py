@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 import census as by_hand
+import claims
 from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.engines.own import thermal
+from springcheck.identify import identify
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import baths, rigid, table
@@ -233,12 +235,50 @@ def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_ot
     limits: dict[str, set[str]] = {}
     for row in rows:
         if row["scheme"] != "none that is known" and " or " not in row["scheme"]:
-            limits.setdefault(f"{row['scheme']} {row['substeps']}", set()).add(row["limit"])
+            coarse = row["precision"] not in ("double", "fixed-point force", "mixed")
+            limits.setdefault(f"{row['scheme']} {row['substeps']} {coarse:d}", set()).add(row["limit"])
     for scheme, found in limits.items():
         numbers = {float(x) for x in found if x not in ("-", "none up to 4")}
-        assert max(numbers, default=0) - min(numbers, default=0) < 2e-4, (scheme, found)
+        # a growth is seen later in single precision: as its square root where eigenvalues meet
+        most = 2e-3 if scheme.endswith("1") else 2e-4
+        assert max(numbers, default=0) - min(numbers, default=0) < most, (scheme, found)
     with (folder / "engines.csv").open(newline="") as file:
         assert list(csv.DictReader(file)) == rows
+
+
+def test_a_program_s_row_is_held_against_the_scheme_that_its_documentation_claims() -> None:
+    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
+    rows = {row["method"].removeprefix("command:"): row for row in document["entries"]}
+    assert {*claims.NAMED, *claims.MAPS} <= set(rows)
+    assert all(row["claimed"] != "unknown" for row in document["entries"])
+    row = dict(rows["petsc-beuler"])
+    by_hand.claimed(row)
+    assert row["agrees"]
+    row["found"] = "explicit-euler"
+    by_hand.claimed(row)
+    assert not row["agrees"]
+    for name in claims.MAPS:
+        row = dict(rows[name])
+        by_hand.claimed(row)
+        assert row["agrees"], name
+        row["trace"] += 1e-9
+        by_hand.claimed(row)
+        assert not row["agrees"], name
+
+
+def test_kept_states_of_engines_that_are_not_here_are_named_as_in_the_table() -> None:
+    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
+    rows = {row["method"]: row["found"] for row in document["entries"]}
+    scene = load_scene("spring-uneven")
+    with np.load(by_hand.STATES) as kept:
+        assert len(kept) >= 8
+        for name, (q, p) in kept.items():
+            t = scene.step * np.arange(len(q))
+            m, k = float(scene.m[0]), float(scene.system.hessian_diagonal(scene.q)[0])
+            found = identify(t, q[:, None], p[:, None], mass=m, stiffness=k)
+            # ten decimals, which are no arithmetic of a step
+            few = name == "cp2k:nve" and found.statement.startswith("The map is Velocity Verlet's")
+            assert few or found.scheme == rows[name], (name, found.statement)
 
 
 def test_a_program_of_an_engine_is_short() -> None:

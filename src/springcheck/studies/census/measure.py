@@ -148,10 +148,11 @@ def entry(label: Label) -> Entry:
         version=", ".join(f"{key} {value}" for key, value in engines.load(label.engine).version().items()),
         claimed=method.scheme,
         found=name,
-        agrees=_agrees(uneven, method.scheme, name),
+        agrees=agrees(uneven, method.scheme, name),
         substeps=0 if found is None or found.stride is None else found.stride,
         velocity_offset=np.nan if found is None else float(found.velocity_offset),
         area=np.nan if method.adaptive else float(np.linalg.det(_map(run))) - 1,
+        trace=np.nan if method.adaptive else float(np.trace(_map(run))),
         friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
@@ -210,7 +211,7 @@ def _held(scene: Scene, found: Identification | None) -> str:
     return "force-held-rk4" if endless else ""
 
 
-def _agrees(scene: Scene, claimed: str, found: str) -> bool:
+def agrees(scene: Scene, claimed: str, found: str) -> bool:
     """Whether two schemes have the same map on a spring; True where one of them has none to compare."""
     m, k = (np.array([x]) for x in _spring(scene))
     try:

@@ -38,6 +38,8 @@ class Entry:
     """Time of the velocities after that of the positions, in steps."""
     area: float
     """Determinant of the measured map of one step less 1: 0 for a step that keeps area."""
+    trace: float = nan
+    """Its trace: with the determinant all that a map shows whatever the units and the time of velocities."""
     friction: float
     """Friction c/m that nobody asked for, with the stiffness as stated [1/T]."""
     precision: str

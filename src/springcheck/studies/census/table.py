@@ -23,6 +23,7 @@ COLUMNS = {
     "thermostat": "thermostat",
     "constraint": "constraint",
     "scheme": "scheme, from the states",
+    "claimed": "declared or documented as",
     "velocity": "stored velocity",
     "substeps": "steps inside",
     "friction": "unasked friction c/m",
@@ -64,6 +65,7 @@ body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:110em;padding
 body{color:#222;background:#fff}
 table{border-collapse:collapse;font-size:13px}td,th{padding:.25em .6em;text-align:left;vertical-align:top}
 th{position:sticky;top:0;background:#eee;cursor:pointer}tr:nth-child(even){background:#f7f7f7}
+td:nth-child(n+4):nth-child(-n+7){min-width:11em}
 td.wrong{color:#b00;font-weight:bold}code{font-size:12px}input{font:inherit;width:24em;padding:.3em}
 @media(prefers-color-scheme:dark){body{color:#ddd;background:#181818}th{background:#333}
 tr:nth-child(even){background:#222}a{color:#8bf}td.wrong{color:#f77}}
@@ -98,12 +100,8 @@ def _row(x: Row) -> dict[str, str]:
         "version": x["version"],
         "thermostat": x.get("thermostat") or "none",
         "constraint": x.get("constraint") or "none",
-        "scheme": " or ".join(
-            getattr(schemes.ELSEWHERE.get(name), "title", schemes.title(name))
-            for name in x["found"].split(" or ")
-        )
-        if named
-        else x["found"],
+        "scheme": _titles(x["found"]) if named else x["found"],
+        "claimed": _titles(x["claimed"]),
         "velocity": "-" if offset is None else "synchronised" if offset == 0 else f"{offset:+g} of a step",
         "substeps": str(x["substeps"] or "-"),
         "friction": _number(x["friction"], 1e-9),
@@ -117,6 +115,13 @@ def _row(x: Row) -> dict[str, str]:
         "note": "; ".join(filter(None, (x.get("note", ""), "" if x["agrees"] else "DECLARED OTHERWISE"))),
         "command": x.get("command", f"springcheck census --method {x['method']}"),
     }
+
+
+def _titles(names: str) -> str:
+    found = (
+        getattr(schemes.ELSEWHERE.get(name), "title", schemes.title(name)) for name in names.split(" or ")
+    )
+    return " or ".join(found)
 
 
 def _number(x: float | None, least: float) -> str:
@@ -149,7 +154,10 @@ def as_csv(found: Sequence[Mapping[str, str]]) -> str:
 def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, Any]]) -> str:
     """The page: a table to filter and sort; CSV and JSON are in it."""
     engines = set(map(engine, found))
-    shown = {"CSV": ("text/csv", as_csv(found)), "JSON": ("application/json", json.dumps(list(documents)))}
+    shown = {
+        "CSV": ("text/csv", as_csv(found)),
+        "JSON": ("application/json", json.dumps(list(documents), separators=(",", ":"))),
+    }
     links = " ".join(
         f'<a download="engines.{name.lower()}" href="data:{kind};base64,'
         f'{base64.b64encode(text.encode()).decode()}">{name}</a>'
@@ -164,7 +172,7 @@ def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, An
 <style>{STYLE}</style></head><body>
 <h1>Which integrator does it really run?</h1>
 <p>{len(found)} ways to move a mass on a spring by {len(engines)} engines.  No cell is an engine's word: each
-but the note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9);
+but claim and note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9);
 of thermostats from those of springs at h omega = 0.5 and friction times step 0.4.
 {links}</p>
 <p><input placeholder="filter: rapier, implicit, single ..." aria-label="filter"></p>
