@@ -100,6 +100,27 @@ def test_numbers_that_are_none_are_words(spring: Path, content: page.Content) ->
     assert np.signbit(found[3])
 
 
+def test_its_headline_and_its_card_are_what_was_found(content: page.Content) -> None:
+    text = page.html(content)
+    found = "Mass on a spring: explicit Euler spirals out; 2 keep to their orbits"
+    assert f"<h1>{found}</h1>" in text
+    assert f'<meta property="og:title" content="{found}">' in text
+    assert f'<meta property="og:description" content="{content.summary_line}">' in text
+
+
+def test_the_page_draws_what_plot_draws(spring: Path, content: page.Content) -> None:
+    from springcheck.studies.run.page import banks
+
+    drawn_here = _data(page.html(content))["banks"]["motion"]["charts"]
+    expected = [chart for bank in banks(measure.stored(spring)) for chart in bank.charts]
+    assert [[x["name"] for x in one["curves"]] for one in drawn_here] == [
+        [x.name for x in one.curves] for one in expected
+    ]
+    shown = [[one[axis]["shown"] for axis in ("x", "y")] for one in drawn_here]
+    for ranges, one in zip(shown, expected, strict=True):
+        np.testing.assert_allclose(ranges, [one.x.shown, one.y.shown], rtol=1e-6)
+
+
 def test_it_asks_for_nothing_and_is_small(content: page.Content) -> None:
     text = page.html(content)
     assert len(text.encode()) < 500_000
