@@ -239,3 +239,14 @@ def test_a_hinge_in_gravity_is_semi_implicit_euler_in_the_angle(
     for wrong in ({"wave": np.array([1.0, 1.0, 2.0])}, {"depth": np.array([2.3, -1.7, 7.9])}):
         with pytest.raises(MethodError, match="gravity makes one pendulum of a rotor, of wave 1"):
             driver.run(replace(several, terms=(replace(term, **wrong),)), label)
+
+
+@pytest.mark.parametrize("method", ["force", "joint-spring", "hinge"])
+def test_dart_takes_no_negative_step_and_is_not_blamed_for_it(method: str, need: Need) -> None:
+    need(f"dart:{method}")
+    scene = replace(load_scene("torsion-pendulum" if method == "hinge" else "spring-uneven"), steps=20)
+    with pytest.raises(MethodError, match="DART takes no negative step"):
+        driver.run(replace(scene, step=-scene.step), f"dart:{method}")
+    mirror = [one for one in checks.THOROUGH if one.name == "mirror"]
+    (verdict,) = checks.judge_thoroughly(scene, f"dart:{method}", driver.run, mirror)
+    assert verdict.passed is None

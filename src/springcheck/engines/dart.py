@@ -12,6 +12,7 @@ import numpy as np
 
 from springcheck.engines.bonds import hinges, walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping
@@ -23,6 +24,9 @@ class _World:
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import dartpy
 
+        if step < 0:
+            # it would warn, and go on by its own step
+            raise MethodError(f"{label}: DART takes no negative step")
         springs = method.name == "joint-spring"
         self.force_calls = 0
         self._m = scene.m
