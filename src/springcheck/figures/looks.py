@@ -91,6 +91,18 @@ LOOKS = {
     "force-held-5": Look(_OLIVE, DASHED),
     "force-held-10": Look(_OLIVE, DASH_DOT),
     "force-held-rk4": Look(_OLIVE, DOTTED),
+    "baoab": Look(_RED, SOLID),
+    "baoa": Look(_GREEN, SOLID),
+    "obabo": Look(_PINK, SOLID),
+    "oabao": Look(_BLACK, SOLID),
+    "aboba": Look(_BLUE, LONG),
+    "bbk": Look(_ORANGE, LONG),
+    "andersen": Look(_WINE, LONG),
+    "andersen-after-kick": Look(_SKY, DASH_DOT),
+    "andersen-leapfrog": Look(_GREY, DASH_DOT),
+    "vanden-eijnden-ciccotti": Look(_RED, LONG),
+    "lammps-langevin": Look(_PINK, LONG),
+    "gj-i": Look(_BLUE, DASHED),
 }
 FAILED = "#DD0033"
 """Of whatever is wrong, in figures and page."""

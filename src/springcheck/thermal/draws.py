@@ -318,12 +318,13 @@ def _jointly(
             return found, unknown
         change = (inverse @ (target - now).transpose(1, 0, 2).reshape(f, u * n, 1)).reshape(f, u, n)
         found = found + change.transpose(1, 0, 2)
-        if np.all(np.abs(change) <= 1e-13 * (1 + np.abs(found.transpose(1, 0, 2)))):
+        if np.all(np.abs(change) <= 1e-9 * (1 + np.abs(found.transpose(1, 0, 2)))):
             break
     else:
         return found, unknown
     unit = np.abs(inverse) @ of.transpose(1, 0, 2).reshape(f, u * n, 1)
-    return found, np.asarray(unit.reshape(f, u, n).transpose(1, 0, 2))
+    # the inverse is a double's: what it leaves is beside the rounding
+    return found, np.asarray((unit.reshape(f, u, n) + np.abs(change)).transpose(1, 0, 2))
 
 
 def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:
