@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import json
 import os
@@ -13,7 +14,7 @@ import stat
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -29,8 +30,11 @@ JOURNAL_FORMAT = "springcheck journal 1"
 TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
 """Names of files that are being written: of a user's files none is called so."""
 
-UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK}
-"""What a file system says that does not offer an operation."""
+UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK, errno.EINTR}
+"""What a file system says that does not offer an operation, or never ends one."""
+
+PATIENCE = 1.0
+"""Time for which a call of the system that was interrupted is made again [s]; Python makes it for ever."""
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",
@@ -128,18 +132,35 @@ def reserve(file: BinaryIO, size: int) -> None:
     libhdf5 cannot close a file whose last write failed; with the space reserved beforehand none fails.  Where
     the system cannot reserve, zeros are written.
     """
-    if hasattr(os, "posix_fallocate"):
-        try:
-            os.posix_fallocate(file.fileno(), 0, size)
-            return
-        except OSError as error:
-            if error.errno not in UNSUPPORTED:
-                raise
+    if hasattr(os, "posix_fallocate") and _done("posix_fallocate", file, 0, size):
+        return
     file.seek(0, os.SEEK_END)
     block = bytes(1 << 20)
     for start in range(file.tell(), size, len(block)):
         file.write(block[: size - start])
     file.flush()
+
+
+def _done(name: str, file: BinaryIO, *given: int) -> bool:
+    """Whether a function of the C library did its work on a file; False where the system does not offer it.
+
+    Raises OSError with what else it answers, as a number or by `errno`.
+    """
+    call, until = _function(name), time.monotonic() + PATIENCE
+    while number := call(file.fileno(), *given):
+        number = number if number > 0 else ctypes.get_errno()
+        if number != errno.EINTR or time.monotonic() > until:
+            break
+    if number and number not in UNSUPPORTED:
+        raise OSError(number, os.strerror(number))
+    return not number
+
+
+def _function(name: str) -> Callable[..., int]:
+    # offsets have 64 bits where longs have, and the others ask for no such file
+    return lambda file, *given: int(
+        getattr(ctypes.CDLL(None, use_errno=True), name)(file, *map(ctypes.c_long, given))
+    )
 
 
 def created(path: Path) -> BinaryIO:
@@ -329,11 +350,6 @@ def _taken(file: BinaryIO) -> bool | None:
     import fcntl
 
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return _done("flock", file, fcntl.LOCK_EX | fcntl.LOCK_NB) or None
     except BlockingIOError:
         return False
-    except OSError as error:
-        if error.errno not in UNSUPPORTED:
-            raise
-        return None
-    return True
