@@ -180,7 +180,7 @@ def test_a_file_system_without_locks_or_room_to_reserve_is_used_and_it_is_said(
     number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """EINTR for ever as well, as a file system in user space may answer: Python's calls never end there."""
-    monkeypatch.setattr("springcheck.store.files.PATIENCE", 0.01)
+    monkeypatch.setattr("springcheck.store.files.INTERRUPTED_FOR", 0.01)
     monkeypatch.setattr("springcheck.store.files._function", lambda name: lambda *_: number)
     assert main(["run", "spring", *OWN, "-o", "s.h5"]) == 0
     assert "locks" in capsys.readouterr().err

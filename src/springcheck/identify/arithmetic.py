@@ -273,13 +273,15 @@ def _defects(
     if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
         uneven = _stepped_to(record, found, matches, signed, size)
         rounded = np.where(stride == 1, _largest(np.abs(uneven), 2.0**-52 * size), ulp)
+    slack = np.zeros_like(missing)
     if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
-        unlike = _largest(np.maximum(missing - _unlike(record, found, matches), 0), 2.0**-52 * size)
+        slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
+        unlike = _largest(np.maximum(missing - slack, 0), 2.0**-52 * size)
         rounded = np.where(stride > 1, unlike, rounded)
     plain = rounded <= most_ulp
     if record.fine and not np.all(plain):
-        again = _refitted(record, found, matches, signed, 2.0**-52 * size, numbers=True)
-        plain |= _largest(np.abs(again), 2.0**-52 * size) <= most_ulp
+        again = np.abs(_refitted(record, found, matches, signed, 2.0**-52 * size, numbers=True))
+        plain |= _largest(np.maximum(again - slack, 0), 2.0**-52 * size) <= most_ulp
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

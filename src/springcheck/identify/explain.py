@@ -209,16 +209,22 @@ def _shape(e: Evidence) -> list[Explanation]:
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
-    partly = FALLS * left[good[0]] > 1
-    if partly and good[0] in tuned and "anharmonic" not in left:
-        # a frequency that was looked for explains a part of much that so few pairs cannot show
+    untried = counted < FEWEST_MISSES or (good[0] in tuned and "anharmonic" not in left)
+    if untried and FALLS * left[good[0]] > 1 and good[0] != "constant":
+        # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
+        # cannot show
         return [_too_few(size, counted)]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
     cause += driven.said(e, good[0] == "drive", tuned[good[0]]) if good[0] in tuned else ""
     few = _turns(e) < FEW_TURNS
-    if few and (good[0] in (*STATE, *TIME) or (partly and good[0] != "parity")):
+    if few and good[0] in (*STATE, *TIME):
         # where states hardly come back, any function of time is one of many powers of the state
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
+    angle = 2 * math.pi * _turns(e) / e.pairs
+    off = [abs(math.remainder(tuned.get(good[0], 0.0) - n * angle, 2 * math.pi)) for n in HARMONICS]
+    if good[0] in tuned and min(off) * e.pairs < math.pi:
+        # powers of the position have frequencies that are the motion's own, several times
+        good = [*good, "anharmonic"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
     if len(kinds) > 1:
         # over few periods position and velocity are functions of time, and of each other; states that
@@ -248,6 +254,9 @@ STATE = ("quadratic", "anharmonic", "position", "velocity")
 
 TIME = ("oscillation", "stiffness in time", "friction in time", "map in time", "drive")
 """Groups of functions of time, which the state follows there as well."""
+
+HARMONICS = (-3, -2, 2, 3)
+"""Multiples of the motion's frequency at which a force that is not linear acts, or changes a stiffness."""
 
 FEW_TURNS = 2.0
 """Turns of the motion from which states come back often enough to tell what goes with them from time."""

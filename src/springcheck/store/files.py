@@ -33,7 +33,7 @@ TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
 UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK, errno.EINTR}
 """What a file system says that does not offer an operation, or never ends one."""
 
-PATIENCE = 1.0
+INTERRUPTED_FOR = 1.0
 """Time for which a call of the system that was interrupted is made again [s]; Python makes it for ever."""
 
 CAUSES = {
@@ -146,7 +146,7 @@ def _done(name: str, file: BinaryIO, *given: int) -> bool:
 
     Raises OSError with what else it answers, as a number or by `errno`.
     """
-    call, until = _function(name), time.monotonic() + PATIENCE
+    call, until = _function(name), time.monotonic() + INTERRUPTED_FOR
     while number := call(file.fileno(), *given):
         number = number if number > 0 else ctypes.get_errno()
         if number != errno.EINTR or time.monotonic() > until:
