@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -95,3 +96,24 @@ def test_springs_that_couple_two_axes_are_no_field() -> None:
     run = springcheck.simulate(scene, "own:velocity-verlet")
     found = springcheck.identify(run.t, run.q[:, :2], run.p[:, :2], mass=scene.m[:2])
     assert "magnetic" not in found.statement
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "says"),
+    [
+        ("magnetic", "own:euler", "turns and grows"),
+        ("magnetic", "own:semi-implicit-euler", "a magnetic field across the plane"),
+        ("foucault", "own:euler", "a magnetic field across the plane"),
+        ("foucault", "own:semi-implicit-euler", "a magnetic field across the plane"),
+        ("foucault", "own:rk4", "a magnetic field across the plane"),
+        ("two-scales", "own:semi-implicit-euler", "normal modes"),
+    ],
+)
+def test_explicit_schemes_in_a_field_and_stiff_modes_are_no_friction_drive_or_noise(
+    name: str, label: str, says: str
+) -> None:
+    scene = springcheck.load_scene(name)
+    run = springcheck.simulate(replace(scene, steps=min(scene.steps, 4000)), label)
+    found = springcheck.identify(run, mass=scene.m)
+    assert says in found.statement
+    assert not re.search("friction|drives|Noise|coupled", found.statement)

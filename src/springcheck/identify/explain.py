@@ -12,7 +12,6 @@ from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance, matched
 from springcheck.identify.families import title
-from springcheck.identify.field import of_plane
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Terms, distinct
 from springcheck.identify.interrupted import few_bad_frames
@@ -134,8 +133,6 @@ def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
     def look(e: Evidence) -> list[Explanation]:
         if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
             return []
-        if turned_by := of_plane(e.record, maps):
-            return turned_by
         others = np.concatenate([m.z[:-1].astype(np.float64) for m in maps], axis=1)
         share = _left(others, e.misses)
         if share > 0.3:
@@ -222,8 +219,8 @@ def _shape(e: Evidence) -> list[Explanation]:
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
     angle = 2 * math.pi * _turns(e) / e.pairs
     off = [abs(math.remainder(tuned.get(good[0], 0.0) - n * angle, 2 * math.pi)) for n in HARMONICS]
-    if good[0] in tuned and min(off) * e.pairs < math.pi:
-        # powers of the position have frequencies that are the motion's own, several times
+    if good[0] in tuned and "anharmonic" not in left and min(off) * e.pairs < math.pi:
+        # powers of the position, not tried, have frequencies that are the motion's own, several times
         good = [*good, "anharmonic"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
     if len(kinds) > 1:
@@ -372,6 +369,13 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
             "steps has no fixed scheme to find",
+            misfit=size,
+        )
+    if e.record.parts is not None:
+        return Explanation(
+            cause=f"The normal modes of the coordinates are parted to no more than {size:.1e} of their size "
+            "in each frame, as where one is stiff and small: no scheme is told",
+            remedy="give the coordinates of one mode, or a motion in which all have the same size",
             misfit=size,
         )
     return Explanation(

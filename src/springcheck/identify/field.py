@@ -12,33 +12,41 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.fit import Map
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 
 LEFT = 1e-9
 """Of the states' size, what a right complex map leaves over at most, the roundings of a long motion in it."""
 
+KEPT = 1e-4
+"""Of 1, by which the determinant may miss it where its angle is that of the velocity."""
+
 BORIS_AGREES = 1e-10
 """Share of the largest entry by which Boris' map may miss the measured one."""
 
 
-def of_plane(record: Record, maps: list[Map]) -> list[Explanation]:
-    """What turns the two coordinates of these maps into each other, if that is all that couples them."""
-    if len(maps) != 2 or len(maps[0].z) != len(maps[1].z):
+def of_plane(record: Record) -> list[Explanation]:
+    """What turns two coordinates into each other, if there are no more and that is all that couples them."""
+    if record.q.shape[1] != 2:
         return []
-    x, y = ((one.z * one.size).astype(np.float64) for one in maps)
-    z = x + 1j * y
-    rows, *_ = np.linalg.lstsq(z[:-1], z[1:])
+    (x, y), (u, v) = (a.astype(np.float64).T for a in (record.q, record.v * record.interval))
+    z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
-    off = np.max(np.abs(z[1:] - z[:-1] @ rows) / size)
-    entries = np.asarray(rows.T, np.complex128)
+    # of what grows or dies every frame counts by its size
+    weight = 1 / np.max(np.abs(z[:-1]) / size, axis=1, keepdims=True) if np.all(np.any(z, axis=1)) else 1.0
+    scaled = weight * z[:-1] / size
+    rows = np.linalg.lstsq(scaled, weight * z[1:] / size)[0]
+    off = np.max(np.abs(weight * z[1:] / size - scaled @ rows))
+    entries = np.asarray((rows * size / size[:, None]).T[:2, :2], np.complex128)
+    size = size[:2]
     if off > LEFT or np.max(np.abs(entries.imag) * size / size[:, None]) < LEFT:
         return []
     interval = abs(float(record.interval))
-    angle = cmath.phase(complex(np.linalg.det(entries)))
+    det = complex(np.linalg.det(entries))
+    angle = cmath.phase(det)
+    turned = f"{angle:.9g}" if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
-        f"The velocity turns by {angle:.9g} in each frame beside what springs alike along both axes do: a "
+        f"The velocity turns by {turned} in each frame beside what springs alike along both axes do: a "
         "magnetic field across the plane, or Coriolis' force in a turning frame"
     )
     half = math.tan(-angle / 2)
@@ -50,7 +58,11 @@ def of_plane(record: Record, maps: list[Map]) -> list[Explanation]:
             f". By Boris, if every step was recorded: strength over mass {2 * half / interval:.9g}, "
             f"stiffness over mass {stiff / interval**2:.9g}"
         )
-    return [Explanation(cause=cause, remedy="judge it against a scene with [[magnetic]]", misfit=float(off))]
+    return [
+        Explanation(
+            cause=cause, remedy="judge it against a scene with [[magnetic]]", misfit=float(off), local=True
+        )
+    ]
 
 
 def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:

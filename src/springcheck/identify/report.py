@@ -112,6 +112,7 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
     record = read(t, q, p, v, mass)
     try:
         found = of_few(record, _of_record(record, **stated))
+        found = found if found.fits and stated["stiffness"] is not None else of_rotation(record, found)
     except IdentificationError:
         if in_a_bath := of_bath(t, q, p, v, mass):
             return in_a_bath
@@ -154,10 +155,8 @@ def _of_coordinates(
     explained = _explained(record, moving, maps, joints, terms)
     if not explained and not record.fine:
         # an equilibrium beside 0 that a short or coarse file does not show may still be there
-        apart = [
-            x if np.any(x.centre) else fit(record, j, constant=True)
-            for j, x in zip(moving, maps, strict=True)
-        ]
+        both = zip(moving, maps, strict=True)
+        apart = [x if np.any(x.centre) else fit(record, j, constant=True) for j, x in both]
         joints, terms = find(record, apart, base, stride)
         explained = _explained(record, moving, apart, joints, terms)
         maps = apart if explained else maps
@@ -199,7 +198,7 @@ def _of_coordinates(
     if asked is not None and friction is None and record.mass is not None:
         found = of_stated_friction(found, asked, float(record.mass[moving[0]]))
     if stated is None:
-        return of_rotation(record, moving, found)
+        return found
     found = of_unasked_friction(found) if friction is None else found
     of = record, moving[0], maps[0], base[0], float(stated[moving[0]]), asked
     faults = faults_of(*of) if found.explanations and found.candidates else []

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
+from springcheck.identify.field import of_plane
+from springcheck.identify.misplaced import MOST_COMPARED
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Identification
 from springcheck.physics.arrays import Floats, Reals
@@ -89,32 +92,38 @@ def distance(record: Record) -> Record | None:
     )  # fmt: skip
 
 
-def of_rotation(record: Record, moving: list[int], found: Identification) -> Identification:
-    """What was found, where the states may as well be a rotation."""
-    pair = turning(record, moving) if found.fits else None
-    if pair is None:
+def of_rotation(record: Record, found: Identification) -> Identification:
+    """What was found, where the states may as well be a rotation, or are one and no scheme fits."""
+    if found.explanations and (turned := of_plane(record)):
+        return replace(found, statement=turned[0].cause, explanations=tuple(turned))
+    if not found.fits or (pair := _turning(record)) is None:
         return found
+    i, j, factor = pair
+    grows = abs(abs(factor) - 1) > ALIKE * ROUNDING
+    how = f"turns and grows by {abs(factor) - 1:+.3g} in each frame" if grows else "only turns"
     return replace(
         found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
-        statement=f"The velocity of coordinates {pair[0]} and {pair[1]} only turns: a rotation, as of a "
-        f"charge in a magnetic field (Boris), or a circular orbit on springs: {found.statement}",
+        statement=f"The velocity of coordinates {i} and {j} {how}: a rotation, as of a charge in a magnetic "
+        f"field{'' if grows else ' (Boris)'}, or a circular orbit on springs: {found.statement}",
         notes=(*found.notes, "what would tell: the stiffness, or an orbit that is no circle"),
     )  # fmt: skip
 
 
-def turning(record: Record, moving: list[int]) -> tuple[int, int] | None:
-    """Two coordinates whose velocity only turns, its size the same in every frame; None where there are none.
+def _turning(record: Record) -> tuple[int, int, complex] | None:
+    """Two coordinates whose velocity (v_i + i v_j) is multiplied by the same number from frame to frame,
+    and that number, not real; None where there are none.
 
     A charge in a magnetic field moves so, and a circular orbit about an isotropic spring.
     """
     v = record.v.astype(np.float64)
-    for n, i in enumerate(moving):
-        for j in moving[n + 1 :]:
-            square = v[:, i] ** 2 + v[:, j] ** 2
-            mean = float(np.mean(square))
-            off = 2 * np.sqrt(mean) * np.max(record.v_quantum[:, [i, j]])
-            if np.ptp(square) > ALIKE * ROUNDING * np.sqrt(len(v)) * mean + 2 * off:
-                continue
-            if min(np.ptp(v[:, i]), np.ptp(v[:, j])) > np.sqrt(mean):
-                return i, j
+    for i, j in combinations(range(min(v.shape[1], MOST_COMPARED)), 2):
+        w = v[:, i] + 1j * v[:, j]
+        size = np.abs(w)
+        if not np.all(size > 0):
+            continue
+        factor = complex(np.mean(w[1:] / w[:-1]))
+        room = ALIKE * ROUNDING * (size[1:] + size[:-1]) + 2 * np.max(record.v_quantum[1:, [i, j]], axis=1)
+        turns = abs(np.angle(factor)) * len(w) > 1
+        if turns and np.all(np.abs(w[1:] - factor * w[:-1]) <= room):
+            return i, j, factor
     return None
