@@ -661,3 +661,20 @@ def test_a_stepper_that_fails_names_its_line_and_one_of_arrays_is_taken() -> Non
     with pytest.raises(MethodError, match=where):
         identify_stepper(fails)
     assert identify_stepper(of_arrays).scheme == "semi-implicit-euler"
+
+
+def test_more_steps_to_a_frame_than_are_looked_at_are_no_unknown_scheme_and_the_step_names_it() -> None:
+    h, every, w2 = 0.23, 150, 1.7
+    q, v, frames = 1.0, 0.3, [(1.0, 0.3)]
+    for i in range(30 * every):
+        v -= h / 2 * w2 * q
+        q += h * v
+        v -= h / 2 * w2 * q
+        if i % every == every - 1:
+            frames.append((q, v))
+    states = np.array(frames).T
+    t = np.arange(31) * h * every
+    found = identify(t, states[0], v=states[1], mass=1.0)
+    assert "none of the known schemes' in up to 100 steps to a frame" in found.statement
+    assert "state the step" in found.explanations[0].remedy
+    assert identify(t, states[0], v=states[1], mass=1.0, step=h).scheme == "velocity-verlet"

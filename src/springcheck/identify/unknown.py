@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance
 from springcheck.identify.families import title
-from springcheck.identify.hypothesis import SURE, distinct
+from springcheck.identify.hypothesis import STRIDES, SURE, distinct
 from springcheck.identify.result import Explanation
 
 REAL = 0.3
@@ -45,8 +45,10 @@ def misfit(e: Evidence) -> Explanation:
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
     kind = _class(e) or growth
     return Explanation(
-        cause=f"One linear map explains the states, but it is none of the known schemes': {kind}{near}",
-        remedy="compare the order of its stages and their coefficients with the scheme's",
+        cause="One linear map explains the states, but it is none of the known schemes' in up to "
+        f"{STRIDES[1]} steps to a frame: {kind}{near}",
+        remedy="compare the order of its stages and their coefficients with the scheme's; state the step where "
+        "more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
     )
 
