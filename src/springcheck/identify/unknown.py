@@ -47,8 +47,8 @@ def misfit(e: Evidence) -> Explanation:
     return Explanation(
         cause="One linear map explains the states, but it is none of the known schemes' in up to "
         f"{STRIDES[1]} steps to a frame: {kind}{near}",
-        remedy="compare the order of its stages and their coefficients with the scheme's; state the step where "
-        "more of them lie between frames",
+        remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
+        "where more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
     )
 
