@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import tracemalloc
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -678,3 +679,32 @@ def test_more_steps_to_a_frame_than_are_looked_at_are_no_unknown_scheme_and_the_
     assert "none of the known schemes' in up to 100 steps to a frame" in found.statement
     assert "state the step" in found.explanations[0].remedy
     assert identify(t, states[0], v=states[1], mass=1.0, step=h).scheme == "velocity-verlet"
+
+
+def test_a_full_second_kick_in_the_textbook_form_is_no_friction_of_a_right_scheme() -> None:
+    """Its loss of area is h k/(2 m), which friction of two laws explains entry for entry, at other rates."""
+    h, w2, q, v = 0.1, 2.9 / 3.7, 1.0, 0.3
+    frames = [(q, v)]
+    for _ in range(200):
+        q = q + v * h - 0.5 * w2 * q * h * h
+        v = v - w2 * q * h
+        frames.append((q, v))
+    states = np.array(frames).T
+    found = identify(np.arange(201) * h, states[0], v=states[1], mass=3.7, stiffness=2.9)
+    assert found.verdict == "none"
+    assert "h k/(2 m): the mark of a scheme that is written down wrongly" in found.statement
+
+
+@pytest.mark.parametrize("force", [lambda q: 0.8 * q + 0.05 * q**3, lambda q: 0.8 * np.sin(q)])
+def test_an_anharmonic_motion_is_no_drive_at_its_own_harmonics(force: Any) -> None:
+    h, q, v = 0.1, 0.9, 0.3
+    frames = [(q, v)]
+    for _ in range(400):
+        v -= h / 2 * force(q)
+        q += h * v
+        v -= h / 2 * force(q)
+        frames.append((q, v))
+    states = np.array(frames).T
+    found = identify(np.arange(401) * h, states[0], v=states[1], mass=1.0)
+    assert "anharmonic" in found.statement
+    assert "time" not in found.statement

@@ -211,15 +211,21 @@ def _shape(e: Evidence) -> list[Explanation]:
         # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
         # cannot show
         return [_too_few(size, counted)]
+    angle = 2 * math.pi * _turns(e) / e.pairs
+    away = {
+        name: e.pairs * min(abs(math.remainder(w - n * angle, 2 * math.pi)) for n in HARMONICS)
+        for name, w in tuned.items()
+    }
+    if {"quadratic", "cubic", "anharmonic"} & set(good):
+        # a wave that is in step with the motion to a share of a turn over the run is its own power
+        good = [name for name in good if away.get(name, math.inf) > IN_STEP]
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
     cause += driven.said(e, good[0] == "drive", tuned[good[0]]) if good[0] in tuned else ""
     few = _turns(e) < FEW_TURNS
     if few and good[0] in (*STATE, *TIME):
         # where states hardly come back, any function of time is one of many powers of the state
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
-    angle = 2 * math.pi * _turns(e) / e.pairs
-    off = [abs(math.remainder(tuned.get(good[0], 0.0) - n * angle, 2 * math.pi)) for n in HARMONICS]
-    if good[0] in tuned and "anharmonic" not in left and min(off) * e.pairs < math.pi:
+    if away.get(good[0], math.inf) < math.pi and "anharmonic" not in left:
         # powers of the position, not tried, have frequencies that are the motion's own, several times
         good = [*good, "anharmonic"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
@@ -252,7 +258,10 @@ STATE = ("quadratic", "anharmonic", "position", "velocity")
 TIME = ("oscillation", "stiffness in time", "friction in time", "map in time", "drive")
 """Groups of functions of time, which the state follows there as well."""
 
-HARMONICS = (-3, -2, 2, 3)
+IN_STEP = 0.1
+"""Angle over the run by which a wave may be off the motion's harmonics where it is their own."""
+
+HARMONICS = (-3, -2, -1, 0, 1, 2, 3)
 """Multiples of the motion's frequency at which a force that is not linear acts, or changes a stiffness."""
 
 FEW_TURNS = 2.0

@@ -132,13 +132,16 @@ def of_unasked_friction(found: Identification) -> Identification:
     if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
         return found
     for one in found.candidates:
-        for w, rate in zip(one.omega, one.friction, strict=True):
-            # an inverted spring has no frequency
-            share = rate / (w * w * one.step) if w > 0 else 0.0
-            n = round(1 / share) if share > 1 / MOST_PARTS / 2 else round(share)
-            if not (share and 1 <= n <= MOST_PARTS and abs(share * n - 1) < MARK):
+        for w, rate, det in zip(one.omega, one.friction, found.determinant, strict=True):
+            a = (w * one.step) ** 2
+            # what a step loses of the area is the same by every law of friction; an inverted spring has no a
+            lost = [rate * one.step, 1 - det, 1 / det - 1] if a > 0 and det > 0 else []
+            parts = [n for x in lost for n in range(1, MOST_PARTS + 1) if abs(x * n / a - 1) < MARK]
+            if not parts:
                 continue
-            if n == 1 and one.scheme == EULER and one.law.startswith(IMPLICIT):
+            n = parts[0]
+            own = n == 1 and abs(lost[0] / a - 1) < MARK
+            if own and one.scheme == EULER and one.law.startswith(IMPLICIT):
                 plain = replace(
                     one, scheme="implicit-euler", aliases=(), friction=(0.0,) * len(one.omega), law=""
                 )
@@ -149,8 +152,9 @@ def of_unasked_friction(found: Identification) -> Identification:
                 )  # fmt: skip
             part = "h k/m" if n == 1 else f"h k/({n} m)"
             cause = (
-                f"{one.scheme} with a friction c/m = {rate:.6g} that was not stated and is {part}: the mark "
-                "of a scheme that is written down wrongly, or of an implicit one; state the friction if not"
+                f"{one.scheme} with a friction c/m = {rate:.6g} that was not stated and loses as much area "
+                f"as {part}: the mark of a scheme that is written down wrongly, or of an implicit one; state "
+                "the friction if not"
             )
             wrong = Explanation(
                 cause=cause, remedy="compare the factors 1/2 of the step with the scheme's", misfit=0.0
