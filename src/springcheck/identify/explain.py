@@ -380,7 +380,7 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             "steps has no fixed scheme to find",
             misfit=size,
         )
-    if e.record.parts is not None:
+    if e.record.parts is not None and e.record.q.shape[1] > 1:
         return Explanation(
             cause=f"The normal modes of the coordinates are parted to no more than {size:.1e} of their size "
             "in each frame, as where one is stiff and small: no scheme is told",
