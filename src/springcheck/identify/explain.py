@@ -222,7 +222,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     cause, remedy = _sentence(e, good[0], q, v, missing, size)
     cause += driven.said(e, good[0] == "drive", tuned[good[0]]) if good[0] in tuned else ""
     few = _turns(e) < FEW_TURNS
-    if few and good[0] in (*STATE, *TIME):
+    if few and (good[0] in (*STATE, *TIME) or len({KIND[name] for name in good}) > 1):
         # where states hardly come back, any function of time is one of many powers of the state
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
     if away.get(good[0], math.inf) < math.pi and "anharmonic" not in left:

@@ -51,6 +51,9 @@ CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds the chance of a
 mistake."""
 
+FEWEST_SLIPPING = 20
+"""Numbers up to which what a clock's slips do to each step is not fitted."""
+
 CLEAN = 100.0
 """What may be left over in the mean square, of what is expected, where it may be rounding."""
 
@@ -352,7 +355,7 @@ def _constant_part(
         return old.cost - new.cost > least_gain * max(new.chi2 / spare, least)
 
     best = _minimum(z, sigma, process, start, 0, None)
-    if record.slips is not None and numbers > 20:
+    if record.slips is not None and numbers > FEWEST_SLIPPING:
         wide = _minimum(z, sigma, process, best, 1, None)
         sliding = _minimum(z, sigma, process, wide, 1, record.slips)
         if gains(wide, sliding, 2 * CONSTANT_SHOWS):
@@ -369,8 +372,10 @@ def _constant_part(
         widest = _minimum(z, sigma, process, best, 2, slips)
         # at rest the roundings are the same in every step, and add up to a constant of their own
         shift = (np.eye(2) - widest.entries) @ (widest.centre - best.centre)
-        # and what a constant does not bring down to rounding may be of something else
-        explained = widest.chi2 <= CLEAN * (numbers - unknown - 3) and gains(best, widest, CONSTANT_SHOWS)
+        # where the clock's slips are too few to be fitted, a constant may stand for them
+        slipping = record.slips is not None and numbers <= FEWEST_SLIPPING
+        explained = gains(best, widest, CONSTANT_SHOWS)
+        explained &= not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
         if explained and np.max(np.abs(shift)) > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
     return best, centred, slips

@@ -134,8 +134,9 @@ def of_unasked_friction(found: Identification) -> Identification:
     for one in found.candidates:
         for w, rate, det in zip(one.omega, one.friction, found.determinant, strict=True):
             a = (w * one.step) ** 2
-            # what a step loses of the area is the same by every law of friction; an inverted spring has no a
+            # what a step loses of the area by friction is the same by every law; an inverted spring has no a
             lost = [rate * one.step, 1 - det, 1 / det - 1] if a > 0 and det > 0 else []
+            lost = [x for x in lost if abs(x - lost[0]) <= a * lost[0]]
             parts = [n for x in lost for n in range(1, MOST_PARTS + 1) if abs(x * n / a - 1) < MARK]
             if not parts:
                 continue
