@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2574,
     ("driver", "conformance", "doors"): 1190,
     ("checks",): 4303,
-    ("identify",): 7823,
+    ("identify",): 7825,
     ("formats", "store"): 5008,
     ("studies",): 1603,
     ("studies/*",): 11019,

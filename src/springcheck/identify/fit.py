@@ -34,7 +34,7 @@ CONSTANT_LIKELY = 10.0
 
 FLOOR = 1 / 8
 """A number near zero is written finer than its neighbours by any power of ten; it counts as no finer than
-this share of the other component's quantum, so that no single number decides a fit."""
+this share of the other component's quantum."""
 
 LEAST_LEFT = 1 / 16
 """Of the rounding of a state, what one step leaves over at least in the mean square: numbers that happen to
@@ -48,8 +48,7 @@ LEAST_NOISE = 1e-30
 """Share of the largest noise that a pair counts with at least."""
 
 CERTAIN = 14.0
-"""Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds the chance of a
-mistake."""
+"""Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds mistakes."""
 
 FEWEST_SLIPPING = 20
 """Numbers up to which what a clock's slips do to each step is not fitted."""
@@ -70,7 +69,7 @@ UNKNOWN = 1e6
 """Share of a state that may change between two frames of which nothing is known."""
 
 MOST_ROUNDS = 12
-"""Gauss-Newton's steps at most; three reach rounding in double precision, five in the coarsest text."""
+"""Gauss-Newton's steps at most; three reach rounding in double precision, five in coarse text."""
 
 SETTLED = 1e-3
 """Gain of chi-squared that another step must promise, in units of what each number leaves over."""
@@ -371,12 +370,11 @@ def _constant_part(
     if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
         widest = _minimum(z, sigma, process, best, 2, slips)
         # at rest the roundings are the same in every step, and add up to a constant of their own
-        shift = (np.eye(2) - widest.entries) @ (widest.centre - best.centre)
+        shift = np.max(np.abs((np.eye(2) - widest.entries) @ (widest.centre - best.centre)))
         # where the clock's slips are too few to be fitted, a constant may stand for them
         slipping = record.slips is not None and numbers <= FEWEST_SLIPPING
-        explained = gains(best, widest, CONSTANT_SHOWS)
-        explained &= not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
-        if explained and np.max(np.abs(shift)) > 64 * ROUNDING * np.max(np.abs(z)):
+        clean = not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
+        if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
     return best, centred, slips
 
