@@ -708,3 +708,12 @@ def test_an_anharmonic_motion_is_no_drive_at_its_own_harmonics(force: Any) -> No
     found = identify(np.arange(401) * h, states[0], v=states[1], mass=1.0)
     assert "anharmonic" in found.statement
     assert "time" not in found.statement
+
+
+@pytest.mark.parametrize("raised", [SystemExit(0), GeneratorExit(), BaseException("odd")])
+def test_a_stepper_that_leaves_by_whatever_exception_is_told_in_a_line(raised: BaseException) -> None:
+    def step(*_: Any) -> Any:
+        raise raised
+
+    with pytest.raises(MethodError, match=f"failed at q=.*{type(raised).__name__}"):
+        identify_stepper(step)

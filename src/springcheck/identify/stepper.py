@@ -61,7 +61,9 @@ def _one(
             float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
             for x in (new_q, new_p)
         )
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         file = getattr(getattr(step, "__code__", None), "co_filename", "")
         raise MethodError(
             f"the stepper failed at q={q:.6g}, p={p:.6g}, h={h:.6g}: {told(error, file)}; "
