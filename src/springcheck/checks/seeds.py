@@ -72,7 +72,7 @@ class Seeded:
         )  # fmt: skip
         if run.rebuilds_velocity:
             of_p = of_p + self.scene.m * of_q / abs(self.scene.step)
-        if self.scheme.rescales and self.scheme.acts[0].kind == "kick":
+        if self.scheme.rescales_after:
             # the kinetic energy that the factor is of has the roundings of all that came before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
         return unit * of_q + SMALLEST, unit * of_p + SMALLEST
@@ -220,8 +220,7 @@ def noise_matrix(subject: Seeded) -> Finding | str:
         ideal = subject.stepper(scene)(*start, scene.system.potential_force, draws)
         factor: Any = True
         if scheme.rescales:
-            after = scheme.acts[0].kind == "kick"
-            force = scene.system.potential_force if after else lambda q, p: 0 * q
+            force = scene.system.potential_force if scheme.rescales_after else lambda q, p: 0 * q
             both = [subject.stepper(scene)(*start, force, draws, hit)[1] for hit in (None, 1.0)]
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
         worst = max(worst, _off((run.q[1], run.p[1]), ideal, subject.allowed(run, factor=factor)))

@@ -88,6 +88,11 @@ class Thermostat:
         return any(act.kind == "collide" for act in self.acts)
 
     @property
+    def rescales_after(self) -> bool:
+        """Whether that factor comes after kicks and drifts."""
+        return self.rescales and self.acts[0].kind == "kick"
+
+    @property
     def rescales(self) -> bool:
         """Whether all momenta get one factor, of their kinetic energy and the draws of all: no linear map."""
         return any(act.kind in ("rescale", "scale", "chain") for act in self.acts)
