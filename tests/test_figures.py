@@ -316,6 +316,16 @@ def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     assert "explicit Euler spirals out; implicit Euler spirals in; semi-implicit Euler" in title
 
 
+def test_an_axis_of_energies_shows_no_millionths() -> None:
+    ys = energies._scale([np.array([1.0, 1 + 3e-8]), np.array([1.0, 1 - 1e-9])], np.ones(2))
+    assert ys.half >= 0.01
+    assert ys.low < 1 < ys.high
+    scene = scenefile.load_scene("free")
+    made = runs(scene, "own:semi-implicit-euler")
+    (title,) = (bank.heading for bank in of_runs(scene, made, made) if bank.name == "energy")
+    assert title == "Free mass: a straight line: all keep the energy exactly"
+
+
 def test_what_wavers_neither_gains_nor_loses() -> None:
     n = np.arange(400)
     assert energies.steady(np.exp(0.01 * n), 1) == pytest.approx(np.expm1(0.01))

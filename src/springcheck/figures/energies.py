@@ -34,6 +34,9 @@ CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
 """Part of an energy, or logarithm of it over the start's, from which it has changed; part of its change that
 is even, which what wavers has not; schemes that a title names."""
 
+SEEN = 0.01
+"""Part of an energy from which an axis that is not logarithmic shows what it does."""
+
 FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
 """Relative differences below this are none: they stand on the lower edge; differences that are roundings."""
 
@@ -112,7 +115,8 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
     said = []
     if runs.scene.system.keeps_energy:
         if max(largest.values()) <= ALL_ROUNDED:
-            return f"all keep the energy to rounding, {max(largest.values()):.0e}"
+            most = max(largest.values())
+            return f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
         for group in runs.groups:
             each = steady(found[group.members[0].label], group.members[0].every)
             if each and not group.failed:
@@ -187,7 +191,10 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
         # the right energy may fall further
         bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
         return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
-    return overlay.widened(low, high, clipped=len(near) < len(found))
+    ys = overlay.widened(low, high, clipped=len(near) < len(found))
+    # what differs by less is for the differences below
+    room = max(ys.half, SEEN * abs(ys.centre))
+    return Frame(ys.centre - room, ys.centre + room, ys.clipped)
 
 
 def decades(
