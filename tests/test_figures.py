@@ -357,6 +357,19 @@ def test_an_orbit_that_has_collapsed_at_once_has_spiralled_in() -> None:
     assert "implicit Euler spirals in; 2 keep to their orbits" in of_runs(scene, made, made)[0].heading
 
 
+def test_an_engine_far_off_the_others_of_its_scheme_has_its_line_in_its_panel() -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    (made,) = runs(scene, "sundials:adams").values()
+    far = replace(made, label="sundials:far", q=made.q * (1 + 1e-3 * np.linspace(0, 1, len(made.t)))[:, None])
+    both = {made.label: made, far.label: far}
+    for bank in of_runs(scene, both, both):
+        if bank.name in ("energy", "error"):
+            lines = [
+                [x.name for x in one.curves if x.name in both and not x.over] for one in bank.charts[-2:]
+            ]
+            assert lines == [["sundials:far"], ["sundials:adams"]], bank.name
+
+
 def test_frames_too_far_apart_to_be_joined_are_dots() -> None:
     for name, dots in (("spring", False), ("ch-bond", True)):
         scene = scenefile.load_scene(name)

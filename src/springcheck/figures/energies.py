@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -218,7 +219,12 @@ def decades(
         clipped = len(inside) < len(mine)
         high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 10 * low)
         ys = Frame(low, high, clipped, log=True)
-        groups = [group for group in runs.groups if group.members[0].label in labels]
+        # an engine may be farther off than others of its scheme
+        groups = [
+            replace(group, members=members)
+            for group in runs.groups
+            if (members := tuple(run for run in group.members if run.label in labels))
+        ]
 
         def shown(run: Trajectory, ys: Frame = ys) -> tuple[Floats, Floats]:
             y = found[run.label]

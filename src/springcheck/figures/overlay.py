@@ -136,8 +136,8 @@ class Runs:
 
     def first(self, curves: Sequence[Curve]) -> Iterable[tuple[str, Curve]]:
         """Of each motion its title and its first curve."""
-        titles = {group.members[0].label: group.title for group in self.groups}
-        return [(titles[curve.name], curve) for curve in curves if curve.name in titles]
+        titles = {run.label: group.title for group in self.groups for run in group.members}
+        return [(titles[curve.name], curve) for curve in curves if curve.name in titles and not curve.over]
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
         """Which schemes leave a picture for good, and when: at which frame, None where never."""
