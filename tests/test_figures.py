@@ -368,6 +368,8 @@ def test_an_engine_far_off_the_others_of_its_scheme_has_its_line_in_its_panel() 
                 [x.name for x in one.curves if x.name in both and not x.over] for one in bank.charts[-2:]
             ]
             assert lines == [["sundials:far"], ["sundials:adams"]], bank.name
+            # and the title is of the worst of them
+            assert re.search(r"by at most 0\.\d+ %", bank.heading), bank.heading
 
 
 def test_frames_too_far_apart_to_be_joined_are_dots() -> None:

@@ -112,7 +112,7 @@ def _times(runs: Runs) -> Frame:
 
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
     """Who gains or loses energy in every step alike, and how far the others are off."""
-    largest = {group.title: float(np.max(differences[group.members[0].label])) for group in runs.groups}
+    largest = _largest(runs, differences)
     said = []
     if runs.scene.system.keeps_energy:
         if max(largest.values()) <= ALL_ROUNDED:
@@ -129,6 +129,11 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
     if largest:
         said.append(extremes(largest, "energy off by at most {}", beyond=LARGE))
     return "; ".join(said)
+
+
+def _largest(runs: Runs, found: Mapping[str, Floats]) -> dict[str, float]:
+    """The largest number of any engine of each scheme."""
+    return {x.title: max(float(np.max(found[run.label])) for run in x.members) for x in runs.groups}
 
 
 def steady(energies: Floats, every: int) -> float:
@@ -286,7 +291,7 @@ def error(runs: Runs, exact: Exact) -> Bank:
     charts = decades(
         runs, found, time, "error / initial energy norm", "Distance from the exact solution.", known=True
     )
-    largest = {group.title: float(np.max(found[group.members[0].label])) for group in runs.groups}
+    largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
     said = extremes(some, "off the exact solution by at most {}", beyond=MOST) if some else "errors"
     return Bank(
