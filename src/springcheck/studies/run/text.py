@@ -17,7 +17,7 @@ from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
-from springcheck.text.lines import Lines, Row, TextTable, plain, table
+from springcheck.text.lines import Lines, Row, TextTable, hanging, plain, table
 from springcheck.text.wording import count, seconds
 
 if TYPE_CHECKING:
@@ -345,7 +345,7 @@ def _summary(report: Report) -> Lines:
         names = " and ".join(report.broke)
         return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
     return [
-        *([plain(left, "dim")] if not failed and (left := checks.not_exercised(report.scene)) else []),
+        *(hanging("", left) if not failed and (left := checks.not_exercised(report.scene)) else []),
         plain(f"{report.counts}{taken}", look),
         *(
             []
