@@ -40,8 +40,8 @@ SECONDS = 5.0
 Step = Callable[..., Any]
 
 
-class TooLongError(BaseException):
-    """Passes by whoever catches the mistakes of a function."""
+class TooLongError(KeyboardInterrupt):
+    """The clock's Ctrl-C: passes by whoever catches the mistakes of a function, whatever they leave by."""
 
 
 @contextmanager
