@@ -18,7 +18,7 @@ from typing import Any
 
 import springcheck
 from springcheck import interrupts
-from springcheck.cli import output, slips
+from springcheck.cli import groups, output, slips
 from springcheck.cli.commands import COMMANDS, Command
 from springcheck.cli.examples import EXAMPLES
 from springcheck.errors import SpringcheckError, StoreWarning, plain
@@ -138,11 +138,10 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
                     *(f"  springcheck {one.name} {x}".rstrip() for x in EXAMPLES.get(one.name, [""])),
                 ]
             ),
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=groups.Formatter,
         )
         if one.name in words:
-            for names, how in (*one.arguments, *(REPORTS if one.name in REPORTING else ())):
-                parser_of.add_argument(*names, **how)
+            groups.add(parser_of, one.name, (*one.arguments, *(REPORTS if one.name in REPORTING else ())))
         if isinstance(one, Study):
             parser_of.set_defaults(command=partial(_study, one), keeps=one.keeps)
         else:

@@ -309,7 +309,8 @@ _STEPS = argument("--step", type=float, metavar="H", help="the time step of a fi
 COMMANDS = (
     Command("inspect", "what is in a store", _inspect, (
         _FILE,
-        argument("--trajectory", metavar="LABEL", help="print the numbers of one trajectory"),
+        argument("--trajectory", metavar="LABEL",
+                 help="print the numbers of one trajectory, first to last frame"),
         argument("--rows", type=int, metavar="N", help="how many frames of it (default 20)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         JSON,
@@ -317,9 +318,11 @@ COMMANDS = (
     Command("plot", "draw what is in a store, or in a file of any program, as PNG and SVG", _plot, (
         _FILE,
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
-        argument("--particle", type=int, metavar="I", help="the motion of this particle alone"),
+        argument("--particle", type=int, metavar="I",
+                 help="the motion of this particle alone, from 0 on (default: of all)"),
         argument("--quantity", metavar="NAME",
-                  help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome"),
+                  help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome "
+                  "(default: error and energy)"),
         argument("--over", metavar="FIELD[,FIELD]",
                   help="of an ensemble: over which of the fields that were varied"),
         _NAMES,
@@ -345,7 +348,8 @@ COMMANDS = (
         _GROUP,
         argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
         argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
-        argument("--mass", type=float, metavar="M", help="mass of every particle, where the file has none"),
+        argument("--mass", type=float, metavar="M",
+                 help="mass of every particle in the file's unit, where it has none"),
         _NAMES,
         argument("--step", type=float, metavar="H", help="is this the time step?"),
         argument("--scheme", metavar="NAME", help="is this the scheme?"),

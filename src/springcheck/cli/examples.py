@@ -12,7 +12,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
         "spring --stepper mine.py:step",
         "spring --vary time.step=0.01:1:40:log",
     ),
-    "ensemble": ("spring --vary spring.0.stiffness=1:100:64 --method own:rk4",),
+    "ensemble": ("spring --vary time.step=0.01:1:40:log --method own:rk4",),
     "faults": ("", "-o faults.h5"),
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),

@@ -24,6 +24,11 @@ def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
 def lines(summary: store.Summary, options: Namespace) -> Lines:
     """The store as text.  StoreError where it cannot be read or holds no such trajectory."""
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
+    run, stride = _asked_for(summary, options)
+    if run is not None:
+        out += _frames(run, stride, store.end(summary.path, run.label, 1))
+        if not options.verdicts:
+            return out
     if not summary.complete:
         out.append(plain("unfinished: the command that writes it has not ended", "bold red"))
     if summary.runs:
@@ -44,8 +49,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     for study, result in held(summary):
         said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
-    run, stride = _asked_for(summary, options)
-    return out if run is None else [*out, plain(), *_frames(run, stride)]
+    return out
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:
@@ -70,17 +74,21 @@ def _runs(summary: store.Summary) -> TextTable:
     return table(titles, rows, left=("trajectory", "outcome", "sha256"), prose="versions")
 
 
-def _frames(run: Trajectory, stride: int) -> Lines:
+def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
+    """Some frames, and the last one where it is none of them."""
     n = run.q.shape[1]
     shown = min(n, 3)
-    title = f"{run.label}" + (f", every {ordinal(stride)} frame" if stride > 1 else "")
+    title = f"{run.label}" + (f", every {ordinal(stride)} frame and the last" if stride > 1 else "")
     if n > shown:
         title += f", the first {shown} of {n} particles"
     names = [f"{name}{i}" if n > 1 else name for name in ("q", "p") for i in range(shown)]
     rows = [
         [repr(float(x)) for x in (t, *q[:shown], *p[:shown])]
-        for t, q, p in zip(run.t, run.q, run.p, strict=True)
+        for one in (run, last)
+        for t, q, p in zip(one.t, one.q, one.p, strict=True)
     ]
+    if rows[-2:-1] == rows[-1:]:
+        del rows[-1]
     return [plain(title, "italic"), table(("t", *names), rows)]
 
 

@@ -50,7 +50,7 @@ def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
         repeatable(
             "--scheme", "SCHEME|NAME=SCHEME", "the scheme of your functions and programs, or of one of them"
         ),
-        argument("--timeout", type=float, metavar="SECONDS", help="what a program may take (default 600)"),
+        argument("--timeout", type=float, metavar="SECONDS", help="that a program may take (default 600)"),
         FORCE,
         JSON,
         QUIET,

@@ -14,7 +14,8 @@ VARY = (
     argument(
         "--samples", type=int, metavar="N", help="N random scenes, each FIELD=LOW:HIGH[:log] drawn evenly"
     ),
-    argument("--seed", type=int, metavar="S", help="of the samples (default 0), or of random methods"),
+    argument("--seed", type=int, metavar="S",
+             help="of the samples (default 0), or of random methods (default: drawn)"),
 )  # fmt: skip
 """What is varied."""
 

@@ -14,7 +14,11 @@ STUDY = Study(
         *store_arguments("extremes.h5"),
         argument("--quick", action="store_true", help="fewer cells, in about 20 seconds"),
         argument(
-            "--cells", type=int, default=0, metavar="N", help="a finer atlas of about N cells, as 100000"
+            "--cells",
+            type=int,
+            default=0,
+            metavar="N",
+            help="a finer atlas of about N cells, as 100000 (default: the usual one)",
         ),
     ),
 )

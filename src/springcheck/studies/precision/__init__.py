@@ -13,7 +13,7 @@ STUDY = Study(
         SCENE,
         *team.arguments(),
         *store_arguments("SCENE-precision.h5"),
-        argument("--budget", type=float, metavar="SECONDS", help="time to spend, shared fairly (default 75)"),
+        argument("--budget", type=float, metavar="SECONDS", help="of run time, shared fairly (default 75)"),
         argument("--points", action="store_true", help="print every point"),
     ),
 )

@@ -16,12 +16,16 @@ STUDY = Study(
         _SCENE,
         *store_arguments(),
         argument("--all", action="store_true", help="by every method, not the default ones alone"),
-        argument("--step", type=float, metavar="H", help="another step than the scene's"),
-        argument("--temperature", metavar="T", help="a heat bath: kelvin, or kT where units are reduced"),
-        argument("--friction", type=float, metavar="G", help="its friction rate (default 0.1/step)"),
-        argument("--steps", type=int, metavar="N", help="another number of steps"),
+        argument("--step", type=float, metavar="H",
+                 help="time step in the scene's unit (default: the scene's)"),
+        argument("--temperature", metavar="T",
+                 help="a heat bath: 300K, or kT where units are reduced (default: none)"),
+        argument("--friction", type=float, metavar="G",
+                 help="the bath's friction rate, per unit of time (default 0.1/step)"),
+        argument("--steps", type=int, metavar="N", help="how many steps (default: the scene's)"),
         repeatable(
-            "--set", "FIELD=NUMBER", "another number in a field of the scene file, as spring.0.stiffness=2"
+            "--set", "FIELD=NUMBER",
+            "a number in a field of the scene file, in its units, as spring.0.stiffness=2"
         ),
         repeatable(
             "--fault", "NAME[=SIZE]",

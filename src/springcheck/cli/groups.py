@@ -1,0 +1,59 @@
+"""Under which headings the help of a command shows its arguments."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Mapping, Sequence
+
+from springcheck.studies.arguments import REPORT_FORMS, Argument
+
+GROUPS: Mapping[str, Sequence[str]] = {
+    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from",
+              "--against", "--add"),
+    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction",
+              "--thermostats"),
+    "many runs": ("--vary", "--samples", "--seed"),
+    "methods": (
+        "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
+    ),
+    "known of the motion": ("--mass", "--stiffness"),
+    "how much is measured": ("--thorough", "--budget", "--quick", "--cells", "--workers", "--cluster"),
+    "figures": ("--particle", "--quantity", "--over"),
+    "output": (
+        "output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points", "--page",
+        "--csv",
+    ),
+    "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
+}  # fmt: skip
+"""Headings in the order of the help, with the arguments below each."""
+ELSEWHERE: Mapping[str, Mapping[str, str]] = {
+    "plot": {"--step": "input"},
+    "judge": {"--step": "input", "--scheme": "scene"},
+    "identify": {
+        "--stepper": "input", **dict.fromkeys(("--step", "--friction", "--scheme"), "known of the motion"),
+    },
+}  # fmt: skip
+"""By command: what means something else to it than to the others."""
+
+
+class Formatter(argparse.RawDescriptionHelpFormatter):
+    """Folds what is one line, and leaves examples as they stand."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        if "\n" in text:
+            return super()._fill_text(text, width, indent)
+        return argparse.HelpFormatter._fill_text(self, text, width, indent)
+
+
+def heading(command: str, names: Sequence[str]) -> str:
+    """Under which heading an argument stands; "other" where no group names it, as a plug-in's own."""
+    known = ELSEWHERE.get(command, {})
+    every = [known[name] for name in names if name in known]
+    return [*every, *(title for title, of in GROUPS.items() if set(names) & {*of}), "other"][0]
+
+
+def add(parser: argparse.ArgumentParser, command: str, arguments: Iterable[Argument]) -> None:
+    """Give a command its arguments, in groups."""
+    groups = {title: parser.add_argument_group(title) for title in (*GROUPS, "other")}
+    for names, how in arguments:
+        groups[heading(command, names)].add_argument(*names, **how)
