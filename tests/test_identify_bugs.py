@@ -359,3 +359,20 @@ def test_an_implicit_friction_of_the_wrong_sign_is_told_by_the_stated_stiffness(
     # another friction is not that fault, and neither is a spring that is as stiff as it looks
     assert "wrong sign" not in identify(t, q, p, mass=M, stiffness=K, friction=2 * c).statement
     assert identify(t, q, p, mass=M, stiffness=K / (1 - H * c / M)).fits
+
+
+def test_positions_that_all_lie_on_one_number_are_explained_without_a_warning() -> None:
+    """A wall 1e9 away: the momentum moves, and the position stands still by a fault."""
+    far = 1e9
+
+    def held(q, p, h, force, mass):  # type: ignore[no-untyped-def]
+        p = p + h / 2 * force(q)
+        return q, p + h / 2 * force(q + h * p / mass)
+
+    q, p, states = far + 1e-5, 0.0, []
+    for _ in range(201):
+        states.append((q, p))
+        q, p = held(q, p, H, lambda x: -K * (x - far), M)
+    found = identify(H * np.arange(201), *np.array(states).T, mass=M, stiffness=K)
+    assert not found.fits
+    assert "velocity" in found.statement

@@ -30,8 +30,8 @@ def test_no_legal_engine_is_rejected_and_no_fault_is_missed_that_is_far_above_th
     found = judge_campaign.campaign(first, 20)
     assert found.sets >= 60
     assert found.alarms == []
-    # roundings of many steps are bounded as if all were of one sign
-    assert set(found.decades) <= {"1e2", "1e3"}
+    # on these scenes none is missed; below 100 times the noise one may hide in a bound
+    assert set(found.decades) <= {"1e2"}
     assert found.numbers == []
     assert found.seen >= 20
     assert max(found.noise.values()) < 0.5

@@ -70,6 +70,10 @@ def test_every_step_of_a_long_anharmonic_run_is_judged(tmp_path: Path, fault: st
     report = judged(tmp_path, wells(400), FAULTS[fault])
     assert report.judged_frames == 401
     assert report.status == (fault != "right")
+    # steps 72 to 310 stand still, 16 frames a piece: the frames off were counted in the first of them alone
+    (step,) = (v for v in report.verdicts if v.check == "step-defect")
+    assert ("; of 25 pieces of the run 16 fail" in step.why) == (fault == "stands still"), step.why
+    assert ("pieces of the run" in step.why) == (fault == "stands still")
 
 
 @pytest.mark.usefixtures("small")

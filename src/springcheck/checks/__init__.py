@@ -233,11 +233,15 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
         verdict = max(judged, key=_badness)
         sees = Limits.least(one.sees for one in judged)
         # where it fails first is what is looked for, and how badly at the worst
-        failed = next((one for one in judged if one.passed is False), verdict)
+        failed = [one for one in judged if one.passed is False]
+        why = (failed or [verdict])[0].why
+        if len(failed) > 1:
+            # frames that are off were counted in the first alone
+            why += f"; of {len(judged)} pieces of the run {len(failed)} fail"
         if verdict.unit == check.DECADES:
             # the worst of several is as bad as this so many times as often
             verdict = replace(verdict, value=verdict.value - float(np.log10(len(judged))))
-        out.append(replace(verdict, why=failed.why, sees=sees))
+        out.append(replace(verdict, why=why, sees=sees))
     return out
 
 

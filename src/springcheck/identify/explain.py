@@ -126,7 +126,9 @@ def _left(columns: Floats, missing: Floats) -> float:
 def _hats(x: Floats, count: int) -> Floats:
     """Piecewise linear functions of x that add up to 1, (f, count)."""
     at = np.linspace(float(np.min(x)), float(np.max(x)), count)
-    return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
+    # of what stands still there are none
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
 
 
 def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
