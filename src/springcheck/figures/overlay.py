@@ -346,4 +346,6 @@ def labelled(chart: Chart) -> Chart:
 
 def share(x: float) -> str:
     """A part of a whole as it is read: in percent, or as a power of ten."""
-    return f"{100 * x:.2g} %" if 5e-4 <= x < 1 else f"{100 * x:.0f} %" if 1 <= x < 1000 else f"{x:.0e}"
+    return (
+        f"{100 * x:.2g} %" if 5e-4 <= x < 0.995 else f"{100 * x:.0f} %" if 0.995 <= x < 1000 else f"{x:.0e}"
+    )

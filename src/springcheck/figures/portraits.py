@@ -41,8 +41,15 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
     return Bank(
         name=what.replace(" ", "-"), title="Methods drawn", charts=charts, columns=min(2, len(charts)),
         heading=_heading(runs, f"{what}{_of(runs, shown)}", said),
-        size=(5.6, 5.2) if len(charts) == 1 else (4.9, 3.4),
+        size=_size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4))),
     )  # fmt: skip
+
+
+def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, float]:
+    """Of a panel [in]: of equal scales no higher than the highest motion is."""
+    spans = [(np.ptp(one.x.shown), np.ptp(one.y.shown)) for one in charts if one.x.shown and one.y.shown]
+    high = max((float(y / x) for x, y in spans), default=1.0)
+    return wide, min(most, wide * high + 0.8) if all(one.equal for one in charts) else most
 
 
 def _heading(runs: Runs, what: str, said: str) -> str:
@@ -299,7 +306,9 @@ def _position(
         x=Scale(name=with_unit("time t", unit), shown=xs.ends, factor=dt),
         y=Scale(name=f"|{name}|" if steep else name, log=steep, shown=ys.ends, factor=dy),
         curves=[*lines, *curves],
-        labels=overlay.at_ends(runs.first(curves), xs, ys) if alone and span[1] == _last(runs) else (),
+        labels=overlay.at_ends(runs.first(curves), xs, ys, height=overlay.NAME_HIGH * (1 if alone else 2))
+        if (alone or span[0] == 0) and span[1] == _last(runs)
+        else (),
         note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",
     )
 

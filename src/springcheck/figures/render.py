@@ -114,7 +114,9 @@ def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None
 
 def _heading(figure: Figure, text: str, width: int) -> None:
     """A title over all axes of a figure."""
-    figure.suptitle(textwrap.fill(text, width), x=0.02, ha="left", fontsize=10)
+    # a number keeps its unit, and a name its hyphen
+    kept = textwrap.fill(text.replace(" %", "\0%"), width, break_on_hyphens=False).replace("\0", " ")
+    figure.suptitle(kept, x=0.02, ha="left", fontsize=10)
 
 
 def _entries(curves: Sequence[Curve]) -> list[Line2D]:
@@ -185,7 +187,7 @@ def _chart(axes: Axes, chart: Chart, letters: int) -> None:
     _scale(axes, chart.x, "x", tiled=chart.tiles is not None)
     _scale(axes, chart.y, "y", tiled=chart.tiles is not None)
     if chart.equal:
-        axes.set_aspect("equal", adjustable="box")
+        axes.set_aspect("equal", adjustable="box", anchor="N")
     if chart.short:
         axes.set_title(textwrap.fill(chart.short, letters), fontsize=8.5, loc="left")
     if chart.note:
@@ -268,7 +270,10 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
     color = looks.look(rule.group).color if rule.group else color
     draw = axes.axvline if rule.axis == "x" else axes.axhline
     draw(rule.at, color=color, linestyle=line, linewidth=0.9, zorder=1.5)
-    how: dict[str, Any] = {"fontsize": 7.5, "color": color, "textcoords": "offset points"}
+    white = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+    how: dict[str, Any] = {
+        "fontsize": 7.5, "color": color, "textcoords": "offset points", "path_effects": white, "zorder": 4.5
+    }  # fmt: skip
     if rule.axis == "x":
         axes.annotate(rule.name, (rule.at, height), xycoords=("data", "axes fraction"), xytext=(3, -6), **how)
     else:
