@@ -29,6 +29,11 @@ def test_a_scheme_says_its_step_and_source(name: str) -> None:
     assert scheme.source in " ".join(" ".join(said).split())
 
 
+def test_a_title_that_the_census_prints_is_a_name_too() -> None:
+    for scheme in schemes.known().values():
+        assert next(iter(explain.lines(scheme.title))) == f"{scheme.name}: {scheme.title}"
+
+
 def test_the_steps_are_the_formulas() -> None:
     verlet = ["  p = p + 1/2 h F", "  q = q + h p/m", "  p = p + 1/2 h F"]
     assert list(explain.lines("velocity-verlet"))[1:4] == verlet

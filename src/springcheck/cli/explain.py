@@ -29,11 +29,13 @@ def lines(name: str) -> Iterator[str]:
     """What a name stands for, all of it.  SpringcheckError where it stands for nothing."""
     if name in _CHECKS:
         return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
+    known = schemes.known()
+    # by its title too, which is what tables print
+    for scheme in known.values():
+        if name in (scheme.name, scheme.title):
+            return scheme_lines(scheme)
     if ":" in name:
         return _method(name)
-    known = schemes.known()
-    if name in known:
-        return scheme_lines(known[name])
     # heavier to import, and rarely asked for
     from springcheck.identify.meanings import MEANINGS
 
