@@ -19,10 +19,10 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1190,
     ("checks",): 4306,
     ("identify",): 7825,
-    ("formats", "store"): 5008,
+    ("formats", "store"): 5054,
     ("studies",): 1603,
     ("studies/*",): 11028,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6432,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6440,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

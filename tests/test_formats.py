@@ -254,6 +254,19 @@ def json_of_rows(run: Trajectory) -> list[str]:
     return ["x.json"]
 
 
+def json_of_bare_rows(run: Trajectory) -> list[str]:
+    rows = zip(*rows_of(run).values(), strict=True)
+    Path("x.json").write_text(json.dumps([*rows]))
+    return ["x.json", "--columns", "t,q,p"]
+
+
+def json_of_pandas(run: Trajectory) -> list[str]:
+    """As `DataFrame.to_json` writes it."""
+    found = {name: {str(i): x for i, x in enumerate(values)} for name, values in rows_of(run).items()}
+    Path("x.json").write_text(json.dumps(found))
+    return ["x.json"]
+
+
 def excel(run: Trajectory) -> list[str]:
     pytest.importorskip("openpyxl")
     pytest.importorskip("pandas").DataFrame(rows_of(run)).to_excel("x.xlsx", index=False)
@@ -331,8 +344,8 @@ WRITERS: list[Writer] = [
     csv, with_index, printed_with_index, decimal_commas, blanks,
     six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
-    gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows, excel, parquet, feather, matlab,
-    matlab_7_3, octave, amber,
+    gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows,
+    json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave, amber,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
     csv, blanks, npz, in_space, dump, trr, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
@@ -538,6 +551,9 @@ HARMFUL = {
     "x.feather": "ARROW1" + "\xff" * 99,
     "x.mat": "MATLAB 5.0 MAT-file" + " " * 105 + "\0\x01IM" + "\x0f\0\0\0\xff\xff\xff\x7f" * 9,
     "x.gz": "\x1f\x8b\x08\0nothing",
+    "latin-1.csv": "t,q,p # \xe5\n0,1,2\n",
+    "empty.csv": ",\n" * 2_000_000,
+    "one.csv": "1\n" * 20_000_000,
 }
 
 
@@ -548,6 +564,15 @@ def test_a_file_made_to_do_harm_is_one_line() -> None:
     for name, line in zip(HARMFUL, lines, strict=True):
         assert line.startswith(f"springcheck: {name}")
         assert len(line) < 500
+    assert "no text in UTF-8" in lines[-3]
+    assert "no row of numbers so far" in lines[-2]
+
+
+def test_datasets_by_their_names_that_cannot_be_read_are_not_called_missing() -> None:
+    with h5py.File("x.h5", "w") as file:
+        for name in "tqp":
+            file.create_dataset(name, (1 << 30,), "f8", chunks=(1 << 20,))
+    assert "/p claims 8589934592 bytes, more than the file holds" in one_line("x.h5")
 
 
 def answered(*files: str) -> list[str]:

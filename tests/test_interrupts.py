@@ -367,6 +367,21 @@ def test_a_command_ends_with_its_grandchildren_whatever_signal_comes(
     assert interrupting._left(process.pid) == 0
 
 
+@posix
+def test_a_signal_is_heard_after_a_library_has_taken_it_in_c() -> None:
+    """UCX, which MPI loads, prints its state at SIGHUP from then on, and so nothing ended."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(body="""import ctypes, os, signal, time
+    from springcheck.engines import foreign
+    with foreign("x", "x"):
+        ctypes.CDLL(None).signal(signal.SIGHUP, ctypes.cast(1, ctypes.c_void_p))
+    os.kill(os.getpid(), signal.SIGHUP)
+    time.sleep(5)""")],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "springcheck: interrupted\n")
+
+
 SLOW_DISK = """interrupts.GRACE = 0.1
     import ctypes, os, signal, threading
     from springcheck import driver, store

@@ -157,9 +157,17 @@ _PAGE = 4096
 
 
 def calling(name: str) -> None:
-    """Code of others of this name is called from here on; "" for none."""
+    """Code of others of this name is called from here on; "" for none.
+
+    Where it has put a handler in C in place of ours, as UCX below MPI does for SIGHUP, ours is back.
+    """
     if _State.board is not None:
         _State.board[2:_PAGE] = name.encode("utf-8", "replace")[: _PAGE - 3].ljust(_PAGE - 2, b"\0")
+    for number in (getattr(signal, one, None) for one in SIGNALS if not name):
+        # what Python knows of a signal is not what C has made of it; threads may set none
+        if number is not None and signal.getsignal(number) is _raise:
+            with contextlib.suppress(ValueError):
+                signal.signal(number, _raise)
 
 
 def ended_by(*names: str) -> str:

@@ -92,7 +92,7 @@ FORMATS: tuple[Format, ...] = (
     ),
     Format(
         name="JSON",
-        recognise=lambda head, path: re.match(rb"\s*(\{|\[\s*\{)", head) is not None,
+        recognise=lambda head, path: re.match(rb"\s*(\{|\[\s*[\[{])", head) is not None,
         read=lambda path, columns, step: libraries.read_json(path, columns),
         library=True,
     ),
@@ -208,7 +208,9 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
             return found.read(path, columns, step)
         return _apart(found, path, columns, step)
     except (UnicodeDecodeError, gzip.BadGzipFile, EOFError) as error:
-        raise StoreError(f"{path}: is of no format that is known here; {KNOWN}") from error
+        raise StoreError(
+            f"{path}: is of no format that is known here, and no text in UTF-8; {KNOWN}"
+        ) from error
 
 
 def _apart(found: Format, path: Path, columns: list[str], step: float | None) -> States:

@@ -20,7 +20,7 @@ from springcheck.errors import StoreError, plain
 from springcheck.formats.columns import States
 from springcheck.formats.lines import MOST_NUMBERS
 from springcheck.formats.molecular import of_frames, times
-from springcheck.formats.numbers import states_of
+from springcheck.formats.numbers import of_table, states_of
 from springcheck.formats.tables import roundoff
 
 MOST_FRAMES = 1 << 20
@@ -134,17 +134,25 @@ def read_mat(path: Path, columns: list[str]) -> States:
 
 
 def read_json(path: Path, columns: list[str]) -> States:
-    """An object of lists by name, or a list of objects, one for each row."""
+    """Lists by name, or their values by row as pandas writes them; or a list of rows, named or not."""
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
     with _library(path, "msgspec", "msgspec"):
         found = msgspec.json.decode(path.read_bytes())
     if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
         found = {name: [row.get(name) for row in found] for name in found[0]}
+    if isinstance(found, list):
+        try:
+            rows = np.asarray(found, np.float64)
+        except (ValueError, TypeError):
+            rows = np.empty(0)
+        if rows.ndim == 2 and rows.size:
+            return of_table(path, rows, columns)
     if not isinstance(found, dict):
-        raise StoreError(f"{path}: neither an object of lists nor a list of objects")
+        raise StoreError(f"{path}: no lists by name, and no list of rows of as many numbers each")
     arrays = {}
-    for name, values in found.items():
+    for name, column in found.items():
+        values = [*column.values()] if isinstance(column, dict) else column
         if isinstance(values, list):
             try:
                 arrays[str(name)] = np.asarray(values, np.float64)

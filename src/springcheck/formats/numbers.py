@@ -102,6 +102,11 @@ def read_npy(path: Path, names: Sequence[str]) -> States:
         return split(path, columns, _roundoff([found[name] for name in found.dtype.names]))
     if found.ndim != 2 or not np.issubdtype(found.dtype, np.number) or np.iscomplexobj(found):
         raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
+    return of_table(path, found, names)
+
+
+def of_table(path: Path, found: Any, names: Sequence[str]) -> States:
+    """The states in the columns (f, c) of an array, which have no names but these."""
     if not names:
         raise StoreError(f"{path}: its {found.shape[1]} columns have no names; give them, as --columns t,q,v")
     return split(path, named(path, np.asarray(found, np.float64), names), _roundoff([found]))

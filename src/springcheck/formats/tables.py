@@ -15,6 +15,8 @@ from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
 """Rows whose digits are looked at."""
+LONGEST_HEAD = 1 << 20
+"""Lines before the first row of numbers."""
 
 
 def read_table(path: Path, names: Sequence[str]) -> States:
@@ -25,6 +27,14 @@ def read_table(path: Path, names: Sequence[str]) -> States:
     width = 0
     with Lines(path) as lines:
         for line in lines:
+            if len(first) == SHOWN and width > 1 and (row := _plain(line)) and len(row) == width:
+                lines.count(width)
+                numbers.extend(row)
+                continue
+            if not width and lines.number > LONGEST_HEAD:
+                raise lines.wrong("no row of numbers so far")
+            if width == 1 and len(first) == SHOWN:
+                break  # the message is the same, however many follow
             cells = _cells(line)
             if not cells or (width and line.lstrip().startswith("#")):
                 continue
@@ -72,6 +82,16 @@ def _cells(line: str) -> list[str]:
     while parts and not parts[-1]:
         parts.pop()
     return parts
+
+
+def _plain(line: str) -> list[float] | None:
+    """The numbers of a row that needs no more than `float`, which most do: some four times as fast."""
+    if ";" in line or "\t" in line:
+        return None
+    try:
+        return [*map(float, line.split("," if "," in line else None))]
+    except ValueError:
+        return None
 
 
 def _numbers(cells: Iterable[str]) -> list[float] | None:

@@ -108,16 +108,27 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
-    """The same one by one, in this process: together no more than one trajectory may have."""
+    """The same one by one, in this process: together no more than one trajectory may have.
+
+    Raises StoreError where none of those wanted can be read.
+    """
     left = MOST_NUMBERS
+    refused: StoreError | None = None
     with access.for_reading(path) as file:
         for place in _places(file, "", set()):
             if wanted(place):
-                with contextlib.suppress(StoreError):
+                try:
                     dataset = _numbers(path, file, place)
-                    if dataset.ndim <= 3 and dataset.size <= left:
+                    if dataset.size > left:
+                        raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers, with those in {place}")
+                    if dataset.ndim <= 3:
+                        values = np.asarray(dataset[()])
                         left -= dataset.size
-                        yield place, np.asarray(dataset[()])
+                        yield place, values
+                except StoreError as error:
+                    refused = refused or error
+        if refused and left == MOST_NUMBERS:
+            raise refused
 
 
 def _places(group: Any, before: str, seen: set[int], depth: int = 0) -> Iterator[str]:
