@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
-from springcheck import store
+from springcheck import engines, schemes, store
+from springcheck.errors import SpringcheckError
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Result, Study
@@ -16,9 +18,19 @@ from springcheck.text.wording import ordinal
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
     """The studies of a store, each with its result.  StoreError where one of them cannot be read."""
+    learn(summary)
     for study in STUDIES:
         if study.held(summary):
             yield study, study.stored(summary.path)
+
+
+def learn(summary: store.Summary) -> None:
+    """Make the schemes known that engines of these runs bring, where the engines are here."""
+    for run in summary.runs:
+        name = run.label.partition(":")[0]
+        if run.parameters.get("scheme") not in schemes.known() and name in engines.names():
+            with suppress(SpringcheckError):
+                engines.engine(name)
 
 
 def lines(summary: store.Summary, options: Namespace) -> Lines:

@@ -207,7 +207,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
-    bath = "every method draws noise of its own; the first periods"
+    bath = "every method draws noise of its own; a few periods"
     off = _off(runs, shown[0]) if runs.scene.bath is None else bath
     return Bank(
         name="position", title="Methods drawn", charts=charts, columns=len(spans),

@@ -92,7 +92,7 @@ class Chart {
   draw() {
     const { spec } = this, wordy = (scale) => (scale.named ? Math.max(...scale.values.map((v) => v.length)) : 0);
     // names are written in full: at the left, and upwards below
-    const L = 62 + 6.4 * Math.max(0, wordy(spec.y) - 5), R = 12, T = 12, B = 46 + 7.4 * Math.max(0, wordy(spec.x) - 2);
+    const L = 62 + 6.8 * Math.max(0, wordy(spec.y) - 5), R = 12, T = 12, B = 46 + 7.4 * Math.max(0, wordy(spec.x) - 2);
     const W = (this.W = Math.max(280, this.box.clientWidth || 440));
     const tall = spec.y.named ? spec.y.values.length * 14 + T + B : Math.min(420, Math.max(260, Math.round(W * 0.72)));
     const H = (this.H = tall);
@@ -138,7 +138,8 @@ class Chart {
     this.frame = element("rect", { class: "drag", width: 0, height: 0 });
     inside.append(this.ring, this.frame);
     root.append(inside, element("rect", { class: "frame", ...box }));
-    root.append(element("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, spec.x.name));
+    // a long name stays inside
+    root.append(element("text", { x: Math.min((L + W - R) / 2, W - 3.6 * spec.x.name.length), y: H - 8, "text-anchor": "middle" }, spec.x.name));
     root.append(element("text", { transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, "text-anchor": "middle" }, spec.y.name));
     this.box.replaceChildren(root);
     const names = spec.tiles ? "" : ` Shown: ${this.seen().map((curve) => curve.name).join(", ") || "nothing"}.`;

@@ -14,7 +14,7 @@ import numpy as np
 from springcheck import checks, schemes, store
 from springcheck.checks import compare
 from springcheck.checks.compare import EXACT, Same
-from springcheck.cli import explain
+from springcheck.cli import explain, inspect
 from springcheck.cli.page.sections import Section, sections
 from springcheck.errors import SpringcheckError
 from springcheck.figures.charts import Bank, numbers
@@ -142,6 +142,7 @@ def gather(path: Path) -> Content:
     most = max(FEWEST_SHOWN, NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
     kept = bool(summary.runs) and path.is_file()
+    inspect.learn(summary)
     verdicts = store.verdicts(path) if kept else ()
     comparison = store.comparison(path) if kept else None
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
