@@ -19,10 +19,10 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1190,
     ("checks",): 4306,
     ("identify",): 7825,
-    ("formats", "store"): 5054,
+    ("formats", "store"): 5058,
     ("studies",): 1603,
     ("studies/*",): 11028,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6453,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6459,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

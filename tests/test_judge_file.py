@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +86,17 @@ def test_what_is_no_number_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "LinAlgError" not in said
+
+
+@pytest.mark.parametrize("label", ["openmm:verlet", "openmm:verlet@OpenCL-single"])
+def test_a_store_is_judged_by_the_arithmetic_that_its_run_declared(
+    tmp_path: Path, label: str, need: Callable[[str], None]
+) -> None:
+    need(label)
+    store = tmp_path / "run.h5"
+    assert main(["run", "spring", "--method", label, "-o", str(store), "--quiet"]) == 0
+    found = file.judge(store, scene="spring", scheme="velocity-verlet", trajectory=label)
+    assert found.status == 0, found
+    assert any("rebuilt from positions" in note for note in found.notes)
+    other = file.judge(store, scene="spring", scheme="semi-implicit-euler", trajectory=label)
+    assert other.status == 1, "what an engine declares excuses no other scheme"

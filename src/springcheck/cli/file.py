@@ -184,7 +184,10 @@ def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     for run in () if foreign else store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run
         piece = next(store.windows(path, run.label, run.frames + 1))
-        found[run.label] = States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None)
+        found[run.label] = States(
+            t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, arithmetic=piece.arithmetic,
+            rebuilds_velocity=piece.rebuilds_velocity,
+        )  # fmt: skip
     if not foreign:
         return found
     if columns or not store.is_h5md(path):
@@ -264,11 +267,14 @@ def as_trajectory(
         notes.append(f"ends after {steps:,} steps, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
+    if states.rebuilds_velocity:
+        notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
     judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
-        arithmetic=Arithmetic(name=AS_WRITTEN, state=states.roundoff),
+        arithmetic=states.arithmetic or Arithmetic(name=AS_WRITTEN, state=states.roundoff),
+        rebuilds_velocity=states.rebuilds_velocity,
         # a line that is no axis is rounded in each of its coordinates
         off_axis=beside if beside > 8 * states.roundoff else None,
     )  # fmt: skip
