@@ -22,6 +22,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.studies.run.heat import Heat
 from springcheck.thermal import THERMOSTATS, chance
 
 pytestmark = pytest.mark.slow
@@ -275,3 +276,16 @@ def test_splittings_of_openmmtools_are_those_of_their_letters() -> None:
         verdicts = springcheck.judge(scene, run) + checks.judge_seeds(scene, f"openmmtools:{name}", 3)
         assert [f"{name} {v.check}: {v.why}" for v in verdicts if v.passed is False] == []
         assert sum(v.passed is True for v in verdicts) >= 9
+
+
+def test_the_error_of_a_temperature_is_that_of_the_frames_it_is_of() -> None:
+    scene = replace(scenefile.load_scene("bath-spring"), steps=2000)
+    run = driver.run(scene, "own:baoab")
+    thin = replace(run, t=run.t[::10], q=run.q[::10], p=run.p[::10], every=10 * run.every)
+    near = replace(run, t=run.t[-len(thin.t) :], q=run.q[-len(thin.t) :], p=run.p[-len(thin.t) :])
+    errors = []
+    for some in (thin, near):
+        heat = Heat(scene)
+        heat.add(some)
+        errors.append(heat.line(run.label).configurational_error)
+    assert errors[0] < errors[1] / 1.5, "as many frames further apart tell more"

@@ -175,7 +175,8 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     elif not options.quiet:
         output.show(study.lines(found, options))
     elif found.status == 2 and not getattr(found, "broke", {}):
-        print("springcheck: nothing was measured; without --quiet the report says why", file=sys.stderr)
+        why = "nothing was measured, or not all could be judged; without --quiet the report says what"
+        print(f"springcheck: {why}", file=sys.stderr)
     for why in getattr(found, "broke", {}).values():
         print(f"springcheck: {plain(why)}; mend it, and give the command again", file=sys.stderr)
     return status

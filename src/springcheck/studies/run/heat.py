@@ -23,6 +23,7 @@ class Heat:
         self._sums = np.zeros((2, scene.n))
         self._frames = 0
         self._from = 0
+        self._every = scene.every
         self._scheme = ""
 
     def add(self, piece: Trajectory) -> None:
@@ -48,7 +49,7 @@ class Heat:
         self._frames += len(some)
 
     def _begin(self, piece: Trajectory) -> None:
-        scene, self._scheme = self._scene, piece.scheme
+        scene, self._scheme, self._every = self._scene, piece.scheme, piece.every
         assert scene.bath is not None
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
@@ -70,7 +71,7 @@ class Heat:
                 law, errors = (nan, nan), np.stack([nan, nan])
             else:
                 law = self._law.configurational, self._law.kinetic
-                several = self._law.error_of_variances(max(self._frames, 2), self._scene.every)
+                several = self._law.error_of_variances(max(self._frames, 2), self._every)
                 errors = several.T * np.stack(law)
         n = len(nan)
         error = np.sqrt(np.sum(errors**2, axis=1)) / n
