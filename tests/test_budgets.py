@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
     ("engines",): 2574,
     ("driver", "conformance", "doors"): 1190,
-    ("checks",): 4306,
+    ("checks",): 4308,
     ("identify",): 7825,
     ("formats", "store"): 5058,
     ("studies",): 1603,

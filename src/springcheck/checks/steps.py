@@ -141,7 +141,9 @@ STILL = "standing still would pass: rounding may be as large as"
 def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
     """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
     if case.ahead is not None:
-        left = np.max(_left(case, to_q - case.ahead.end[0], to_p - case.ahead.end[1]), axis=1)
+        with np.errstate(all="ignore"):
+            off = to_q - case.ahead.end[0], to_p - case.ahead.end[1]
+        left = np.max(_left(case, *off), axis=1)
         return np.asarray(np.maximum(_off(case.ahead, to_q, to_p), left))
     q, p = case.next_states
     with np.errstate(all="ignore"):
