@@ -13,10 +13,13 @@ import springcheck
 from springcheck import checks, schemes
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import clean, steppers
+
+EXTENDED = pytest.mark.skipif(not WIDE, reason="so sharp are references of more digits than a double")
 
 
 def plain(scene: Scene, name: str, moved: Scene | None = None) -> Trajectory:
@@ -248,6 +251,7 @@ def lattice(n: int, every: int, *, link: float = 1.3, light: float = 1.0) -> Sce
     return replace(made, quantities=("q", "p"))
 
 
+@EXTENDED
 @pytest.mark.parametrize("every", [2, 50])
 def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_vectors(every: int) -> None:
     scene = lattice(33, every)
@@ -262,6 +266,7 @@ def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_
     assert exact < many < 4 * exact
 
 
+@EXTENDED
 @pytest.mark.parametrize("name", ["velocity-verlet", "rk4", "implicit-midpoint"])
 @pytest.mark.parametrize("every", [20, 700])
 def test_a_step_is_judged_as_sharply_between_frames_far_apart_as_by_itself(name: str, every: int) -> None:
