@@ -177,6 +177,14 @@ def states_in(
     return found[label]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recorded(States):
+    """States of a store of ours, which says how the engine rounds."""
+
+    arithmetic: Arithmetic
+    rebuilds_velocity: bool
+
+
 def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
     foreign = bool(columns) or store.is_foreign(path)
@@ -184,7 +192,7 @@ def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     for run in () if foreign else store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run
         piece = next(store.windows(path, run.label, run.frames + 1))
-        found[run.label] = States(
+        found[run.label] = Recorded(
             t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, arithmetic=piece.arithmetic,
             rebuilds_velocity=piece.rebuilds_velocity,
         )  # fmt: skip
@@ -267,14 +275,15 @@ def as_trajectory(
         notes.append(f"ends after {steps:,} steps, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
-    if states.rebuilds_velocity:
+    ours = states if isinstance(states, Recorded) else None
+    if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
     judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
-        arithmetic=states.arithmetic or Arithmetic(name=AS_WRITTEN, state=states.roundoff),
-        rebuilds_velocity=states.rebuilds_velocity,
+        arithmetic=ours.arithmetic if ours else Arithmetic(name=AS_WRITTEN, state=states.roundoff),
+        rebuilds_velocity=ours is not None and ours.rebuilds_velocity,
         # a line that is no axis is rounded in each of its coordinates
         off_axis=beside if beside > 8 * states.roundoff else None,
     )  # fmt: skip

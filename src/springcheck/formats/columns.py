@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from springcheck.errors import StoreError, plain
-from springcheck.physics.arrays import Arithmetic
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, Floats]
@@ -48,9 +47,6 @@ class States:
     mass: Floats | None
     roundoff: float = 2.0**-53
     """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
-    arithmetic: Arithmetic | None = None
-    """How the engine rounds, where the file says so: a store of ours does."""
-    rebuilds_velocity: bool = False
 
 
 def kind(name: str) -> Kind | None:
