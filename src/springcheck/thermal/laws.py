@@ -98,16 +98,37 @@ class Law:
         """
         n, d = self._state[0][1].shape[:2]
         scale = self._scale
-        total, right = np.zeros((n, d * d, d * d)), np.zeros((n, d * d))
-        for chance, A, G in self._state:
-            a, g = A * scale[:, None, :] / scale[:, :, None], G / scale[:, :, None]
-            total += chance * np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
+        right = np.zeros((n, d * d))
+        for chance, _, G in self._state:
+            g = G / scale[:, :, None]
             right += chance * np.einsum("nij,nkj->nik", g, g).reshape(n, d * d)
         out = np.full((n, d, d), np.inf)
-        radius = np.max(np.abs(np.linalg.eigvals(total)), axis=-1)
-        for i in np.flatnonzero(radius < 1):
-            out[i] = np.linalg.solve(np.eye(d * d) - total[i], right[i]).reshape(d, d)
+        for i in np.flatnonzero(self.growth < 1):
+            out[i] = np.linalg.solve(np.eye(d * d) - self._moments[i], right[i]).reshape(d, d)
         return np.asarray(out * scale[:, :, None] * scale[:, None, :])
+
+    @cached_property
+    def _moments(self) -> Floats:
+        """What a step makes of second moments of (q, p, carried draws) but for its noise (n, d d, d d)."""
+        n, d = self._state[0][1].shape[:2]
+        scale, total = self._scale, np.zeros((n, d * d, d * d))
+        for chance, A, _ in self._state:
+            a = A * scale[:, None, :] / scale[:, :, None]
+            total += chance * np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
+        return total
+
+    @property
+    def growth(self) -> Floats:
+        """Spectral radius of the map of second moments (n,), bounded below 1; infinite beyond all numbers."""
+        out = np.full(len(self._moments), np.inf)
+        finite = np.isfinite(self._moments).all(axis=(1, 2))
+        out[finite] = np.max(np.abs(np.linalg.eigvals(self._moments[finite])), axis=-1)
+        return out
+
+    @property
+    def slowest(self) -> float:
+        """Spectral radius of the mean map: what a step leaves of the slowest part of the motion."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.A.astype(np.float64)))))
 
     @property
     def _scale(self) -> Floats:

@@ -57,8 +57,8 @@ class Heat:
                 scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n), k=scene.system.modes.w2,
                 rate=scene.bath.friction, thermal=scene.thermal,
             )  # fmt: skip
-            radius = float(np.max(np.abs(np.linalg.eigvals(self._law.A.astype(np.float64)))))
-            self._from = round(SETTLED / -np.log(radius)) if 0 < radius < 1 else 0
+            left = self._law.slowest
+            self._from = round(SETTLED / -np.log(left)) if 0 < left < 1 else 0
 
     def line(self, method: str) -> Heated:
         """What was found."""

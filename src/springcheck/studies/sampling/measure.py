@@ -104,8 +104,7 @@ def measured(label: Label) -> Sampled:
 
 def _memory(law: Law) -> float:
     """What the slowest part of the motion decays by in a step, as its logarithm."""
-    radius = float(np.max(np.abs(np.linalg.eigvals(law.A.astype(np.float64)))))
-    return max(-np.log(radius), 0.02) if radius > 0 else 1.0
+    return max(-np.log(law.slowest), 0.02) if law.slowest > 0 else 1.0
 
 
 def _off(law: Law | None, frames: int) -> float:
@@ -120,8 +119,7 @@ def _off(law: Law | None, frames: int) -> float:
 def _radius(scheme: str, friction: float, turn: float) -> float:
     """Spectral radius of the law's map of second moments."""
     with np.errstate(all="ignore"):
-        total = sum(c * np.kron(A[0], A[0]) for c, A, _ in law_at(scheme, turn, friction)._state)
-    return float(np.max(np.abs(np.linalg.eigvals(total)))) if np.isfinite(total).all() else np.inf
+        return float(law_at(scheme, turn, friction).growth[0])
 
 
 def _radius_of_engine(label: Label, friction: float, turn: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 
 import numpy as np
 
@@ -50,8 +51,8 @@ def banks(study: Sampling) -> list[Bank]:
             ],
         )
         for said, cost in (
-            ("force calls a spring", _force_calls),
-            ("seconds a spring, of 1,000 side by side", _seconds),
+            ("force calls a spring", attrgetter("force_calls")),
+            ("seconds a spring, of 1,000 side by side", attrgetter("seconds")),
         )
     ]  # fmt: skip
     shown = [x for x in study.methods if np.any(np.isfinite(x.limit_law) & (x.limit_law > 0))]
@@ -83,14 +84,6 @@ def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
     """One line for each scheme that has a law."""
     found = dict.fromkeys(one.scheme for one in methods if np.any(np.isfinite(one.configurational_law)))
     return [Curve(name=title(name), group=name, x=FINE, y=curve(name, FINE, of)) for name in found]
-
-
-def _force_calls(x: Sampled) -> float:
-    return x.force_calls
-
-
-def _seconds(x: Sampled) -> float:
-    return x.seconds
 
 
 def _marks(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> Curve:
