@@ -36,7 +36,6 @@ from springcheck.physics.arrays import WIDE, Extended, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import VanDerPol
 
 JOINED = 32
 """Joined particles up to which tangent maps are carried as matrices (2n, 2n)."""
@@ -266,15 +265,11 @@ def variational(system: System[Scene]) -> Callable[[Iterable[Term]], Force]:
     def of(terms: Iterable[Term]) -> Force:
         terms = tuple(terms)
         whole = system.force_of(terms)
-        # friction, and a magnetic field, are linear in p, and so their own change, wherever they are
-        brakes = system.force_of(
-            term
-            for term in terms
-            if term.kind in ("friction", "magnetic") and not isinstance(term, VanDerPol)
-        )
+        # friction, and a magnetic field, are linear in p, and so their own change where the motion is
+        brakes = system.force_of(term for term in terms if term.kind in ("friction", "magnetic"))
 
         def force(q: Reals, p: Reals) -> Reals:
-            change = brakes(q[1:], p[1:])
+            change = brakes(np.broadcast_to(q[0], q[1:].shape), p[1:])
             for term in terms:
                 term.add_change(q[0], p[0] / system.m, q[1:], p[1:] / system.m, change)
             return np.concatenate([whole(q[0], p[0])[None], change])

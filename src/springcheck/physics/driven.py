@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, Origin, Term
+from springcheck.physics.term import Column, Origin, Term, WithoutPotential
 
 CLOCK = 2.0**-500
 """Mass of the clock [M], whose momentum is the same number: it moves by 1 a unit of time, and its energy is
@@ -57,7 +57,7 @@ _TURNS = (Column("frequency", "frequency", single=False), Column("phase", "phase
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Drive(_Driven):
+class Drive(WithoutPotential, _Driven):
     """Driving forces on particles i: amplitude cos(frequency t + phase).  amplitude [M L/T2].
 
     They have no energy: what a drive does to the energy is its work.
@@ -67,14 +67,6 @@ class Drive(_Driven):
     formula: ClassVar[str] = "force amplitude cos(frequency t + phase)"
     columns: ClassVar[tuple[Column, ...]] = (Column("amplitude", "amplitude", single=False), *_TURNS)
     amplitude: Floats
-
-    @staticmethod
-    def potential(u: Reals, *_: Floats) -> Reals:
-        return np.zeros_like(u)
-
-    @staticmethod
-    def second(u: Reals, amplitude: Floats, *_: Floats) -> Reals:
-        return np.zeros_like(amplitude)
 
     def pull(self, q: Reals) -> Reals:
         return -self.amplitude * self.wave(q)

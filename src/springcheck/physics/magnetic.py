@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, Origin, Term
+from springcheck.physics.term import Column, Origin, WithoutPotential
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Magnetic(Term):
+class Magnetic(WithoutPotential):
     """A force strength (v_b, -v_a) in the plane of the coordinates a and b of one particle.
 
     strength [M/T]: charge times field, along z where a is x and b is y; for Coriolis' force 2 m Omega.  It
@@ -27,14 +27,6 @@ class Magnetic(Term):
     a: Integers
     b: Integers
     strength: Floats
-
-    @staticmethod
-    def potential(u: Reals, strength: Floats) -> Reals:
-        return np.zeros_like(u)
-
-    @staticmethod
-    def second(u: Reals, strength: Floats) -> Reals:
-        return np.zeros_like(strength)
 
     def pull(self, q: Reals) -> Reals:
         return np.zeros((*q.shape[:-1], len(self)), q.dtype)

@@ -253,6 +253,18 @@ class Term:
         return replace(record, **values)  # type: ignore[no-any-return]
 
 
+class WithoutPotential(Term):
+    """A term whose rows have no energy: friction, a field, a driving force."""
+
+    @staticmethod
+    def potential(u: Reals, *_: Floats) -> Reals:
+        return np.zeros_like(u)
+
+    @staticmethod
+    def second(u: Reals, strength: Floats, *_: Floats) -> Reals:
+        return np.zeros_like(strength)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnParticles(Term):
     """A term on single particles i (s,): u = q[i] - at."""

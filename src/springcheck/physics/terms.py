@@ -17,7 +17,7 @@ from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.rods import Rod, WallRod
-from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term
+from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term, WithoutPotential
 from springcheck.physics.vanderpol import VanDerPol
 
 __all__ = [
@@ -218,7 +218,7 @@ class Morse(OnPairs):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Damping(Term):
+class Damping(WithoutPotential):
     """Friction of particles i: force -c v, v their velocities.  c >= 0 [M/T]."""
 
     key: ClassVar[str] = "damping"
@@ -231,17 +231,9 @@ class Damping(Term):
     c: Floats
 
     @staticmethod
-    def potential(u: Reals, c: Floats) -> Reals:
-        return np.zeros_like(u)
-
-    @staticmethod
     def slope(u: Reals, c: Floats) -> Reals:
         """Of the velocity u, not of an elongation."""
         return c * u
-
-    @staticmethod
-    def second(u: Reals, c: Floats) -> Reals:
-        return np.zeros_like(c)
 
     @staticmethod
     def rounding(size: Reals, u: Reals, c: Floats) -> Reals:

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, Origin, Term
+from springcheck.physics.term import Column, Origin, WithoutPotential
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VanDerPol(Term):
+class VanDerPol(WithoutPotential):
     """Friction of particles i that their place decides: force c (1 - ((q - at)/width)**2) v.
 
     c [M/T], width and at [L].  On a spring k, m q'' = c (1 - x**2) q' - k q has mu = c/sqrt(k m).
@@ -32,14 +32,6 @@ class VanDerPol(Term):
     c: Floats
     width: Floats
     at: Floats
-
-    @staticmethod
-    def potential(u: Reals, *_: Floats) -> Reals:
-        return np.zeros_like(u)
-
-    @staticmethod
-    def second(u: Reals, c: Floats, *_: Floats) -> Reals:
-        return np.zeros_like(c)
 
     def resistance(self, q: Reals) -> tuple[Reals, Reals]:
         """What the velocity is multiplied by to give the brake, and its derivative by q: (..., s) each
@@ -61,9 +53,8 @@ class VanDerPol(Term):
         self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
 
     def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
-        brake, bend = self.resistance(q)
-        v, dq, dv = (np.take(x, self.i, axis=-1) for x in (v, dq, dv))
-        self.add_pull(brake * dv + bend * v * dq, out)
+        v, dq = (np.take(x, self.i, axis=-1) for x in (v, dq))
+        self.add_pull(self.resistance(q)[1] * v * dq, out)
 
     def add_rounding(
         self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
