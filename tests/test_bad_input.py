@@ -228,8 +228,9 @@ def test_figures_are_not_drawn_into_a_file(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize("blocks", [1, 3, 40])
 def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
     resource = pytest.importorskip("resource")
+    # without -B Python keeps half of a module's bytecode under this limit, and later commands die of it
     done = subprocess.run(
-        [sys.executable, "-m", "springcheck", "run", "spring", "--method", "own:*", "-o", "here.h5"],
+        [sys.executable, "-B", "-m", "springcheck", "run", "spring", "--method", "own:*", "-o", "here.h5"],
         env=os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * blocks, 1024 * blocks)),
         capture_output=True,

@@ -252,7 +252,8 @@ except StoreError as error:
 def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path: Path, size: int) -> None:
     path, s = tmp_path / "s.h5", scene(steps=4000)
     ran = subprocess.run(
-        [sys.executable, "-c", FULL, str(path), str(size), str(Path(__file__).parent)],
+        # -B: no half of a module's bytecode may be left under this limit
+        [sys.executable, "-B", "-c", FULL, str(path), str(size), str(Path(__file__).parent)],
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     *stored, last = ran.stdout.splitlines()
