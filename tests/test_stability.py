@@ -18,10 +18,12 @@ from rich.text import Text
 from springcheck import driver, engines, schemes
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
+from springcheck.studies.choose import LeftOut
 from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
+from springcheck.studies.text import left_out
 
 pytestmark = pytest.mark.slow
 
@@ -202,3 +204,12 @@ def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Ne
     need("own:respa8")
     study = stability.measure(scenes.load_scene("spring"), ["own:respa8", "own:velocity-verlet"])
     assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)
+
+
+def test_what_is_left_out_is_named_once() -> None:
+    reasons = {"own:rods": "own:rods: serves rods alone", "own:a": "no step", "own:b": "no step"}
+    said = left_out([LeftOut(method=method, reason=reason) for method, reason in reasons.items()])
+    assert [str(line) for line in said[1:]] == [
+        "Left out own:rods: serves rods alone",
+        "Left out own:a, own:b: no step",
+    ]

@@ -10,10 +10,10 @@ from springcheck.text.wording import count
 
 
 def left_out(left: Sequence[LeftOut]) -> Lines:
-    """One line for each reason."""
+    """One line for each reason, which names no method again."""
     reasons: dict[str, list[str]] = {}
     for one in left:
-        reasons.setdefault(one.reason, []).append(one.method)
+        reasons.setdefault(one.reason.removeprefix(f"{one.method}: "), []).append(one.method)
     said = [plain(f"Left out {', '.join(names)}: {why}") for why, names in reasons.items()]
     return [plain(), *said] if said else []
 
