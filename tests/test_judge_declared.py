@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks
+from springcheck import checks, store
 from springcheck.checks import compare
+from springcheck.cli import file
 from springcheck.errors import SpringcheckError
+from springcheck.identify import files
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory
+from springcheck.store.records import KEPT
 from springcheck.studies.faults import clean
 
 
@@ -83,6 +87,48 @@ def test_a_solver_that_stops_at_its_first_row_is_not_judged() -> None:
     assert checks.status(verdicts) == 2
     runs = {run.label: tired}
     assert compare.same_motions(scene, runs, compare.compare(scene, runs)) == []
+
+
+DECLARED: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "state": {"arithmetic": Arithmetic(name="single", state=2.0**-24)},
+    "force": {"arithmetic": Arithmetic(name="mixed", force=2.0**-24)},
+    "quantum": {"arithmetic": Arithmetic(name="fixed", quantum=2.0**-32)},
+    "overflow": {"arithmetic": Arithmetic(name="fixed", quantum=2.0**-32, overflow=1e-3)},
+    "parameters": {"arithmetic": Arithmetic(name="mixed", parameters="single")},
+    "excess": {"arithmetic": Arithmetic(excess=1e-7)},
+    "stale": {"arithmetic": Arithmetic(stale=1e-3)},
+    "lengths": {"arithmetic": Arithmetic(lengths=1e-8)},
+    "keeps_displacement": {"arithmetic": Arithmetic(keeps_displacement=True), "rebuilds_velocity": True},
+    "rebuilds_velocity": {"rebuilds_velocity": True},
+    "off_axis": {"off_axis": 1e-9},
+}
+
+
+def test_every_fact_of_an_arithmetic_is_stored() -> None:
+    every = {f"arithmetic.{one.name}" for one in fields(Arithmetic)}
+    assert every <= set(KEPT.values())
+    assert {one.name for one in fields(Arithmetic)} <= {*DECLARED, "name"}
+
+
+@pytest.mark.parametrize("fact", DECLARED)
+def test_a_store_is_judged_as_its_run_was_whatever_it_declares(tmp_path: Path, fact: str) -> None:
+    scene = uneven(quantities=("q", "p", "energy"))
+    # a kick that is off by what some of these facts excuse, so that it matters whether they are read
+    run = run_of(scene)
+    kicked = run.p.copy()
+    kicked[7] *= 1 + 1e-7
+    run = replace(run, p=kicked, **DECLARED[fact])
+    with store.open_new(tmp_path / "a.h5", "run") as journal:
+        journal.save(run, scene)
+        journal.commit(scene)
+    again = file.judge(tmp_path / "a.h5", scene=scene, scheme=run.scheme)
+    known = {v.check: v for v in again.verdicts}
+    for one in checks.explained(scene, run, checks.judge(scene, run), files.shown):
+        other = known[one.check]
+        assert (one.passed, one.why, repr(one.value), repr(one.bound), one.sees) == (
+            other.passed, other.why, repr(other.value), repr(other.bound), other.sees
+        ), one.check  # fmt: skip
 
 
 def many() -> Scene:

@@ -179,10 +179,9 @@ def states_in(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recorded(States):
-    """States of a store of ours, which says how the engine rounds."""
+    """States of a store of ours, which keeps what the engine declared."""
 
-    arithmetic: Arithmetic
-    rebuilds_velocity: bool
+    run: Trajectory
 
 
 def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
@@ -192,10 +191,7 @@ def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     for run in () if foreign else store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run
         piece = next(store.windows(path, run.label, run.frames + 1))
-        found[run.label] = Recorded(
-            t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, arithmetic=piece.arithmetic,
-            rebuilds_velocity=piece.rebuilds_velocity,
-        )  # fmt: skip
+        found[run.label] = Recorded(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, run=piece)
     if not foreign:
         return found
     if columns or not store.is_h5md(path):
@@ -275,18 +271,24 @@ def as_trajectory(
         notes.append(f"ends after {steps:,} steps, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
-    ours = states if isinstance(states, Recorded) else None
+    ours = states.run if isinstance(states, Recorded) else None
     if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
-    judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=("q", "p"))
+    energy = None if ours is None else ours.energy
+    kept = ("q", "p") if energy is None else ("q", "p", "energy")
+    judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=kept)
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
         arithmetic=ours.arithmetic if ours else Arithmetic(name=AS_WRITTEN, state=states.roundoff),
-        rebuilds_velocity=ours is not None and ours.rebuilds_velocity,
         # a line that is no axis is rounded in each of its coordinates
         off_axis=beside if beside > 8 * states.roundoff else None,
     )  # fmt: skip
+    if ours is not None:
+        run = replace(
+            run, energy=energy, rebuilds_velocity=ours.rebuilds_velocity, off_axis=ours.off_axis,
+            tolerance=ours.tolerance if ours.scheme == scheme else None, force_calls=ours.force_calls,
+        )  # fmt: skip
     return judged, run, tuple(notes)
 
 

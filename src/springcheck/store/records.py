@@ -39,6 +39,7 @@ KEPT = {
     "force_overflow": "arithmetic.overflow",
     "parameter_precision": "arithmetic.parameters",
     "force_excess": "arithmetic.excess",
+    "forces_kept_within": "arithmetic.stale",
     "rod_tolerance": "arithmetic.lengths",
     "keeps_displacement": "arithmetic.keeps_displacement",
     "rebuilds_velocity": "rebuilds_velocity",
@@ -79,6 +80,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     force_overflow: float = _DOUBLE.overflow
     parameter_precision: Literal["double", "single"] = _DOUBLE.parameters
     force_excess: float = _DOUBLE.excess
+    forces_kept_within: float = _DOUBLE.stale
     rod_tolerance: float = 0.0
     keeps_displacement: bool = False
     rebuilds_velocity: bool = False
