@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
 
 import house
-import springcheck
-
-HOME = Path(springcheck.__file__).parent
+from house import HOME, imports, modules, room
 
 ROWS = [
     "interrupts", "errors", "physics", "schemes", "thermal", "engines",
@@ -44,44 +40,25 @@ HOMES = {
 }
 
 
-def _modules() -> list[Path]:
-    return sorted(path for path in HOME.rglob("*.py") if path != HOME / "__init__.py")
-
-
-def _row(path: Path) -> str:
-    return path.relative_to(HOME).parts[0].removesuffix(".py")
-
-
-@cache
-def _imports(path: Path) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
-
-
-def test_every_module_has_a_row() -> None:
-    assert {_row(path) for path in _modules()} <= set(ROWS)
+def test_every_module_has_aroom() -> None:
+    assert {room(path) for path in modules()} <= set(ROWS)
 
 
 @pytest.mark.slow
 def test_a_module_imports_only_from_rows_above_it() -> None:
     wrong = []
-    for path in _modules():
-        for name in _imports(path):
+    for path in modules():
+        for name in imports(path):
             parts = name.split(".")
-            if parts[0] == "springcheck" and len(parts) > 1 and parts[1] != _row(path):
+            if parts[0] == "springcheck" and len(parts) > 1 and parts[1] != room(path):
                 assert parts[1] in ROWS, name
-                if ROWS.index(parts[1]) >= ROWS.index(_row(path)):
+                if ROWS.index(parts[1]) >= ROWS.index(room(path)):
                     wrong.append(f"{path.relative_to(HOME)} imports {name}, which is not above it")
     assert wrong == []
 
 
 def test_a_foreign_library_is_imported_only_where_it_belongs() -> None:
-    places = {path.relative_to(HOME).as_posix(): _imports(path) for path in _modules()}
+    places = {path.relative_to(HOME).as_posix(): imports(path) for path in modules()}
     libraries = {(place, name.split(".")[0]) for place, names in places.items() for name in names}
     assert [x for x in libraries if x[1] in HOMES and not x[0].startswith(HOMES[x[1]])] == []
 
@@ -122,7 +99,7 @@ def test_the_keeper_alone_of_the_studies_knows_the_store() -> None:
     uses = {
         path.relative_to(HOME).as_posix()
         for path in HOME.glob("studies/**/*.py")
-        if any(name.startswith("springcheck.store") for name in _imports(path))
+        if any(name.startswith("springcheck.store") for name in imports(path))
     }
     # study.py names a type of it for the reader
     assert uses <= {"studies/keeper.py", "studies/tables.py", "studies/study.py"}
@@ -132,7 +109,7 @@ def test_the_keeper_alone_of_the_studies_knows_the_store() -> None:
     "place", ["cli/__init__.py", "cli/commands.py", "cli/inspect.py", "cli/drawing.py", "plot.py"]
 )
 def test_no_study_is_named_outside_of_the_list(place: str) -> None:
-    named = {name for name in _imports(HOME / place) if name.startswith("springcheck.studies.")}
+    named = {name for name in imports(HOME / place) if name.startswith("springcheck.studies.")}
     for study in STUDIES:
         assert not any(name.startswith(f"springcheck.studies.{study}") for name in named), named
 
@@ -150,41 +127,5 @@ def test_no_test_imports_another() -> None:
     assert found == []
 
 
-def _within(path: Path) -> set[Path]:
-    """Modules of ours that a module imports anywhere in it, for their types too; of the package itself its
-    version alone."""
-    found = set()
-    for name in _imports(path):
-        place = HOME.parent.joinpath(*name.split("."))
-        for one in (place, place.parent):
-            files = [one.with_suffix(".py"), one / "__init__.py"]
-            there = [
-                file
-                for file in files
-                if file.is_file() and HOME in file.parents and file != HOME / "__init__.py"
-            ]
-            if there:
-                found.add(there[0])
-                break
-    return found - {path}
-
-
-def circles() -> list[set[str]]:
-    """Modules that import each other, directly or by others: the strongly connected parts of the picture."""
-    arrows = {path: _within(path) for path in _modules()}
-
-    def reached(start: Path) -> set[Path]:
-        found: set[Path] = set()
-        left = [start]
-        while left:
-            left += arrows[(one := left.pop())] - found
-            found |= arrows[one]
-        return found
-
-    beyond = {path: reached(path) for path in arrows}
-    parts = {frozenset(other for other in beyond[path] if path in beyond[other]) for path in arrows}
-    return [{path.relative_to(HOME).as_posix() for path in part} for part in parts if part]
-
-
 def test_no_modules_import_each_other() -> None:
-    assert circles() == []
+    assert house.circles() == []

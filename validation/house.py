@@ -8,21 +8,10 @@ system), the smallest of interleaved repetitions, with compiled modules in place
 * `run spring`, all of its methods, over a process that imports the libraries that these use, plus what the
   engines alone take to start, to run and to be read (`driver.bare`).
 
-Command: python validation/house.py [repeats]        (40 s for 5)
+Command: python validation/house.py [repeats]        (40 s for 5; on two idle cores)
 
-Printed on two idle cores:
-
-    lines 38407 in 254 modules, median 119.5
-    largest identify/search.py 396, identify/report.py 395, identify/explain.py 389, physics/system.py 385,
-      studies/run/measure.py 381
-    rooms 19, arrows 78, longest chain 9:
-      __main__ > cli > studies > doors > identify > formats > store > physics > errors
-    imports of numpy and h5py       185 ms
-    the smallest run                325 ms
-    imports of the libraries        798 ms
-    run spring                     1104 ms
-    its engines alone               149 ms
-    smallest run / imports 1.76; run spring / (imports + engines) 1.17
+It prints the lines of each room and the largest modules; rooms, arrows, longest chain and circles of modules;
+the CPU milliseconds and the two ratios.
 
 The speed of the own engine beside C is measured by kernel_speed.py.
 """
@@ -36,6 +25,8 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from collections import Counter
+from functools import cache
 from pathlib import Path
 
 from arguments import arguments
@@ -62,28 +53,34 @@ print(time.process_time() - began)
 """What all methods of the scene take without springcheck around them, after their imports."""
 
 
+def modules() -> list[Path]:
+    """Every module but the package itself."""
+    return sorted(path for path in HOME.rglob("*.py") if path != HOME / "__init__.py")
+
+
 def room(path: Path) -> str:
     """The room of a module."""
     return path.relative_to(HOME).parts[0].removesuffix(".py")
 
 
+@cache
+def imports(path: Path) -> set[str]:
+    """What a module imports anywhere in it, by full names."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
 def arrows() -> dict[str, set[str]]:
     """Each room, and those that it imports."""
     found: dict[str, set[str]] = {}
-    for path in HOME.rglob("*.py"):
-        if path == HOME / "__init__.py":
-            continue
-        mine = found.setdefault(room(path), set())
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                names = [f"{node.module}.{alias.name}" for alias in node.names]
-            for name in names:
-                parts = name.split(".")
-                if parts[0] == "springcheck" and len(parts) > 1 and parts[1] != room(path):
-                    mine.add(parts[1])
+    for path in modules():
+        parts = [name.split(".") for name in imports(path) if name.startswith("springcheck.")]
+        found.setdefault(room(path), set()).update(x[1] for x in parts if x[1] != room(path))
     return {name: {x for x in others if x in found} for name, others in found.items()}
 
 
@@ -97,6 +94,42 @@ def longest(found: dict[str, set[str]]) -> list[str]:
         return known[name]
 
     return max((chain(name) for name in sorted(found)), key=len)
+
+
+def _within(path: Path) -> set[Path]:
+    """Modules of ours that a module imports anywhere in it, for their types too; of the package itself its
+    version alone."""
+    found = set()
+    for name in imports(path):
+        place = HOME.parent.joinpath(*name.split("."))
+        for one in (place, place.parent):
+            files = [one.with_suffix(".py"), one / "__init__.py"]
+            there = [
+                file
+                for file in files
+                if file.is_file() and HOME in file.parents and file != HOME / "__init__.py"
+            ]
+            if there:
+                found.add(there[0])
+                break
+    return found - {path}
+
+
+def circles() -> list[set[str]]:
+    """Modules that import each other, directly or by others: the strongly connected parts of the picture."""
+    arrows = {path: _within(path) for path in modules()}
+
+    def reached(start: Path) -> set[Path]:
+        found: set[Path] = set()
+        left = [start]
+        while left:
+            left += arrows[(one := left.pop())] - found
+            found |= arrows[one]
+        return found
+
+    beyond = {path: reached(path) for path in arrows}
+    parts = {frozenset(other for other in beyond[path] if path in beyond[other]) for path in arrows}
+    return [{path.relative_to(HOME).as_posix() for path in part} for part in parts if part]
 
 
 def cpu(command: list[str]) -> float:
@@ -115,11 +148,16 @@ def main() -> int:
     print(
         f"lines {sum(lines.values())} in {len(lines)} modules, median {statistics.median(lines.values()):g}"
     )
+    rooms = Counter[str]()
+    for path, count in lines.items():
+        rooms[room(path)] += count
+    print("rooms " + ", ".join(f"{name} {count}" for name, count in rooms.most_common()))
     print("largest " + ", ".join(f"{path.relative_to(HOME)} {lines[path]}" for path in largest))
     found = arrows()
     chain = longest(found)
     print(f"rooms {len(found)}, arrows {sum(map(len, found.values()))}, longest chain {len(chain)}:")
     print("  " + " > ".join(chain))
+    print(f"circles of modules {len(circles())}")
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     python = [sys.executable, "-m", "springcheck", "run", "spring", "--force"]
     with tempfile.TemporaryDirectory() as folder:
