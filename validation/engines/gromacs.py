@@ -9,7 +9,7 @@ from springs import SPRINGS, Batch, called, placed
 
 from springcheck.engines import Engine, named
 from springcheck.engines.contract import Need, by_name, thermostat
-from springcheck.formats.libraries import read_trr
+from springcheck.formats.trr import read_trr
 from springcheck.physics.arrays import Arithmetic
 
 BOLTZMANN = 0.00831446261815324  # kJ/mol/K
@@ -69,7 +69,7 @@ def start(scene: Any, method: Any, label: Any, step: float, seed: int = 1) -> Ba
             files(Path(folder), scene, method.name, step, steps, seed)
             called("gmx grompp -f in.mdp -c start.gro -r walls.gro -p in.top -o in.tpr -maxwarn 9", folder)
             called("gmx mdrun -s in.tpr -o out.trr -ntmpi 1 -ntomp 1 -nb cpu", folder)
-            found = read_trr(Path(folder, "out.trr"))
+            found = read_trr(Path(folder, "out.trr"), [], None)
         x, v = (np.asarray(a, float).reshape(len(a), -1)[:, scene.where] for a in (found.q, found.v))
         return x - shift(scene), scene.m * v
 

@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import numpy as np
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.formats import libraries, molecular, numbers, tables, trr
-from springcheck.formats.columns import ALONE, States, kind
+from springcheck.formats.columns import ALONE, Reader, States, kind
 from springcheck.formats.numbers import states_of
 from springcheck.store import apart
 
@@ -30,137 +31,51 @@ BEGINNING = 1 << 12
 """Bytes of a file by which its format is recognised."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Format:
     """A format: how it is recognised by the beginning of a file, and read."""
 
     name: str
     recognise: Callable[[bytes, Path], bool]
-    read: Callable[[Path, list[str], float | None], States]
-    """Of a path, the names of columns, and the time step."""
-    library: bool = False
-    """Read by the code of others."""
-    text: bool = False
-    """Read line by line, gzipped or not."""
+    read: Reader
+    by: str = ""
+    """LIBRARY, the code of others, in a process of its own; or LINES, line by line, gzipped or not."""
+
+
+LIBRARY, LINES = "library", "lines"
 
 
 def _starts(*with_: bytes) -> Callable[[bytes, Path], bool]:
     return lambda head, path: head.startswith(with_)
 
 
-def _lines(head: bytes) -> tuple[bytes, bytes, bytes]:
-    first, second, third, *_ = [*head.split(b"\n", 3), b"", b"", b""]
-    return first, second, third
+def _matches(pattern: bytes) -> Callable[[bytes, Path], bool]:
+    return lambda head, path: re.search(pattern, head, re.MULTILINE) is not None
+
+
+def _is_xlsx(head: bytes, path: Path) -> bool:
+    return head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head or b"xl/" in head)
 
 
 FORMATS: tuple[Format, ...] = (
-    Format(
-        name="NPY",
-        recognise=_starts(b"\x93NUMPY"),
-        read=lambda path, columns, step: numbers.read_npy(path, columns),
-    ),
-    Format(
-        name=".xlsx",
-        recognise=lambda head, path: (
-            head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head or b"xl/" in head)
-        ),
-        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_excel"),
-        library=True,
-    ),
-    Format(
-        name="NPZ",
-        recognise=_starts(b"PK\x03\x04"),
-        read=lambda path, columns, step: numbers.read_npz(path, columns),
-    ),
-    Format(
-        name="Parquet",
-        recognise=_starts(b"PAR1"),
-        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_parquet"),
-        library=True,
-    ),
-    Format(
-        name="Feather",
-        recognise=_starts(b"ARROW1", b"FEA1"),
-        read=lambda path, columns, step: libraries.read_pandas(path, columns, "read_feather"),
-        library=True,
-    ),
-    Format(
-        name="MATLAB .mat",
-        recognise=_starts(b"MATLAB 5.0"),
-        read=lambda path, columns, step: libraries.read_mat(path, columns),
-        library=True,
-    ),
-    Format(
-        name="JSON",
-        recognise=lambda head, path: re.match(rb"\s*(\{|\[\s*[\[{])", head) is not None,
-        read=lambda path, columns, step: libraries.read_json(path, columns),
-        library=True,
-    ),
-    Format(
-        name="LAMMPS dump",
-        recognise=_starts(b"ITEM: "),
-        read=lambda path, columns, step: molecular.read_lammps(path, step),
-        text=True,
-    ),
-    Format(
-        name="LAMMPS log",
-        recognise=lambda head, path: re.search(rb"^LAMMPS \(", head, re.MULTILINE) is not None,
-        read=molecular.read_log,
-        text=True,
-    ),
-    Format(
-        name="DCD",
-        recognise=lambda head, path: head[4:8] == b"CORD",
-        read=lambda path, columns, step: libraries.read_dcd(path),
-        library=True,
-    ),
-    Format(
-        name="GROMACS .xtc",
-        recognise=_starts(b"\x00\x00\x07\xcb", b"\x00\x00\x07\xe7"),
-        read=lambda path, columns, step: libraries.read_xtc(path),
-        library=True,
-    ),
-    Format(
-        name=".trr",
-        recognise=_starts(b"\x00\x00\x07\xc9"),
-        read=lambda path, columns, step: trr.read_trr(path),
-    ),
-    Format(
-        name=".gro",
-        recognise=lambda head, path: ".gro" in path.suffixes,
-        read=lambda path, columns, step: molecular.read_gro(path, step),
-        text=True,
-    ),
-    Format(
-        name="Amber NetCDF",
-        recognise=_starts(b"CDF\x01", b"CDF\x02"),
-        read=lambda path, columns, step: libraries.read_amber(path),
-        library=True,
-    ),
-    Format(
-        name="ASE .traj",
-        recognise=_starts(b"- of Ulm"),
-        read=lambda path, columns, step: libraries.read_ase(path, step),
-        library=True,
-    ),
-    Format(
-        name="extended .xyz",
-        recognise=lambda head, path: _lines(head)[0].strip().isdigit() and b"Properties=" in _lines(head)[1],
-        read=lambda path, columns, step: libraries.read_ase(path, step),
-        library=True,
-    ),
-    Format(
-        name=".xyz",
-        recognise=lambda head, path: molecular.is_xyz(_lines(head)[0], _lines(head)[2]),
-        read=lambda path, columns, step: molecular.read_xyz(path, step),
-        text=True,
-    ),
-    Format(
-        name="text tables",
-        recognise=lambda head, path: True,
-        read=lambda path, columns, step: tables.read_table(path, columns),
-        text=True,
-    ),
+    Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
+    Format(".xlsx", _is_xlsx, partial(libraries.read_pandas, "read_excel"), LIBRARY),
+    Format("NPZ", _starts(b"PK\x03\x04"), numbers.read_npz),
+    Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
+    Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),
+    Format("MATLAB .mat", _starts(b"MATLAB 5.0"), libraries.read_mat, LIBRARY),
+    Format("JSON", _matches(rb"\A\s*(\{|\[\s*[\[{])"), libraries.read_json, LIBRARY),
+    Format("LAMMPS dump", _starts(b"ITEM: "), molecular.read_lammps, LINES),
+    Format("LAMMPS log", _matches(rb"^LAMMPS \("), molecular.read_log, LINES),
+    Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_dcd, LIBRARY),
+    Format("GROMACS .xtc", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), libraries.read_xtc, LIBRARY),
+    Format(".trr", _starts(b"\0\0\x07\xc9"), trr.read_trr),
+    Format(".gro", lambda head, path: ".gro" in path.suffixes, molecular.read_gro, LINES),
+    Format("Amber NetCDF", _starts(b"CDF\x01", b"CDF\x02"), libraries.read_amber, LIBRARY),
+    Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),
+    Format("extended .xyz", _matches(molecular.COUNT + rb".*Properties="), libraries.read_ase, LIBRARY),
+    Format(".xyz", _matches(molecular.XYZ), molecular.read_xyz, LINES),
+    Format("text tables", lambda head, path: True, tables.read_table, LINES),
 )
 """In the order in which they are tried; text tables are what nothing else is."""
 
@@ -203,8 +118,8 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
         if zipped:
             with gzip.open(path) as file:
                 head = file.read(BEGINNING)
-        found = next(one for one in FORMATS if one.recognise(head, path) and (one.text or not zipped))
-        if not found.library:
+        found = next(one for one in FORMATS if one.recognise(head, path) and (one.by == LINES or not zipped))
+        if found.by != LIBRARY:
             return found.read(path, columns, step)
         return _apart(found, path, columns, step)
     except (UnicodeDecodeError, gzip.BadGzipFile, EOFError) as error:

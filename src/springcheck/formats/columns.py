@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -47,6 +47,10 @@ class States:
     mass: Floats | None
     roundoff: float = 2.0**-53
     """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
+
+
+Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
+"""(path, names of columns, time step of a file that counts steps) -> its states."""
 
 
 def kind(name: str) -> Kind | None:

@@ -45,7 +45,7 @@ def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
         raise StoreError(f"{path}: {name} cannot read it: {said or type(error).__name__}") from error
 
 
-def read_ase(path: Path, step: float | None) -> States:
+def read_ase(path: Path, columns: list[str], step: float | None) -> States:
     """What ASE reads: extended XYZ with velocities or momenta, and .traj."""
     with _library(path, "ASE", "ase"):
         import ase.io
@@ -82,14 +82,14 @@ def _written(lines: list[str]) -> float:
     return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell])
 
 
-def read_xtc(path: Path) -> States:
+def read_xtc(path: Path, columns: list[str], step: float | None) -> States:
     """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
     with _analysed(path, "lib.formats.libmdaxdr", "XTCFile") as file:
         found = [(frame.time, np.array(frame.x)) for frame in islice(file, MOST_FRAMES)]
     return of_frames(path, [t for t, _ in found], [q for _, q in found], None, None, 2.0**-24)
 
 
-def read_dcd(path: Path) -> States:
+def read_dcd(path: Path, columns: list[str], step: float | None) -> States:
     """A DCD file by MDAnalysis: positions alone [Angstrom], in single precision, as is its time step [ps]."""
     with _analysed(path, "coordinates.DCD", "DCDReader") as file:
         found = [(frame.time, np.array(frame.positions)) for frame in islice(file, MOST_FRAMES)]
@@ -107,7 +107,7 @@ def _analysed(path: Path, module: str, name: str) -> Iterator[Any]:
         yield file
 
 
-def read_amber(path: Path) -> States:
+def read_amber(path: Path, columns: list[str], step: float | None) -> States:
     """An Amber trajectory in NetCDF 3 by SciPy: Angstrom and ps, in single precision; frames of atoms."""
     with _library(path, "SciPy", "scipy"):
         from scipy.io import netcdf_file
@@ -124,7 +124,7 @@ def read_amber(path: Path) -> States:
     )
 
 
-def read_mat(path: Path, columns: list[str]) -> States:
+def read_mat(path: Path, columns: list[str], step: float | None) -> States:
     """Arrays of a MATLAB file up to version 7 by SciPy."""
     with _library(path, "SciPy", "scipy"):
         from scipy.io import loadmat
@@ -133,7 +133,7 @@ def read_mat(path: Path, columns: list[str]) -> States:
     return states_of(path, found, columns)
 
 
-def read_json(path: Path, columns: list[str]) -> States:
+def read_json(path: Path, columns: list[str], step: float | None) -> States:
     """Lists by name, or their values by row as pandas writes them; or a list of rows, named or not."""
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
@@ -161,7 +161,7 @@ def read_json(path: Path, columns: list[str]) -> States:
     return states_of(path, arrays, columns)
 
 
-def read_pandas(path: Path, columns: list[str], call: str) -> States:
+def read_pandas(call: str, path: Path, columns: list[str], step: float | None) -> States:
     """A table that pandas reads by this function, its columns named in the file."""
     with _library(path, "pandas", "'springcheck[tables]'"):
         pandas = import_module("pandas")

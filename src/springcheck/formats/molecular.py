@@ -61,7 +61,7 @@ def _atoms(text: str, lines: Lines, before: int | None) -> int:
     return n
 
 
-def read_lammps(path: Path, step: float | None) -> States:
+def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     """A text dump with id, positions (x or xu) and velocities (vx), and perhaps the mass."""
     steps: list[int] = []
     numbers = array("d")
@@ -144,7 +144,7 @@ def read_log(path: Path, columns: list[str], step: float | None) -> States:
     return of_rows(path, values, first, names, [])
 
 
-def read_gro(path: Path, step: float | None) -> States:
+def read_gro(path: Path, columns: list[str], step: float | None) -> States:
     """Frames of a .gro file with velocities; their titles hold the times."""
     t: list[float] = []
     numbers = array("d")
@@ -178,12 +178,13 @@ def read_gro(path: Path, step: float | None) -> States:
     return of_frames(path, t, q, v, None, written)
 
 
-def is_xyz(first: bytes, second: bytes) -> bool:
-    """Whether a file begins as plain .xyz does: a count, a comment, an atom of a name and numbers."""
-    return first.strip().isdigit() and re.match(rb"\s*[A-Za-z]{1,8}\d*\s+[-+.\d]", second) is not None
+COUNT = rb"\A[^\S\n]*\d+[^\S\n]*\n"
+"""How extended and plain .xyz begin: with a line of one number."""
+XYZ = COUNT + rb".*\n[^\S\n]*[A-Za-z]{1,8}\d*[^\S\n]+[-+.\d]"
+"""Plain .xyz goes on with a comment and an atom of a name and numbers."""
 
 
-def read_xyz(path: Path, step: float | None) -> States:
+def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
     """Plain .xyz: a name and three numbers for each atom, and three more where it has velocities.
 
     The comment of a frame may hold its time, as ``t = 0.1``.

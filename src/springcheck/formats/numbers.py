@@ -43,9 +43,9 @@ def _roundoff(arrays: Sequence[Any]) -> float:
     return float(max([2.0**-53, *widths]))
 
 
-def read_npz(path: Path, names: Sequence[str] = ()) -> States:
-    """Arrays t (f,), q and p or v (f,) or (f, n), and perhaps m (n,), by their names or as `names` say."""
-    return states_of(path, _load(path), names)
+def read_npz(path: Path, columns: list[str], step: float | None) -> States:
+    """Arrays t (f,), q and p or v (f,) or (f, n), and perhaps m (n,), by their names or as `columns` say."""
+    return states_of(path, _load(path), columns)
 
 
 def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) -> States:
@@ -94,15 +94,15 @@ def _chosen(path: Path, arrays: Mapping[str, Any], names: Sequence[str]) -> Mapp
     return found
 
 
-def read_npy(path: Path, names: Sequence[str]) -> States:
+def read_npy(path: Path, columns: list[str], step: float | None) -> States:
     """A structured array with named fields, or a table (f, c) whose columns are named."""
     found = _load(path)
     if found.dtype.names:
-        columns = {name: np.asarray(found[name], np.float64) for name in found.dtype.names}
-        return split(path, columns, _roundoff([found[name] for name in found.dtype.names]))
+        fields = {name: np.asarray(found[name], np.float64) for name in found.dtype.names}
+        return split(path, fields, _roundoff([found[name] for name in found.dtype.names]))
     if found.ndim != 2 or not np.issubdtype(found.dtype, np.number) or np.iscomplexobj(found):
         raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
-    return of_table(path, found, names)
+    return of_table(path, found, columns)
 
 
 def of_table(path: Path, found: Any, names: Sequence[str]) -> States:

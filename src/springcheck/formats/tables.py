@@ -19,7 +19,7 @@ LONGEST_HEAD = 1 << 20
 """Lines before the first row of numbers."""
 
 
-def read_table(path: Path, names: Sequence[str]) -> States:
+def read_table(path: Path, columns: list[str], step: float | None) -> States:
     """The states of a text table; the last line before the numbers names the columns."""
     header: list[str] = []
     first: list[list[str]] = []
@@ -54,7 +54,7 @@ def read_table(path: Path, names: Sequence[str]) -> States:
                 first.append(cells)
     if not width:
         raise StoreError(f"{path}: holds no row of numbers")
-    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, list(names), header)
+    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header)
 
 
 def of_rows(

@@ -19,7 +19,7 @@ KINDS = {4: (">f4", 2.0**-24), 8: (">f8", 2.0**-53)}
 """Numbers of so many bytes, and how they round."""
 
 
-def read_trr(path: Path) -> States:
+def read_trr(path: Path, columns: list[str], step: float | None) -> States:
     """Positions [nm] and velocities [nm/ps].
 
     Frames are XDR, big-endian: a mark, the format's name, the bytes of each array, the numbers of atoms and
