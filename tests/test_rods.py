@@ -246,6 +246,25 @@ def test_rods_that_share_particles_are_solved_to_rounding() -> None:
     assert np.max(np.abs(rods(scene).strain(q))) < 1e-17 or np.finfo(np.longdouble).eps > 1e-16
 
 
+@pytest.mark.parametrize("what", ["momenta without a step", "a frame of zeros"])
+def test_frames_from_which_no_step_leads_hide_no_others(what: str) -> None:
+    """Rods that share particles are solved for together, of all frames at once, but each frame by itself."""
+    scene = triangle(steps=20)
+    right = driver.run(scene, "own:velocity-verlet")
+    q, p = right.q.copy(), right.p.copy()
+    if what == "a frame of zeros":
+        q[15:] = p[15:] = 0
+    else:
+        p[15:] *= 1e6
+    broken = replace(right, q=q, p=p)
+    verdicts = {v.check: v for v in checks.judge(replace(scene, quantities=("q", "p")), broken)}
+    assert verdicts["step-defect"].passed is False
+    assert "at step 15" in verdicts["step-defect"].why
+    p[3:] = right.p[3:] * (1 + 1e-9)
+    verdicts = {v.check: v for v in checks.judge(replace(scene, quantities=("q", "p")), broken)}
+    assert "at step 3" in verdicts["step-defect"].why
+
+
 @pytest.mark.parametrize("label", ["own:velocity-verlet", "ase:rattle", "openmm:verlet-rods"])
 def test_a_rod_to_a_fixed_point_turns_about_it(label: str, need: Need) -> None:
     need(label)

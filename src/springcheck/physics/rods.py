@@ -10,7 +10,7 @@ length, a quadratic; rods that share a particle are solved for together, by Newt
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -74,6 +74,15 @@ class WallRod(_Rigid, OnParticles):
         Column("wall", "at", 0.0, single=False),
     )
     length: Floats
+
+
+def _where_regular(work: Callable[..., Floats], matrix: Floats, *more: Floats) -> Floats:
+    """What a function of numpy.linalg makes of matrices (..., c, c); of singular ones, NaN."""
+    try:
+        return work(matrix, *more)
+    except np.linalg.LinAlgError:
+        singular = np.linalg.slogdet(matrix)[0] == 0
+        return work(np.where(singular[..., None, None], np.nan, matrix), *more)
 
 
 class Rods:
@@ -193,10 +202,7 @@ class Rods:
         for _ in range(3):
             moved = self.apart(self.spread(self.each(found) * right) / self.m.astype(wanted.dtype))
             lacks = np.asarray(wanted - self.dot(left, moved), np.float64)
-            try:
-                found = found + np.linalg.solve(matrix, lacks[..., None])[..., 0]
-            except np.linalg.LinAlgError:
-                return np.full_like(wanted, np.nan)
+            found = found + _where_regular(np.linalg.solve, matrix, lacks[..., None])[..., 0]
         return found
 
     def reach(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -222,16 +228,21 @@ class Rods:
             # the rod that lies within a quarter turn of where it lay
             k = np.where(b > 0, -c / (b + root), (root - b) / a)
             return np.asarray(k / self.inverse_mass.astype(s.dtype))
-        k, last = np.zeros_like(self.dot(r, s)), np.inf
+        k = np.zeros_like(self.dot(r, s))
+        last, going = np.full(k.shape[:-1], np.inf), np.ones(k.shape[:-1], np.bool_)
         m = self.m.astype(s.dtype)
+        # each state by itself: one without a solution says nothing of those beside it
         for _ in range(MOST_NEWTON):
             now = s + self.apart(self.spread(self.each(k) * r) / m)
             gap = (self.dot(now, now) - length * length) / 2
-            most = float(np.max(np.abs(gap) / (length * length), initial=0.0))
-            if not most < last:
-                return k if last < np.sqrt(np.finfo(s.dtype).eps) else np.full_like(k, np.nan)
-            k, last = k - self.solve(now, r, gap), most
-        return np.full_like(k, np.nan)
+            most = np.asarray(np.max(np.abs(gap) / (length * length), axis=-1, initial=0.0), np.float64)
+            going &= most < last
+            if not np.any(going):
+                break
+            k = np.where(going[..., None], k - self.solve(now, r, gap), k)
+            last = np.where(going, most, last)
+        solved = ~going & (last < np.sqrt(np.finfo(s.dtype).eps))
+        return np.where(solved[..., None], k, np.nan)
 
     def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
         """A drift for the time x from `before` to q, with its momenta p, brought back to the lengths."""
@@ -292,11 +303,9 @@ class Rods:
         """The largest |k| of `solve` for what is wanted of these sizes."""
         if not self.share:
             return np.abs(self.solve(left, right, size))
-        try:
-            inverse = np.abs(np.linalg.inv(self._matrix(left, right)))
-        except np.linalg.LinAlgError:
-            return np.full_like(size, np.inf)
-        return np.asarray((inverse @ size[..., None])[..., 0])
+        inverse = np.abs(_where_regular(np.linalg.inv, self._matrix(left, right)))
+        found = (inverse @ size[..., None])[..., 0]
+        return np.asarray(np.where(np.isnan(found), np.inf, found))
 
     # what is said of states
 
