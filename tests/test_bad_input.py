@@ -271,8 +271,20 @@ def test_too_little_address_space_is_said_in_words(size: int) -> None:
 
 
 @pytest.mark.slow
+def test_a_backend_that_matplotlib_does_not_know_is_named_where_it_draws_and_nowhere_else() -> None:
+    Path("x.csv").write_text("t,q,v\n" + "".join(f"{i},{0.3**i},{-(0.2**i)}\n" for i in range(9)))
+    done = limited("plot", "x.csv", "-o", "drawn", MPLBACKEND="nonsense")
+    said = "springcheck: MPLBACKEND='nonsense' names no backend of matplotlib: unset it, or set it to agg\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+    assert not Path("drawn").exists()
+    assert limited("identify", "x.csv", MPLBACKEND="nonsense").stderr == ""
+    # a window of others is not opened
+    assert limited("plot", "x.csv", "-o", "drawn", MPLBACKEND="tkagg", DISPLAY="none").returncode == 0
+
+
+@pytest.mark.slow
 def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() -> None:
-    odd = {"USER": os.fsdecode(b"J\xf6rg"), "MPLBACKEND": "nonsense"}
+    odd = {"USER": os.fsdecode(b"J\xf6rg")}
     assert limited("run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5", **odd).stderr == ""
     done = limited("plot", "s.h5", "--quiet", **odd)
     assert (done.returncode, done.stderr) == (0, "")

@@ -15,14 +15,14 @@ BUDGETS = {
     ("thermal",): 1727,
     ("engines/own",): 1705,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
-    ("engines",): 2574,
+    ("engines",): 2580,
     ("driver", "conformance", "doors"): 1190,
     ("checks",): 4303,
     ("identify",): 7825,
-    ("formats", "store"): 4976,
+    ("formats", "store"): 5102,
     ("studies",): 1603,
-    ("studies/*",): 11020,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6471,
+    ("studies/*",): 11031,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6486,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

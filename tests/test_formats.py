@@ -23,6 +23,8 @@ from ase import Atoms
 
 from springcheck import driver, formats
 from springcheck.cli import main
+from springcheck.errors import StoreError
+from springcheck.formats.lines import number
 from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
@@ -260,6 +262,19 @@ def json_of_bare_rows(run: Trajectory) -> list[str]:
     return ["x.json", "--columns", "t,q,p"]
 
 
+def json_lines(run: Trajectory) -> list[str]:
+    known = rows_of(run)
+    rows = [json.dumps(dict(zip(known, row, strict=True))) for row in zip(*known.values(), strict=True)]
+    Path("x.jsonl").write_text("\n".join(rows) + "\n")
+    return ["x.jsonl"]
+
+
+def json_lines_of_bare_rows(run: Trajectory) -> list[str]:
+    rows = [json.dumps(row) for row in zip(*rows_of(run).values(), strict=True)]
+    Path("x.jsonl").write_text("\n".join(rows) + "\n")
+    return ["x.jsonl", "--columns", "t,q,p"]
+
+
 def json_of_pandas(run: Trajectory) -> list[str]:
     """As `DataFrame.to_json` writes it."""
     found = {name: {str(i): x for i, x in enumerate(values)} for name, values in rows_of(run).items()}
@@ -288,6 +303,39 @@ def feather(run: Trajectory) -> list[str]:
 def matlab(run: Trajectory) -> list[str]:
     scipy.io.savemat("x.mat", rows_of(run))
     return ["x.mat"]
+
+
+def matlab_struct(run: Trajectory) -> list[str]:
+    scipy.io.savemat("x.mat", {"out": {"states": rows_of(run), "note": "a run"}})
+    return ["x.mat"]
+
+
+def octave_matrix(name: str, rows: np.ndarray) -> str:
+    head = f"# name: {name}\n# type: matrix\n# rows: {rows.shape[0]}\n# columns: {rows.shape[1]}\n"
+    return head + "".join(" " + " ".join(f"{x:.17g}" for x in row) + "\n" for row in rows) + "\n\n"
+
+
+OCTAVE = "# Created by Octave 7.3.0, Mon Nov 23 07:10:55 2026 UTC <root@vm>\n"
+
+
+def octave_text(run: Trajectory) -> list[str]:
+    """As ``save x.txt`` writes a range, a struct with a row and a column, a string and an empty matrix."""
+    known = {name: np.array(values) for name, values in rows_of(run).items()}
+    Path("x.txt").write_text(
+        f"{OCTAVE}# name: t\n# type: double_range\n# base, limit, increment\n"
+        f"0 {known['t'][-1]:.17g} {known['t'][1]:.17g}\n\n\n"
+        "# name: note\n# type: string\n# elements: 1\n# length: 5\na run\n\n\n"
+        "# name: out\n# type: scalar struct\n# ndims: 2\n 1 1\n# length: 2\n"
+        f"{octave_matrix('q', known['q'][:, None])}{octave_matrix('p', known['p'][None])}\n\n"
+        "# name: none\n# type: matrix\n# rows: 0\n# columns: 0\n\n\n"
+    )
+    return ["x.txt"]
+
+
+def octave_table(run: Trajectory) -> list[str]:
+    table = octave_matrix("data", np.array([*rows_of(run).values()]).T)
+    Path("x.txt.gz").write_bytes(gzip.compress((OCTAVE + table).encode()))
+    return ["x.txt.gz", "--columns", "t,q,p"]
 
 
 def matlab_7_3(run: Trajectory) -> list[str]:
@@ -346,6 +394,7 @@ WRITERS: list[Writer] = [
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
     gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows,
     json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave, amber,
+    json_lines, json_lines_of_bare_rows, matlab_struct, octave_text, octave_table,
 ]  # fmt: skip
 READ_BY_ALL: list[Writer] = [
     csv, blanks, npz, in_space, dump, trr, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
@@ -432,6 +481,34 @@ def test_coarse_digits_are_those_of_the_quantity_that_is_written_coarsest() -> N
     assert roundoff(rows, [0]) == 2.0**-53
 
 
+def test_numbers_as_fortran_octave_and_matlab_write_them() -> None:
+    """gfortran leaves the letter out of exponents of three digits; Octave goes through int32 and arrays of
+    three dimensions by columns, writes single precision as such, and as many digits as it is told to."""
+    assert [number(x) for x in ("1.5-100", "-2.5+100", "1.5D-02", ".5-300")] == [
+        1.5e-100,
+        -2.5e100,
+        0.015,
+        5e-301,
+    ]
+    for cell in ("2020-100", "1-2", ".-100", "1.5-1000"):
+        with pytest.raises(ValueError, match="could not convert"):
+            number(cell)
+    assert roundoff([["1.25-100"], ["2.5-100"]], [0]) == pytest.approx(5e-3)
+    q = "# name: q\n# type: {}matrix\n# ndims: 2\n 3 2\n" + "".join(f" {x}\n" for x in range(6)) + "\n"
+    v = "# name: v\n# type: matrix\n# rows: 3\n# columns: 2\n 0.12 3\n 1 4\n 2 5\n\n"
+    t = "# name: t\n# type: range\n# base, limit, increment\n0 2 1\n\n"
+    for kind in ("int32 ", "float "):
+        Path("x.txt").write_text(OCTAVE + q.format(kind) + v + t)
+        assert formats.read(Path("x.txt")).q.tolist() == [[0, 3], [1, 4], [2, 5]]
+    assert formats.read(Path(octave_text(made())[0])).roundoff == 2.0**-53
+    Path("x.txt").write_text(OCTAVE + v + v.replace("# name: v", "# name: q") + t)
+    assert formats.read(Path("x.txt")).roundoff == 0.05
+    scipy.io.savemat("x.mat", {"a": {"t": [0, 1.0], "q": [1, 2.0]}, "b": {"t": [0, 2.0], "q": [3, 5.0]}})
+    with pytest.raises(StoreError, match=r"no array of times among a\.t, a\.q, b\.t, b\.q; name them"):
+        formats.read(Path("x.mat"), alone=True)
+    assert formats.read(Path("x.mat"), ["t=b.t", "q=b.q"], alone=True).q.ravel().tolist() == [3, 5]
+
+
 def test_arrays_that_are_not_there_are_said(capsys: pytest.CaptureFixture[str]) -> None:
     named_in_hdf5(made())
     for columns, said in (
@@ -494,6 +571,12 @@ BAD = [
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
     ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),
     ("PK\x03\x04zip", "NumPy cannot read it"),
+    ("# name: t\n# type: matrix\n# rows: 2\n# columns: 1\n 1\n", "line 5: t: 1 numbers where 2 are said"),
+    ("# name: t\n# type: matrix\n# rows: x\n", "'# rows: x' says no size"),
+    ("# name: t\n# type: range\n# base, limit, increment\n0 1 0\n", "t: range holds what is no number"),
+    ("# name: t\n# type: range\n# base, limit, increment\n0 1e9 1e-9\n", "more than 16,777,216 numbers"),
+    ("# name: x\n# type: scalar\n1\n", "no array of times among x; name them, as --columns"),
+    ('{"t": 1}\n{"t": ', "msgspec cannot read it"),
 ]
 
 

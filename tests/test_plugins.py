@@ -149,9 +149,13 @@ def bad(path: Path, **parts: str) -> Path:
             "object has no attribute 'mass' (bad.py, line 8)",
         ),
         ({"advance": "q[0] = 1 / 0"}, "ZeroDivisionError: division by zero (bad.py, line 6)"),
-        ({"version": "1 / 0"}, "ZeroDivisionError"),
+        (
+            {"version": "1 / 0"},
+            "engine 'bad': its version() failed: ZeroDivisionError: division by zero (bad.py",
+        ),
+        ({"version": "__import__('nonesuch')"}, "engine 'bad', bad, cannot be imported: ModuleNotFoundError"),
         ({"advance": "q[:] = p[:] = 0", "version": "1 / 0"}, "ZeroDivisionError: division by zero (bad.py"),
-        ({"advance": "q[:] = p[:] = 0", "version": "[]"}, "has no attribute 'items'"),
+        ({"version": "[]"}, "engine 'bad': its version() returned list, not a dict of names and versions"),
         (
             {"advance": "q[:] = p[:] = 0", "arithmetic": "lambda: Arithmetic()"},
             "bad:m failed: TypeError: <lambda>() takes 0 positional arguments",
@@ -175,7 +179,7 @@ def test_a_bad_file_is_answered_in_one_line(
 ENDS: dict[str, tuple[str, str]] = {
     "sys.exit(0)": ("start", "bad:m failed: SystemExit: 0 (bad.py, line"),
     "os._exit(0)": ("advance", "bad:m failed: it ended the program (exit status 0)"),
-    "os._exit(1)": ("version", "bad cannot be imported: it ended the program (exit status 1)"),
+    "os._exit(1)": ("version", "engine 'bad': its version() failed: it ended the program (exit status 1)"),
     "os.kill(os.getpid(), 11)": ("advance", "bad:m failed: it crashed (SIGSEGV)"),
     "os.abort()": ("start", "bad:m failed: it crashed (SIGABRT)"),
     "os.kill(os.getpid(), 8)": ("import", "bad.py cannot be imported: it crashed (SIGFPE)"),

@@ -11,6 +11,7 @@ import pytest
 from springcheck import driver, store
 from springcheck.cli import main
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies.stability.result import fastest
 from springcheck.text.wording import count, ordinal
@@ -93,6 +94,20 @@ def test_a_fault_is_a_method_among_the_others_and_is_rejected(capsys: Captured) 
     assert main(["run", "--from", "spring-uneven.h5"]) == 2
     assert "broken on purpose" in capsys.readouterr().err
     assert main(["run", "--from", "spring-uneven.h5", *EULER]) == 0
+
+
+@pytest.mark.skipif(not WIDE, reason="long double is no wider than double here")
+@pytest.mark.parametrize("momentum", ["1e160", "1e-170"])
+def test_energies_beyond_double_precision_are_those_of_the_same_motion_in_other_units(
+    momentum: str, capsys: Captured
+) -> None:
+    found = []
+    for one in ("1", momentum):
+        what = ["run", "spring", *EULER, "--set", f"particle.0.momentum={one}", "--json", "--force"]
+        assert main(what) == 0
+        found += [json.loads(capsys.readouterr().out)["runs"][0]["energy_drift"]]
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+    assert found[0] > 6
 
 
 def test_with_friction_energies_are_measured_against_the_exact_loss(capsys: Captured) -> None:

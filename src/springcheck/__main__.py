@@ -19,8 +19,8 @@ def _main() -> int:
     interrupts.install()
     # what is imported stays: until a command begins its work nothing is searched for cycles
     gc.disable()
-    # figures are drawn without any window, whatever is meant to show them elsewhere
-    os.environ["MPLBACKEND"] = "agg"
+    # figures are drawn without any window; what matplotlib does not know is said by `plot`
+    os.environ.setdefault("MPLBACKEND", "agg")
     try:
         from springcheck import cli
         from springcheck.cli import slips

@@ -56,6 +56,7 @@ def _plot(options: Namespace) -> int:
     from springcheck.cli import drawing
     from springcheck.figures import folder
 
+    drawing.need_matplotlib()
     path = Path(options.file)
     into = Path(options.output or folder.folder_of(path))
     doubts: list[dict[str, str]] = []
@@ -297,7 +298,8 @@ def _completion(options: Namespace) -> int:
 
 FORMATS = (
     "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
-    ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, text tables; texts also gzipped"
+    ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
+    "gzipped"
 )
 """What `springcheck.formats` reads, which is not imported for it."""
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,17 @@ MOST_COORDINATES = 8
 
 FRAMES, SAME = 12, 0.02
 """Frames of a period below which lines between them are chords; relative change of a reach that is none."""
+
+
+def need_matplotlib() -> None:
+    """SpringcheckError where matplotlib refuses to be imported: the environment asks for no backend of it."""
+    try:
+        import_module("matplotlib")
+    except ValueError as error:
+        asked = os.environ.get("MPLBACKEND")
+        raise SpringcheckError(
+            f"MPLBACKEND={asked!r} names no backend of matplotlib: unset it, or set it to agg"
+        ) from error
 
 
 def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:

@@ -44,7 +44,7 @@ from springcheck.engines.registry import (
     unusable,
     while_here,
 )  # fmt: skip
-from springcheck.errors import MethodError, nearest
+from springcheck.errors import MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
@@ -85,8 +85,14 @@ def load(name: str) -> Engine:
     reason = absence(name)
     if reason:
         raise MethodError(reason)
-    with foreign(name, f"{found.title} cannot be imported"):
-        _imported(found.version)
+    with foreign(name, f"engine {name!r}: its version() failed"):
+        try:
+            said = _imported(found.version)
+        except ImportError as error:
+            raise MethodError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
+    if not isinstance(said, dict):
+        kind = type(said).__name__
+        raise MethodError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")
     return found
 
 
@@ -99,9 +105,9 @@ def internal_steps(label: Label) -> Callable[..., Any]:
 
 
 @cache
-def _imported(version: Callable[[], object]) -> None:
+def _imported(version: Callable[[], object]) -> object:
     """Import a library once, where it first is: in the `version` of its engine."""
-    version()
+    return version()
 
 
 def guarded(label: Label, call: Callable[..., T], *arguments: object) -> T:

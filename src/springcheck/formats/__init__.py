@@ -19,7 +19,7 @@ import numpy as np
 
 from springcheck import store
 from springcheck.errors import StoreError
-from springcheck.formats import libraries, molecular, numbers, tables, trr
+from springcheck.formats import libraries, molecular, numbers, octave, tables, trr
 from springcheck.formats.columns import ALONE, Reader, States, kind
 from springcheck.formats.numbers import states_of
 from springcheck.store import apart
@@ -64,7 +64,7 @@ FORMATS: tuple[Format, ...] = (
     Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
     Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),
     Format("MATLAB .mat", _starts(b"MATLAB 5.0"), libraries.read_mat, LIBRARY),
-    Format("JSON", _matches(rb"\A\s*(\{|\[\s*[\[{])"), libraries.read_json, LIBRARY),
+    Format("JSON", _matches(rb"\A\s*(\{|\[\s*[\[{]|\[[^][]*\]\s*\[)"), libraries.read_json, LIBRARY),
     Format("LAMMPS dump", _starts(b"ITEM: "), molecular.read_lammps, LINES),
     Format("LAMMPS log", _matches(rb"^LAMMPS \("), molecular.read_log, LINES),
     Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_dcd, LIBRARY),
@@ -75,6 +75,7 @@ FORMATS: tuple[Format, ...] = (
     Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),
     Format("extended .xyz", _matches(molecular.COUNT + rb".*Properties="), libraries.read_ase, LIBRARY),
     Format(".xyz", _matches(molecular.XYZ), molecular.read_xyz, LINES),
+    Format("Octave text", _matches(rb"^# name: .*\n# type: "), octave.read_octave, LINES),
     Format("text tables", lambda head, path: True, tables.read_table, LINES),
 )
 """In the order in which they are tried; text tables are what nothing else is."""

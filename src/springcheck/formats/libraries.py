@@ -20,7 +20,7 @@ from springcheck.errors import StoreError, plain
 from springcheck.formats.columns import States
 from springcheck.formats.lines import MOST_NUMBERS
 from springcheck.formats.molecular import of_frames, times
-from springcheck.formats.numbers import of_table, states_of
+from springcheck.formats.numbers import of_table, shortened, states_of
 from springcheck.formats.tables import roundoff
 
 MOST_FRAMES = 1 << 20
@@ -125,20 +125,31 @@ def read_amber(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def read_mat(path: Path, columns: list[str], step: float | None) -> States:
-    """Arrays of a MATLAB file up to version 7 by SciPy."""
+    """Arrays of a MATLAB file up to version 7, of its structs too, by SciPy."""
     with _library(path, "SciPy", "scipy"):
         from scipy.io import loadmat
 
         found = {name: np.asarray(x) for name, x in loadmat(str(path)).items() if not name.startswith("__")}
-    return states_of(path, found, columns)
+    while structs := [name for name, x in found.items() if x.dtype.names and x.size == 1]:
+        for name in structs:
+            struct = found.pop(name)
+            found |= {f"{name}.{own}": np.asarray(struct[own].item()) for own in struct.dtype.names or ()}
+    return states_of(path, shortened(found), columns)
 
 
 def read_json(path: Path, columns: list[str], step: float | None) -> States:
-    """Lists by name, or their values by row as pandas writes them; or a list of rows, named or not."""
+    """Lists by name, or their values by row as pandas writes them; or a list of rows, named or not, which may
+    stand one on each line."""
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
     with _library(path, "msgspec", "msgspec"):
-        found = msgspec.json.decode(path.read_bytes())
+        said = path.read_bytes()
+        try:
+            found = msgspec.json.decode(said)
+        except msgspec.DecodeError:
+            if b"\n" not in said.strip():
+                raise
+            found = msgspec.json.Decoder().decode_lines(said)
     if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
         found = {name: [row.get(name) for row in found] for name in found[0]}
     if isinstance(found, list):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -59,11 +60,16 @@ class Lines:
         self._file.close()
 
 
+BARE_EXPONENT = re.compile(r"^([+-]?\d*\.\d*)([+-]\d{3})$")
+"""Fortran leaves out the letter of an exponent of three digits."""
+
+
 def number(cell: str) -> float:
-    """The number in a cell, with Fortran's exponents (1.5D+00) too.  ValueError where there is none."""
+    """The number in a cell, with Fortran's exponents (1.5D+00, 1.5-100) too.  ValueError where there is
+    none."""
     try:
         return float(cell)
     except ValueError:
-        if len(cell) < 64 and not {"d", "D"}.isdisjoint(cell):
-            return float(cell.replace("d", "e").replace("D", "e"))
+        if len(cell) < 64:
+            return float(BARE_EXPONENT.sub(r"\1e\2", cell).replace("d", "e").replace("D", "e"))
         raise

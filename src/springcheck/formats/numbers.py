@@ -52,8 +52,12 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
     Where MATLAB and Octave have written them, times are (1, f) or (f, 1), and rows may be columns.
-    `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``.
+    `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``; of an
+    only array they name the columns.
     """
+    first, *more = arrays.values() or [np.empty(0)]
+    if not more and np.issubdtype(first.dtype, np.number) and first.ndim == 2 and "=" not in "".join(names):
+        return of_table(path, first, names)
     arrays = _chosen(path, arrays, names)
     numbers = {
         name: a
@@ -62,17 +66,27 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     }
     numbers = {name: _turned(a) if kind(name) == "t" else a for name, a in numbers.items()}
     rows = next((len(a) for name, a in numbers.items() if kind(name) == "t" and a.ndim == 1), 0)
+    if not rows:
+        raise StoreError(
+            f"{path}: no array of times among {listed(arrays)}; name them, as --columns t=clock,q=x,v=dx"
+        )
     numbers = {
         name: a.T if a.ndim == 2 and len(a) != rows == a.shape[1] else a for name, a in numbers.items()
     }
     columns = {
         name: np.asarray(a, np.float64).reshape(rows, -1)
         for name, a in numbers.items()
-        if rows and kind(name) not in (None, "m") and a.ndim in (1, 2, 3) and len(a) == rows
+        if kind(name) not in (None, "m") and a.ndim in (1, 2, 3) and len(a) == rows
     }
     masses = [np.atleast_1d(np.asarray(a, np.float64)) for name, a in numbers.items() if kind(name) == "m"]
     states = split(path, columns, _roundoff([numbers[name] for name in columns]))
     return replace(states, mass=masses[0].ravel()) if masses else states
+
+
+def shortened(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Arrays of structs by their own names, ``t`` for ``run.t``, where these differ."""
+    own = {name.rpartition(".")[2]: a for name, a in arrays.items()}
+    return own if len(own) == len(arrays) else arrays
 
 
 def _turned(a: Any) -> Any:

@@ -122,4 +122,4 @@ def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
 
 
 def _digits(cell: str) -> int:
-    return len(re.sub(r"[eEdD].*$", "", cell).lstrip("+-").replace(".", "").lstrip("0"))
+    return len(re.sub(r"([eEdD]|(?<=.)[+-]).*$", "", cell).lstrip("+-").replace(".", "").lstrip("0"))

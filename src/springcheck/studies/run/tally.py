@@ -6,11 +6,14 @@ import numpy as np
 
 from springcheck import checks
 from springcheck.physics import exact
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.heat import Heat
 from springcheck.studies.run.result import MethodRun
+
+TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
+"""An energy of the start below which those of double precision lose digits."""
 
 
 class Tally:
@@ -21,30 +24,38 @@ class Tally:
         self._norm = scene.system.norm
         self.heat = Heat(scene)
         self._known = exact.has_true_motion(scene)
-        self._start = float(scene.system.energy(scene.q, scene.p))
+        start = scene.system.energy(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
+        self._wide = bool(start) and not TINY < abs(start) < np.finfo(np.float64).max
+        self._start = start if self._wide else scene.system.energy(scene.q, scene.p)
         self.error = 0.0 if self._known else np.nan
         self.doubt = 0.0
-        self.drift = 0.0
+        self.drift: float = 0.0
 
     def add(self, piece: Trajectory) -> None:
         """Take a piece into account."""
-        scene, right = self._scene, np.asarray(self._start)
+        scene, right = self._scene, self._start
         if scene.bath:
             self.heat.add(piece)
         if self._known:
             steps = checks.Case(trajectory=piece, scene=scene).steps
             q, p = exact.true_motion(scene, steps, piece.step)
             if not scene.system.keeps_energy:
-                right = np.asarray(scene.system.energy(q, p), np.float64)
+                right = self._energy(q, p)
             # not max(), which leaves out what is no number
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
             self.doubt = max(self.doubt, exact.uncertainty(scene, float(steps[-1]) * piece.step))
         with np.errstate(over="ignore", invalid="ignore"):
-            off: Floats = np.asarray(scene.system.energy(piece.q, piece.p), np.float64) - right
-        worst = float(off[np.argmax(np.abs(off))]) / (abs(self._start) or 1.0)
+            off = self._energy(piece.q, piece.p) - right
+            worst = float(off[np.argmax(np.abs(off))] / (abs(self._start) or 1.0))
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
+
+    def _energy(self, q: Reals, p: Reals) -> Reals:
+        """Energies in double precision, unless that of the start leaves its range."""
+        if not self._wide:
+            return np.asarray(self._scene.system.energy(q, p), np.float64)
+        return self._scene.system.energy(q.astype(np.longdouble), p.astype(np.longdouble))
 
 
 def line(piece: Trajectory, tally: Tally) -> MethodRun:
