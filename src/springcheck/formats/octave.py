@@ -16,7 +16,7 @@ from springcheck.formats.lines import Lines, number
 from springcheck.formats.numbers import shortened, states_of
 from springcheck.formats.tables import SHOWN, roundoff
 
-NUMBERS = re.compile(r"((u?int\d+|float|double_)? ?)(matrix|scalar|range)")
+OF_NUMBERS = re.compile(r"((u?int\d+|float|double_)? ?)(matrix|scalar|range)")
 
 
 def read_octave(path: Path, names: list[str], step: float | None) -> States:
@@ -49,7 +49,7 @@ def _variables(lines: Lines) -> Iterator[tuple[str, Any, float]]:
         if kind_ == "scalar struct":
             length = next((x for x in lines if x.startswith("# length")), "0")
             within.append((name, _integers(lines, length)[0]))
-        elif (match := NUMBERS.fullmatch(kind_)) and "<" not in name:
+        elif (match := OF_NUMBERS.fullmatch(kind_)) and "<" not in name:
             cells, shape, columns_first = _cells(lines)
             try:
                 numbers = [number(cell) for cell in cells]

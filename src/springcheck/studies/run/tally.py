@@ -12,7 +12,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.heat import Heat
 from springcheck.studies.run.result import MethodRun
 
-TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
+FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """An energy of the start below which those of double precision lose digits."""
 
 
@@ -25,7 +25,7 @@ class Tally:
         self.heat = Heat(scene)
         self._known = exact.has_true_motion(scene)
         start = scene.system.energy(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
-        self._wide = bool(start) and not TINY < abs(start) < np.finfo(np.float64).max
+        self._wide = bool(start) and not FAINTEST_ENERGY < abs(start) < np.finfo(np.float64).max
         self._start = start if self._wide else scene.system.energy(scene.q, scene.p)
         self.error = 0.0 if self._known else np.nan
         self.doubt = 0.0
