@@ -260,6 +260,7 @@ def test_every_engine_has_methods_of_known_schemes() -> None:
     from springcheck import schemes
 
     for name in engines.names():
+        assert engines.engine(name).methods
         for method in engines.engine(name).methods.values():
             assert method.adaptive != schemes.scheme(method.scheme).has("one-step")
 

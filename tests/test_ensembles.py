@@ -79,6 +79,7 @@ def test_own_cells_are_equal_bit_for_bit_to_runs_of_their_own(tmp_path: Path) ->
     varied = vary.Varied(scene, cells)
     for method in ("own:euler", "own:semi-implicit-euler", "own:implicit-euler"):
         columns = measure.stored(tmp_path / "e.h5").of(method)
+        assert len(columns["q0"]) == 7
         for k, q in zip(columns["spring.0.stiffness"], columns["q0"], strict=True):
             assert driver.run(varied.whole({"spring.0.stiffness": float(k)}), method).q[-1, 0] == q
 

@@ -30,6 +30,7 @@ def test_a_scheme_says_its_step_and_source(name: str) -> None:
 
 
 def test_a_title_that_the_census_prints_is_a_name_too() -> None:
+    assert len(schemes.known()) > 30
     for scheme in schemes.known().values():
         assert next(iter(explain.lines(scheme.title))) == f"{scheme.name}: {scheme.title}"
 
@@ -42,6 +43,7 @@ def test_the_steps_are_the_formulas() -> None:
 
 
 def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:
+    assert len(engines.names()) > 5
     for engine in engines.names():
         for method in engines.engine(engine).methods:
             assert next(explain.lines(f"{engine}:{method}")).startswith(f"{engine}:{method}: ")
@@ -100,6 +102,7 @@ def test_a_name_of_nothing_is_one_line(name: str, capsys: pytest.CaptureFixture[
 
 
 def test_a_shown_scene_is_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert len(scenefile.names()) > 20
     for name in scenefile.names():
         assert main(["show", name]) == 0
         (tmp_path / "my.toml").write_text(capsys.readouterr().out)

@@ -61,7 +61,9 @@ def test_a_run_that_failed_is_drawn_in_red_on_top_of_the_scheme_that_it_breaks()
     right = made["own:semi-implicit-euler"]
     wrong = replace(right, label="stepper:mine", q=right.q * 1.1)
     made = {"stepper:mine": wrong, **made}
-    for figure in figures(scene, made, failed=["stepper:mine"]).values():
+    drawn = figures(scene, made, failed=["stepper:mine"])
+    assert len(drawn) == 4
+    for figure in drawn.values():
         (line,) = [
             x
             for axes in figure.axes
@@ -362,14 +364,12 @@ def test_an_engine_far_off_the_others_of_its_scheme_has_its_line_in_its_panel() 
     (made,) = runs(scene, "sundials:adams").values()
     far = replace(made, label="sundials:far", q=made.q * (1 + 1e-3 * np.linspace(0, 1, len(made.t)))[:, None])
     both = {made.label: made, far.label: far}
-    for bank in of_runs(scene, both, both):
-        if bank.name in ("energy", "error"):
-            lines = [
-                [x.name for x in one.curves if x.name in both and not x.over] for one in bank.charts[-2:]
-            ]
-            assert lines == [["sundials:far"], ["sundials:adams"]], bank.name
-            # and the title is of the worst of them
-            assert re.search(r"by at most 0\.\d+ %", bank.heading), bank.heading
+    banks = {bank.name: bank for bank in of_runs(scene, both, both)}
+    for bank in (banks["energy"], banks["error"]):
+        lines = [[x.name for x in one.curves if x.name in both and not x.over] for one in bank.charts[-2:]]
+        assert lines == [["sundials:far"], ["sundials:adams"]], bank.name
+        # and the title is of the worst of them
+        assert re.search(r"by at most 0\.\d+ %", bank.heading), bank.heading
 
 
 def test_frames_too_far_apart_to_be_joined_are_dots() -> None:

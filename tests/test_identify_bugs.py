@@ -241,7 +241,9 @@ def test_a_wrong_record_of_a_right_motion_is_told_as_that(name: str) -> None:
 def test_no_explanation_is_without_a_remedy() -> None:
     for name in ("halves swapped", "mass left out", "friction added", "drag by default"):
         stepper, _ = STEPPERS[name]
-        for one in identify_stepper(stepper).explanations:
+        found = identify_stepper(stepper).explanations
+        assert found
+        for one in found:
             assert one.cause
             assert one.remedy
             assert math.isfinite(one.misfit)

@@ -124,7 +124,9 @@ def test_a_store_is_judged_as_its_run_was_whatever_it_declares(tmp_path: Path, f
         journal.commit(scene)
     again = file.judge(tmp_path / "a.h5", scene=scene, scheme=run.scheme)
     known = {v.check: v for v in again.verdicts}
-    for one in checks.explained(scene, run, checks.judge(scene, run), files.shown):
+    wanted = checks.explained(scene, run, checks.judge(scene, run), files.shown)
+    assert any(one.passed is not None for one in wanted)
+    for one in wanted:
         other = known[one.check]
         assert (one.passed, one.why, repr(one.value), repr(one.bound), one.sees) == (
             other.passed, other.why, repr(other.value), repr(other.bound), other.sees

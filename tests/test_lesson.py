@@ -50,7 +50,9 @@ def test_the_notebook_is_one() -> None:
 def test_what_the_lesson_points_to_is_there() -> None:
     for name in ("lesson.md", "README.md"):
         text = (LESSON / name).read_text()
-        for target in re.findall(r"\]\(([^)#]+)\)", text):
+        targets = re.findall(r"\]\(([^)#]+)\)", text)
+        assert targets
+        for target in targets:
             assert target.startswith("https://") or (LESSON / target).exists(), target
 
 

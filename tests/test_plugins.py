@@ -300,6 +300,7 @@ def test_declaring_and_listing_engines_imports_none_of_their_libraries(tmp_path:
 
 
 def test_every_engine_is_registered_and_of_fields_that_mean_something() -> None:
+    assert len(engines.names()) > 5
     for name in engines.names():
         found = engines.engine(name)
         assert found.name == name

@@ -219,6 +219,7 @@ def test_every_point_ends_at_the_same_time(name: str) -> None:
         assert here.frames <= max(accuracy.FRAMES + 1, sweeps.coarsest(known, 2.0) + 1)
         if i > 24:
             break
+    assert i > 15
 
 
 def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:

@@ -78,6 +78,7 @@ def test_our_own_reader_takes_an_exported_file_as_anyones(tmp_path: Path) -> Non
 def test_pyh5md_opens_the_whole_store(tmp_path: Path) -> None:
     s = scene()
     made = written(tmp_path / "s.h5", s)
+    assert made
     with pyh5md.File(str(tmp_path / "s.h5"), "r") as file:
         for label, one in made.items():
             group = file.particles_group(label)

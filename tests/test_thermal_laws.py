@@ -15,6 +15,8 @@ import pytest
 from springcheck.thermal import THERMOSTATS, Law, Stepper
 
 LINEAR = [name for name, one in THERMOSTATS.items() if not one.rescales]
+"""Of which Vanden-Eijnden & Ciccotti's has no covariances in the literature: its recurrence alone is held
+against its paper's."""
 
 SPRINGS = [(0.35, 3.7, 2.9, 0.8, 1.7), (0.11, 0.4, 31.0, 2.3, 0.02), (1.3, 5.0, 2.0, 0.05, 40.0)]
 """h, m, k, gamma, kT: none of them 1, which hides what is missing."""
@@ -53,16 +55,20 @@ def _table(name: str, a: float, x: float) -> tuple[float, float, float | None]:
     }.get(name, (None, None, None))  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("spring", SPRINGS)
-@pytest.mark.parametrize("name", LINEAR)
-def test_covariances_are_those_of_the_table(name: str, spring: tuple[float, ...]) -> None:
-    h, m, k, rate, thermal = spring
-    found, x = law(name, *spring), h * rate
-    expected = _table(name, h * h * k / m, x)
-    cross = found.covariance[0, 0, 1] / thermal * math.sqrt(k / m)
-    for value, known in zip((found.configurational[0], found.kinetic[0], cross), expected, strict=True):
-        if known is not None and (known > 0 or known is expected[2]):
-            assert value == pytest.approx(known, rel=1e-11, abs=1e-11), name
+@pytest.mark.parametrize("name", [name for name in LINEAR if name != "vanden-eijnden-ciccotti"])
+def test_covariances_are_those_of_the_table(name: str) -> None:
+    told = []
+    for spring in SPRINGS:
+        h, m, k, rate, thermal = spring
+        found, x = law(name, *spring), h * rate
+        expected = _table(name, h * h * k / m, x)
+        cross = found.covariance[0, 0, 1] / thermal * math.sqrt(k / m)
+        pairs = zip((found.configurational[0], found.kinetic[0], cross), expected, strict=True)
+        # what is not above 0 is of a step that is not stable
+        told += [x for x in pairs if x[1] is not None and (x[1] > 0 or x[1] is expected[2])]
+    assert told
+    for value, known in told:
+        assert value == pytest.approx(known, rel=1e-11, abs=1e-11), name
 
 
 def by_hand(
