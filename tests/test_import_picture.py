@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import json
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -130,3 +133,21 @@ def test_no_test_imports_another() -> None:
 
 def test_no_modules_import_each_other() -> None:
     assert house.circles() == []
+
+
+def test_whatever_stands_beside_the_package_imports_only_what_the_package_has() -> None:
+    beside = [*Path(house.__file__).parent.rglob("*.py"), *Path(__file__).parent.rglob("*.py")]
+    wanted = {
+        (node.module, name.name)
+        for path in beside
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "springcheck"
+        for name in node.names
+    }
+    lost = []
+    for module, name in sorted(wanted):
+        home = importlib.import_module(module)
+        if not hasattr(home, name) and not (hasattr(home, "__path__") and find_spec(f"{module}.{name}")):
+            lost.append(f"{module}.{name}")
+    assert len(wanted) > 100
+    assert lost == []
