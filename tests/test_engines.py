@@ -256,6 +256,14 @@ def pocl_on_x86() -> bool:
     return name == "Portable Computing Language" and processor() in ("x86_64", "AMD64")
 
 
+def test_a_glob_without_regard_to_a_bath_names_what_it_names_with_and_without_one() -> None:
+    random = [name for name in engines.names() if engines.engine(name).thermostats]
+    assert random
+    for name in random:
+        apart = {*engines.match((f"{name}:*",)), *engines.match((f"{name}:*",), bath=True)}
+        assert set(engines.match((f"{name}:*",), bath=None)) == apart
+
+
 def test_every_engine_has_methods_of_known_schemes() -> None:
     from springcheck import schemes
 

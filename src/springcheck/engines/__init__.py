@@ -202,11 +202,13 @@ def method(label: Label) -> Method:
 
 def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
     """The methods of an engine that a glob may name: where it says nothing of methods, the default ones."""
-    found = engine(name)
-    methods = {**({} if bath else found.methods), **(found.thermostats if bath is not False else {})}
-    default = [m for m, declared in methods.items() if declared.default]
-    all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
-    return list(methods) if all_of_them else default
+    found, meant = engine(name), list[str]()
+    for of_bath, methods in ((False, found.methods), (True, found.thermostats)):
+        if bath in (None, of_bath):
+            default = [m for m, declared in methods.items() if declared.default]
+            all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
+            meant += methods if all_of_them else default
+    return meant
 
 
 def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Label, ...]:
