@@ -51,8 +51,9 @@ def test_own_methods_import_no_engine_and_nothing_heavy(tmp_path: Path) -> None:
 
 
 def test_enough_spring_steps_for_compiling_to_pay_import_the_compiler_and_no_engine(tmp_path: Path) -> None:
-    steps = own.WORTH // scenes.load_scene("long-chain").n
-    found = imported(tmp_path, f"run long-chain --steps {steps} --method own:semi-implicit-euler --quiet")
+    text = scenes.text_of("spring").replace("steps = 200", f"steps = {own.WORTH}")
+    (tmp_path / "long.toml").write_text(f"{text}\n[record]\nevery = {own.WORTH // 100}\n")
+    found = imported(tmp_path, "run long.toml --method own:semi-implicit-euler --quiet")
     assert "numba" in found
     assert not found & (ENGINES | {"matplotlib"})
 

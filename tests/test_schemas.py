@@ -16,11 +16,20 @@ def schema(command: str) -> dict[str, object]:
     return json.loads((schemas.FOLDER / f"{command}-{schemas.SCHEMA}.json").read_text())  # type: ignore[no-any-return]
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the commands read, which are made once."""
+    folder = tmp_path_factory.mktemp("files")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        Path("table.csv").write_text(schemas.table())
+        schemas.printed(schemas.WAYS["run"][0] + " --force")
+    return folder
+
+
 @pytest.fixture
-def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("table.csv").write_text(schemas.table())
-    schemas.printed(schemas.WAYS["run"][0] + " --force")
+def _files(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(made)
 
 
 @pytest.mark.slow

@@ -63,7 +63,8 @@ WAYS = {
 """What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
 
 FEW: dict[str, Any] = {
-    "FAULTS": FAULTS[:2],
+    "FAULTS": FAULTS[:1],
+    "HALVINGS": 0,
     "CLEAN": 1,
     "BATHS": 0,
     "_BATCH": 4,
