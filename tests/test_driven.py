@@ -361,3 +361,101 @@ def test_a_study_of_stability_says_how_the_exact_motion_grows_in_a_period(name: 
         assert factor == 1
     assert floquet(scenes.load_scene("driven-spring").system) is None
     assert "(Floquet)" in str(springcheck.stability(scene, "own:rk4"))
+
+
+TURNING = [
+    (2.9, 0.11, 0.87, 0.1), (2.9, 0.0, W, 0.1), (2.9, 0.11, -0.87, -0.07), (2.9, 40.0, 3.0, 0.1),
+    (-2.9, 0.0, 0.87, 0.1), (2.9, 0.0, 31.0, 0.3), (2.9, 0.11, 0.0, 0.1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("k", "c", "frequency", "step"), TURNING)
+@pytest.mark.parametrize("name", ["explicit-euler", "semi-implicit-euler", "velocity-verlet", "rk4",
+                                  "implicit-midpoint", "implicit-euler", "yoshida4"])  # fmt: skip
+def test_the_closed_form_of_a_driven_scheme_is_where_its_steps_lead(
+    name: str, k: float, c: float, frequency: float, step: float
+) -> None:
+    """Answer and free motion of the map, against its steps in extended precision, at its resonance too."""
+    law = schemes.SCHEMES[name]
+    scene = driven(3.7, k, c, (0.43, frequency, 0.6), step=step, steps=200)
+    if name == "semi-implicit-euler" and frequency == W:
+        turn = float(
+            schemes.rotation(checks.Case(trajectory=rest(scene, law), scene=scene).undriven.matrices).angle[0]
+        )
+        scene = driven(3.7, k, c, (0.43, turn / step, 0.6), step=step, steps=200)
+    case = checks.Case(trajectory=rest(scene, law), scene=scene)
+    if checks.closed_form(case).passed is None:
+        pytest.skip("a step that reverses orientation")
+    q, p = (x.astype(np.longdouble) for x in (scene.q, scene.p))
+    clocked = case.clocked
+    state = [np.append(x, y)[None] for x, y in ((q, 0), (p, drives_clock(clocked)))]
+    most = 0.0
+    u, v = case.undriven.system.modes.from_centres(*case.closed_states)
+    for i in range(1, scene.steps + 1):
+        state = list(clocked.step(*state))
+        size = max(1, float(np.max(np.abs(state[0][0, :1]))), float(np.max(np.abs(state[1][0, :1]))))
+        most = max(
+            most, *(float(np.abs(a[i, 0] - b[0, 0])) / size for a, b in ((u, state[0]), (v, state[1])))
+        )
+    # some roundings of extended precision for each step, beside the largest state so far
+    assert most < 2000 * 200 * np.finfo(np.longdouble).eps
+
+
+def drives_clock(case: checks.Case) -> float:
+    return float(case.trajectory.p[0, -1])
+
+
+def rest(scene: Scene, law: schemes.Scheme) -> Any:
+    return steppers.record(scene, law, steppers.textbook(scene, law))
+
+
+def off(scene: Scene, name: str, x: float, row: int) -> Scene:
+    """The scene with one number of one row of its drive, or modulated spring, off by x as `Limits` counts."""
+    (term,) = (one for one in scene.terms if one.kind == "drive")
+    field = {"amplitude": "amplitude" if isinstance(term, Drive) else "depth", "late": "phase"}.get(
+        name, name
+    )
+    values = getattr(term, field).copy()
+    how = {"phase": 1.0, "late": float(term.frequency[row]) * scene.step}  # type: ignore[attr-defined]
+    values[row] += x * how.get(name, values[row])
+    changed: Any = replace(term, **{field: values})  # type: ignore[type-var]
+    return replace(scene, terms=tuple(changed if one is term else one for one in scene.terms))
+
+
+@pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
+@pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])
+def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law: str) -> None:
+    scene = replace(uneven() if which == "uneven" else scenes.load_scene(which), every=1, steps=200)
+    (term,) = (one for one in scene.terms if one.kind == "drive")
+    scheme = schemes.SCHEMES[law]
+    right = {v.check: v for v in checks.judge(scene, rest(scene, scheme))}
+    told = 0
+    for check in ("step-defect", "closed-form"):
+        assert right[check].passed is (None if check == "closed-form" and which == "mathieu-tongue" else True)
+        for name in ("amplitude", "frequency", "phase", "late"):
+            limit = getattr(right[check].sees, name)
+            if limit is None:
+                continue
+            told += 1
+            each = range(len(term))
+            found = [by(check, scene, off(scene, name, 2 * limit, row), scheme) for row in each]
+            assert not any(found), (check, name, limit)
+            # of several drives the limit is that of the one that shows least
+            assert any(by(check, scene, off(scene, name, limit / 10, row), scheme) for row in each)
+    assert told == (4 if which == "mathieu-tongue" else 8)
+
+
+def by(check: str, scene: Scene, other: Scene, scheme: schemes.Scheme) -> bool | None:
+    """Whether the states of another scene pass a check as those of this one."""
+    one = next(x for x in checks.CHECKS if x.name == check)
+    run = replace(rest(other, scheme), energy=None)
+    return checks.judge(replace(scene, quantities=("q", "p")), run, [one])[0].passed
+
+
+def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() -> None:
+    scene = driven(3.7, 0.0, 0.0, (0.43, 0.87, 0.6))
+    found = checks.closed_form(
+        checks.Case(trajectory=rest(scene, schemes.SCHEMES["velocity-verlet"]), scene=scene)
+    )
+    assert found.passed is None
+    assert "neither turns nor grows" in found.why

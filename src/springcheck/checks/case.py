@@ -49,6 +49,12 @@ class Case(Claim):
         return replace(self, trajectory=replace(run, q=q, p=p), scene=self.scene.system.clocked)
 
     @cached_property
+    def undriven(self) -> Case:
+        """The case without driving forces, whose modes the motion has; itself where there are none."""
+        alone = self.scene.system.without("drive").scene
+        return replace(self, scene=alone) if len(alone.terms) < len(self.scene.terms) else self
+
+    @cached_property
     def steps(self) -> Integers:
         """The number of steps behind each frame."""
         first = float(self.trajectory.t[0]) / self.trajectory.step
@@ -172,9 +178,24 @@ class Case(Claim):
     @cached_property
     def closed_states(self) -> tuple[Extended, Extended]:
         """The scheme's closed-form motion at the frames: modes about their centres, (f, n) each."""
-        return schemes.propagate(
-            self.matrices, *self.mode_start, self.steps, area_preserving=self.area_preserving
+        return self.closed_at(self.steps)
+
+    def closed_at(self, steps: Integers) -> tuple[Extended, Extended]:
+        """The same after so many steps (f,): the motion without a drive, and what each drive adds from
+        rest."""
+        alone = self.undriven
+        u, v = schemes.propagate(
+            alone.matrices, *alone.mode_start, steps, area_preserving=alone.area_preserving
         )
+        if alone is self:
+            return u, v
+        # nobody else needs it
+        from springcheck.schemes import forced
+
+        y, w = forced.answer(
+            self.scheme, self.system, alone.system.modes, alone.matrices, h=self.trajectory.step, steps=steps
+        )
+        return u + y, v + w
 
     @cached_property
     def growth(self) -> tuple[Floats, Extended]:
@@ -183,8 +204,10 @@ class Case(Claim):
         One rounding a step, enlarged by the map from the step where it arises, and all of one sign; of a
         splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.most`.
         """
-        total, grown = schemes.amplification(self.matrices, self.w, self.steps)
-        size = self.system.norm.most(*self.allowance)
+        alone, n = self.undriven, self.scene.n
+        total, grown = schemes.amplification(alone.matrices, alone.w, self.steps)
+        # without that of a clock
+        size = self.system.norm.most(*(one[:, :n] for one in self.clocked.allowance))
         size = np.maximum.accumulate(np.concatenate([size[:1], size]))
         if self.steps[0] == 0:
             first = size[0]
@@ -193,7 +216,7 @@ class Case(Claim):
             before = self.envelope, (self.scene.q, self.scene.p)
             first = np.max([self.system.norm.most(*self.allowance_at(*x)) for x in before])
         bound = np.asarray(self.roundings * total)
-        condition = float(np.max(schemes.condition(self.matrices, self.w)))
+        condition = float(np.max(schemes.condition(alone.matrices, alone.w)))
         if np.isfinite(condition):
             bound = np.minimum(bound, condition * self.walk(self.steps))
         return bound, np.asarray(np.maximum(size, first * grown))
@@ -208,7 +231,7 @@ class Case(Claim):
         state, near 1, where there is one.  A closed form that rounds like the engine is no walk.  `turn`
         is h w, that of the modes unless it is given.
         """
-        how, plain = self.trajectory.arithmetic, self.law.has("plain", "undamped")
+        how, plain = self.trajectory.arithmetic, self.law.has("plain", "undamped", "linear")
         double = how.state == how.force == 2.0**-53 and not how.quantum
         if not WIDE or not plain or not double:
             return np.full(len(steps), np.inf)

@@ -18,10 +18,11 @@ from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 
 
-@check("closed", family="motion", requires=CLOSED)
+@check("closed", family="motion", requires=MAP | {"unmixed", "closed"})
 def closed_form(case: Case) -> Finding | str:
     """The whole motion is the closed-form motion of the scheme, phase 2 asin(h w/2) and all."""
-    q, p = case.system.modes.from_centres(*case.closed_states)
+    modes = case.undriven.system.modes
+    q, p = modes.from_centres(*case.closed_states)
     distance = case.system.norm.size(case.trajectory.q - q, case.trajectory.p - p)
     moved = case.system.norm.size(q - case.scene.q, p - case.scene.p)
     bound, unit = case.growth
@@ -34,7 +35,7 @@ def closed_form(case: Case) -> Finding | str:
         return f"{STILL} the motion"
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
-        return np.where(late[at], case.system.norm.size(*case.system.modes.out_of(*change)) / allowed[at], 0)
+        return np.where(late[at], case.system.norm.size(*modes.out_of(*change)) / allowed[at], 0)
 
     return Finding(
         distance[worst] / unit[worst],

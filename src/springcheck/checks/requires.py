@@ -69,6 +69,19 @@ def _no_phase(case: Any) -> str | None:
     return None
 
 
+def _no_answer(case: Any) -> str | None:
+    """Why the discrete answer to driving forces has no closed form here."""
+    alone = case.undriven
+    if alone is case:
+        return None
+    if case.scheme.has("flow") or case.steps[0] != 0:
+        return "the closed form of what a drive adds is that of steps of forces, from the start of the run on"
+    found = schemes.rotation(alone.matrices)
+    if np.any((found.angle == 0) & (found.growth == 0)):
+        return "a driven mode that neither turns nor grows has no closed form here"
+    return None
+
+
 _ALL = (
     Requirement("start", "the first frame", _unless(
         lambda case: not case.piece or case.steps[0] == 0, "this piece does not hold the start")),
@@ -137,6 +150,8 @@ _ALL = (
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),
     Requirement("resolved", "a step that doubles resolve", _too_long),
     Requirement("phase", "a step that turns", _no_phase),
+    Requirement("closed", "normal modes and a step that turns, driven or not", lambda case: (
+        missing(case.undriven, {"modes", "phase"}) or _no_answer(case))),
 )  # fmt: skip
 
 REQUIREMENTS = {one.name: one for one in _ALL}

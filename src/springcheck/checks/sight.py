@@ -45,8 +45,15 @@ NUMBERS = 1 << 16
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
-NAMES = ("stiffness", "step", "friction")
-"""Limits that are relative changes of a scene's own numbers."""
+OF_A_DRIVE = {
+    "amplitude": ("amplitude", "depth"),
+    "frequency": ("frequency",),
+    "phase": ("phase",),
+    "late": ("phase",),
+}
+"""Limits of a drive, and the fields that hold what is changed: the last is a phase of W h a step."""
+NAMES = ("stiffness", "step", "friction", *OF_A_DRIVE)
+"""Limits that are changes of a scene's own numbers, relative but for phases."""
 
 
 def limits(
@@ -105,10 +112,16 @@ def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> C
     assert rows is not None
     number, chosen = rows
     terms = list(scene.terms)
-    # friction by the rule of all terms: by its own it is no part of what is scaled
-    factor = np.ones(len(terms[number]))
-    factor[chosen] += change
-    terms[number] = Term.scaled(terms[number], factor)
+    more = np.zeros(len(terms[number]))
+    more[chosen] = change
+    if name in OF_A_DRIVE:
+        term: Any = terms[number]
+        field = next(one for one in OF_A_DRIVE[name] if hasattr(term, one))
+        unit = {"phase": 1.0, "late": term.frequency * run.step}.get(name, getattr(term, field))
+        terms[number] = replace(term, **{field: getattr(term, field) + more * unit})
+    else:
+        # friction by the rule of all terms: by its own it is no part of what is scaled
+        terms[number] = Term.scaled(terms[number], 1 + more)
     return Case(trajectory=run, scene=scene.derived(terms=tuple(terms)))
 
 
@@ -119,7 +132,7 @@ Rows: TypeAlias = tuple[int, slice]
 def every_row(case: Case, name: str, copies: int = 1) -> list[Rows]:
     """The springs, or the frictions, of a scene that is so many copies of one side by side, one in each."""
     found: list[Rows] = []
-    kind = "potential" if name == "stiffness" else "friction"
+    kind = {"stiffness": "potential", "friction": "friction"}.get(name, "drive")
     for number, term in enumerate(case.judged.terms):
         if term.kind == kind:
             each = len(term) // copies
@@ -139,7 +152,7 @@ def _weakest(case: Case, every: list[Rows], at: Integers) -> list[Rows]:
         for number in {number for number, _ in every}:
             term = case.judged.terms[number]
             pull = np.abs(
-                term.pull(q) if term.kind == "potential" else term.parameters[0] * p[:, term.particles[0]]
+                term.parameters[0] * p[:, term.particles[0]] if term.kind == "friction" else term.pull(q)
             )
             most = [np.max(pull / allowed[:, index], axis=0) for index in term.particles]
             sizes[number] = np.max(most, axis=0)
@@ -210,17 +223,27 @@ def _ends(case: Case, at: Integers) -> States:
 def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.floating]) -> Limits:
     """The limits of a check of normal modes: `part(rows, right, change)` says how many bounds a change of
     the closed-form motion about the centres is, in mode coordinates (r, n)."""
-    at, change, right, motions = case.once(_mode_motions)
+    at, change, right, motions = case.once(_mode_motions if case.undriven is case else _driven_motions)
 
     def known(name: str) -> list[States]:
-        # the modes of several springs change otherwise with each of them
-        several = name != "step" and len(every_row(case, name)) > 1
-        return [] if several or name not in motions else [motions[name]]
+        return motions.get(name, [])
 
     return limits(right, known, change, lambda off: part(at, right, off))[0]
 
 
-def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States]]:
+def _driven_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[States]]]:
+    """As `_mode_motions`, of driving forces alone: of a few, each by itself."""
+    at = rows(case, len(case.steps))
+    steps = case.steps[at]
+    change = change_of(int(steps[-1]))
+    motions = {
+        name: [changed(case, name, change, one).closed_at(steps) for one in every_row(case, name)[:MOST_ROWS]]
+        for name in OF_A_DRIVE
+    }
+    return at, change, case.closed_at(steps), motions
+
+
+def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[States]]]:
     """Rows, relative change, the modes' motion there, and that with each parameter changed."""
     at = rows(case, len(case.steps))
     steps = case.steps[at]
@@ -230,12 +253,15 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, States
         return schemes.propagate(matrices, *case.mode_start, steps, area_preserving=case.area_preserving)
 
     with np.errstate(all="ignore"):
-        found = ((name, changed_matrices(case, name, change)) for name in NAMES)
+        found = ((name, changed_matrices(case, name, change)) for name in NAMES[:3])
         # beside a step without a solution the change may reverse orientation
+        # the modes of several springs change otherwise with each of them
         motions = {
-            name: states(matrices)
+            name: [states(matrices)]
             for name, matrices in found
-            if matrices is not None and np.all(schemes.rotation(matrices).determinant > 0)
+            if matrices is not None
+            and np.all(schemes.rotation(matrices).determinant > 0)
+            and (name == "step" or len(every_row(case, name)) <= 1)
         }
         return at, change, states(case.matrices), motions
 

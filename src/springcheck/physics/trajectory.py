@@ -275,6 +275,15 @@ class Limits:
     order: float | None = None
     """Of an order or an exponent, absolute."""
 
+    amplitude: float | None = None
+    """Of the drive, or the depth of the modulation, that shows least."""
+    frequency: float | None = None
+    """Of that of a drive, likewise."""
+    phase: float | None = None
+    """Of a drive, in radians."""
+    late: float | None = None
+    """By which part of a step a drive is taken late."""
+
     def __str__(self) -> str:
         """The same in words, or nothing."""
         said = [words.format(x) for name, words in _SEEN.items() if (x := getattr(self, name)) is not None]
@@ -295,6 +304,10 @@ _SEEN = {
     "area": "an area in phase space off by {:.1e} a step",
     "reaction": "a force off its reaction by {:.1e}",
     "order": "an order or exponent off by {:.1e}",
+    "amplitude": "a drive's amplitude off by {:.1e}",
+    "frequency": "its frequency off by {:.1e}",
+    "phase": "its phase off by {:.1e} rad",
+    "late": "a drive late by {:.1e} of a step",
 }
 
 NOT_KNOWN = Limits()

@@ -8,7 +8,7 @@ free particle alike, where points coincide (de Boor, Surveys in Approximation Th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,15 @@ SERIES_TERMS = 26
 """Of a series within |x t| < 1: the next one is below a rounding of 113 bits."""
 
 
+_Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
+
+
 class _Found(NamedTuple):
     """The system without its drives, its modes, and of each drive frequency, phase and force on each mode."""
 
     alone: System[Any]
     modes: Modes
-    drives: tuple[tuple[np.longdouble, np.longdouble, Extended], ...]
+    drives: tuple[_Drive, ...]
 
 
 def prepare(system: System[Any]) -> _Found | None:
@@ -39,13 +42,19 @@ def prepare(system: System[Any]) -> _Found | None:
     alone = system.without("drive")
     if not alone.has_modes:
         return None
-    drives, modes = [], normal_modes(alone)
+    modes = normal_modes(alone)
+    return _Found(alone, modes, drives(system, modes))
+
+
+def drives(system: System[Any], modes: Modes) -> tuple[_Drive, ...]:
+    """Of each drive of a system frequency, phase, and force on each mode without drives (n,)."""
+    found = []
     for term in system.terms:
         for i, amplitude, frequency, phase in term.rows() if term.key == "drive" else ():
             push = np.zeros(system.n)
             push[i] = amplitude
-            drives.append((np.longdouble(frequency), np.longdouble(phase), modes.into(push * 0, push)[1]))
-    return _Found(alone, modes, tuple(drives))
+            found.append((np.longdouble(frequency), np.longdouble(phase), modes.into(push * 0, push)[1]))
+    return tuple(found)
 
 
 def roots(modes: Modes) -> tuple[_Complex, _Complex]:

@@ -221,19 +221,19 @@ AXES = (
 
 DRIVES = (
     Fault("late-drive", "the drive is taken later by a part of the step",
-          ("step-defect",), seeded.stepping(drives.late), size=1e-9, scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(drives.late), size=1e-9, scene="driven"),
     Fault("held-drive", "the drive of the step's start is held over its stages",
-          ("step-defect",), seeded.stepping(drives.held), scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(drives.held), scene="driven"),
     Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
-          ("step-defect",), seeded.stepping(lambda s, k, x: drives.late(s, k, -1.0)), scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(lambda s, k, x: drives.late(s, k, -1.0)), scene="driven"),
     Fault("drive-phase", "the phase of the drive has the wrong sign",
-          ("step-defect",), seeded.moving(lambda s, x: drives.other(s, phase=-1)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, phase=-1)), scene="driven"),
     Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
-          ("step-defect",), seeded.moving(lambda s, x: drives.other(s, amplitude=1 / s.m)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, amplitude=1 / s.m)), scene="driven"),
     Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
-          ("step-defect",), seeded.moving(lambda s, x: drives.other(s, phase=np.pi / 180)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, phase=np.pi / 180)), scene="driven"),
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
-          ("step-defect",), seeded.moving(lambda s, x: drives.other(s, frequency=2 * np.pi)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, frequency=2 * np.pi)), scene="driven"),
 )  # fmt: skip
 
 
