@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command: Callable[[argparse.Namespace], int] = options.command
     what = "nothing is kept"
     if "keeps" not in options and "output" in options:
-        # each is put in its place at once, as one of many figures
+        # every file is moved to its place whole, each of many figures too
         what = "no file is half written"
     elif "keeps" in options and options.keeps(options):
         what = "what was finished is kept, the same command goes on"

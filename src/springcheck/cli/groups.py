@@ -33,7 +33,7 @@ ELSEWHERE: Mapping[str, Mapping[str, str]] = {
         "--stepper": "input", **dict.fromkeys(("--step", "--friction", "--scheme"), "known of the motion"),
     },
 }  # fmt: skip
-"""By command: what means something else to it than to the others."""
+"""By command: options that mean something else there than in other commands, and their headings."""
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):

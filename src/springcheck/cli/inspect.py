@@ -65,7 +65,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:
-    """Some frames of the trajectory asked for, all over its length, and every how many of them."""
+    """Evenly spaced frames of the trajectory asked for, and the stride between them."""
     if options.trajectory is None:
         return None, 1
     return store.strided(summary.path, options.trajectory, 20 if options.rows is None else options.rows)

@@ -249,7 +249,8 @@ class Lock:
     """One writer at a time.  The lock is the system's, so that it ends with its process, killed or not.
 
     Where the file system has no locks, the file itself says who writes, and a `StoreWarning` that two
-    writers on two machines would not see each other.
+    writers on two machines would not see each other.  The library filelock (4.2) knows ENOSYS alone of what
+    such file systems answer (`UNSUPPORTED`), and its file does not say who writes.
     """
 
     def __init__(self, path: Path) -> None:

@@ -147,7 +147,7 @@ def begin(file: Any) -> None:
 
 @cache
 def _empty() -> bytes:
-    """A file that holds nothing but its format, which so stands at the beginning of every file of ours."""
+    """An HDF5 file with its format and nothing else: so the format lies in the first bytes of every store."""
     with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
         write_attributes(file, {"format": FORMAT})
         file.flush()

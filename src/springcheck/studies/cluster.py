@@ -1,8 +1,8 @@
 """Pieces of a study by the workers of a dask cluster: a scheduler that runs, or jobs of a queue.
 
 Workers come and go: what one has not answered goes to another.  A worker whose versions are not this
-program's is refused, because its numbers might not be.  When the scheduler is gone, what was finished is
-kept, and the same command goes on with another one.
+program's is refused, because its numbers might not be; a `Client.get_executor` does neither.  When the
+scheduler is gone, what was finished is kept, and the same command goes on with another one.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Shown:
 
     __slots__ = ()
     table_of: ClassVar[str] = ""
-    """The name in its document of what are the rows of its table."""
+    """The key of its document under which the rows of its table stand."""
 
     def __str__(self) -> str:
         from springcheck.text.lines import as_text

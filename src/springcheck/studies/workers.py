@@ -1,4 +1,8 @@
-"""Parts of a computation in processes of their own, which end with the program, however that ends."""
+"""Parts of a computation in processes of their own, which end with the program, however that ends.
+
+Those of a `ProcessPoolExecutor` stay for ever where the program is killed, and what they are at runs on where
+it leaves early.
+"""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.extremes.grid import Spec
 
 Outcome: TypeAlias = Literal[
-    "right", "unstable, as theory says", "engine's limit", "refused", "silently wrong", "not measured"
+    "right", "unstable, as theory says", "engine's limit", "silently wrong", "not measured"
 ]
 
 GROWN = 2.0

@@ -1,7 +1,7 @@
 """The atlas of extreme cases: every method over the decades, every cell with an outcome and its reason.
 
-A cell is right (each step within its bound), unstable as theory says, at the engine's limit (off, and we
-say why), or refused.  A cell that is off without a named reason is silently wrong, and fails the study.
+A cell is right (each step within its bound), unstable as theory says, or at the engine's limit (off, and we
+say why).  A cell that is off without a named reason is silently wrong, and fails the study.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
-from springcheck.studies.extremes import grid, refusals, running, solving
+from springcheck.studies.extremes import grid, running, solving
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.planes import decade
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
@@ -70,8 +70,6 @@ def measure(
             usable, each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS), strict=True
         )
     ]
-    if not methods:
-        work.append(Piece(key="refusals", what="refusals", measure=refusals.cells, form=CELLS))
     work += _finer(usable, cells)
     kept = kept or Keeper()
     found = [cell for piece in kept.results(work) for cell in piece]

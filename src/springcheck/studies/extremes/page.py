@@ -13,7 +13,6 @@ SHADES = {
     "right": "good",
     "unstable, as theory says": "wild",
     "engine's limit": "limit",
-    "refused": "refused",
     "silently wrong": "wrong",
     "not measured": "#8c6bb1",
 }
@@ -38,7 +37,7 @@ def banks(atlas: Atlas) -> list[Bank]:
         return []
     wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
     others = ", ".join(
-        f"{n} {name}" for name, n in atlas.counts().most_common(3) if n and name != OUTCOMES[4]
+        f"{n} {name}" for name, n in atlas.counts().most_common(3) if n and name != "silently wrong"
     )
     heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
     return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]

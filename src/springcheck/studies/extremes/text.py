@@ -13,7 +13,6 @@ SHORT = {
     "right": "right",
     "unstable, as theory says": "unstable",
     "engine's limit": "limit",
-    "refused": "refused",
     "silently wrong": "wrong",
 }
 """Outcomes, and their columns."""

@@ -182,7 +182,7 @@ BROKEN_STAGES = {
     "old force": (B, A, O, A, Act("held", HALF)),
     "whole drifts": (B, Act("drift", ONE), O, Act("drift", ONE), B),
 }
-"""Splittings that have lost a letter or a number."""
+"""Splittings without one of their stages, or with a wrong coefficient."""
 
 
 def jumping(scene: Scene, scheme: schemes.Scheme, size: float, seed: Any = 1) -> Trajectory:

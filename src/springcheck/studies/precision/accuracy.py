@@ -56,7 +56,7 @@ class Truth:
 
     scene: Scene
     turning: exact.Modes
-    """Modes of its springs alone, by which the phase is told."""
+    """Normal modes of its springs alone, in which the phase is measured."""
     w: float
     """Largest frequency along the motion [1/T], 0 where nothing turns."""
 
