@@ -19,9 +19,9 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1190,
     ("checks",): 4368,
     ("identify",): 7825,
-    ("formats", "store"): 5102,
-    ("studies",): 1603,
-    ("studies/*",): 11031,
+    ("formats", "store"): 5103,
+    ("studies",): 1607,
+    ("studies/*",): 10951,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6486,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
