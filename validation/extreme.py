@@ -6,8 +6,8 @@ motion in 60 digits.
 
 Command: python validation/extreme.py [FOLDER]       (default: figures; about two minutes)
 
-Printed: 10602 cells, 6429 right, 2025 unstable as theory says, 2143 at an engine's limit, 5 not measured
-(single precision may round as far as a step goes), none silently wrong; 32 inputs that make no sense are
+Printed: 10602 cells, 6427 right, 2025 unstable as theory says, 2145 at an engine's limit, 5 not measured
+(single precision may round as far as a step goes), none silently wrong; 38 inputs that make no sense are
 refused in a line: scene files, and scenes that a method cannot serve.  Right for forces between
 1e-300 and 1e300, all that is tried: the own methods; 1e-11 and 1e300: ASE (its forces are kept while nothing
 moves by more than 1e-15); 1e-150 and 1e150: OpenMM on Reference and CPU (it squares lengths); 1e-2 and 1e8:

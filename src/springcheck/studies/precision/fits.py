@@ -17,8 +17,8 @@ from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.points import Point
 
 ASYMPTOTIC = 2e-2
-"""Errors from here down are led by the first term of their expansion.  The next term, relative to the first, is
-about as large as the error: a fiftieth here, and a quarter or a half of that at each halving of the step."""
+"""Errors from here down are led by the first term of their expansion.  The next term over the first is about
+as large as the error: a fiftieth here, and a quarter or a half of that at each halving of the step."""
 
 ABOVE_FLOOR = 100.0
 """Points of a fit lie this far above their rounding, which then shifts no error by more than 1 %."""
