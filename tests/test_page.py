@@ -17,7 +17,7 @@ import browser
 from browser import Browser
 from springcheck import schemes, store
 from springcheck.cli import main, page
-from springcheck.cli.page.content import drawn
+from springcheck.cli.page.given import drawn
 from springcheck.cli.page.sections import Section
 from springcheck.errors import StoreError
 from springcheck.figures import charts, looks
@@ -447,27 +447,24 @@ def test_every_scheme_of_one_particle_is_computed_again(tmp_path: Path, opened: 
         assert found == "differs", (runs[i]["label"], said)
 
 
-def test_counts_that_are_not_those_of_the_tables_are_told(
+def test_counts_and_verdicts_that_were_changed_are_told(
     content: page.Content, chromium: Browser, tmp_path: Path
 ) -> None:
     text = page.html(content)
     shown = re.search(r"> 9 passed|✓ (\d+) passed", text)
     assert shown
-    for old, new, said in (
-        (shown[0], shown[0].replace(shown[1] or "9", "7"), "are not those of their table"),
-        (
-            f'"counts">{content.summary_line}',
-            f'"counts">{content.summary_line.replace("verdicts", "of 99 verdicts")}',
-            "the head says",
-        ),
-        ("<td>passed</td>", '<td class="bad">FAILED</td>', "are not those of their table"),
+    for old, new in (
+        (shown[0], shown[0].replace(shown[1] or "9", "7")),
+        (f'"counts">{content.summary_line}', f'"counts">{content.summary_line.replace("9", "8")}.'),
+        ("<td>passed</td>", '<td class="bad">FAILED</td>'),
+        ("<td>exact</td>", "<td>not exact</td>"),
     ):
         assert old in text
         (tmp_path / "a.html").write_text(text.replace(old, new, 1), encoding="utf-8")
         chromium.open(tmp_path / "a.html")
         found, words = _checked(chromium)
         assert found == "differs", new
-        assert said in words
+        assert 'a verdict or a count reads "' in words
 
 
 def test_what_failed_is_drawn_and_the_check_says_so(tmp_path: Path, opened: Any) -> None:
@@ -552,7 +549,7 @@ def test_factors_and_exact_motion_in_the_page_are_those_of_the_library(
     for name in THREE:
         one = stepped(name, 0.5, 2 * zeta)
         largest = float(np.max(np.abs(np.linalg.eigvals(one))))
-        assert chromium.run(f"radius(THREE['{name}'], 0.5, {zeta})") == pytest.approx(largest, rel=1e-7)
+        assert chromium.run(f"radius(DATA.laws['{name}'], 0.5, {zeta})") == pytest.approx(largest, rel=1e-7)
 
 
 THREE = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
@@ -671,4 +668,29 @@ def test_a_study_is_drawn(studies: dict[str, Path], opened: Any, name: str) -> N
     chromium.key("ArrowRight")
     said = chromium.run(f"document.querySelector('#{name}-0 .reading').textContent").strip()
     assert said
+    assert chromium.said == []
+
+
+def test_a_file_that_is_dropped_is_named_and_goes_nowhere(
+    content: page.Content, opened: Any, spring: Path
+) -> None:
+    chromium = opened(content)
+    run = store.read(spring)["own:velocity-verlet"]
+    rows = [",".join(map(repr, map(float, row))) for row in zip(run.t, run.q[:, 0], run.p[:, 0], strict=True)]
+    said = 'document.getElementById("dropped").textContent'
+    for name, text, found in (
+        ("it's mine.csv", "\n".join(["t,q,v", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
+        ("few.csv", "t,q,v\n0,1,2", "Twelve or more rows"),
+    ):
+        script = (
+            "const kept = new DataTransfer();"
+            f"kept.items.add(new File([{json.dumps(text)}], {json.dumps(name)}));"
+            'document.getElementById("yours").dispatchEvent(new DragEvent("drop", {dataTransfer: kept}));'
+            "return new Promise((done) => setTimeout(done, 300));"
+        )
+        chromium.run(f"(() => {{ {script} }})()")
+        assert found in chromium.run(said)
+    ask = 'document.getElementById("ask").textContent'
+    assert chromium.run(ask) == "springcheck identify 'few.csv'"
+    assert chromium.asked == [chromium.run("location.href")]
     assert chromium.said == []

@@ -144,7 +144,7 @@ def plain(bank: Bank) -> dict[str, Any]:
     for chart in found["charts"]:
         for axis in (chart["x"], chart["y"]):
             said = list(axis.pop("names"))
-            axis |= {"named": bool(said), "values": said or numbers(axis["values"])}
+            axis |= {"named": bool(said), "values": said or numbers(axis["values"]), "powers": _powers(axis)}
         for curve in chart["curves"]:
             curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
             for name in ("open", "over", "band"):
@@ -158,6 +158,20 @@ def plain(bank: Bank) -> dict[str, Any]:
                 "notes": [[at[note] for note in row] for row in tiles["notes"]],
             }
     return found
+
+
+def _powers(axis: dict[str, Any]) -> list[tuple[float, int]]:
+    """Places of powers of ten among many values in even ratios: [place, exponent], a few of them."""
+    values = np.asarray(axis["values"], np.float64)
+    if len(values) < 3 or not np.all(values > 0):
+        return []
+    logs = np.log10(values)
+    ratios = np.diff(logs)
+    if not np.allclose(ratios, ratios[0], rtol=1e-6):
+        return []
+    every = math.ceil((logs[-1] - logs[0]) / 7)
+    exponents = range(every * math.ceil(logs[0] / every), math.floor(logs[-1]) + 1, every)
+    return [(float((e - logs[0]) / ratios[0]), e) for e in exponents]
 
 
 def numbers(values: Sequence[float] | Floats) -> list[float | str]:

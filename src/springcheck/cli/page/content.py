@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,16 @@ from springcheck import checks, schemes, store
 from springcheck.checks import compare
 from springcheck.checks.compare import EXACT, Same
 from springcheck.cli import explain, inspect
+from springcheck.cli.page import given
 from springcheck.cli.page.sections import Section, sections
 from springcheck.errors import SpringcheckError
-from springcheck.figures.charts import Bank, numbers
+from springcheck.figures.charts import Bank
 from springcheck.figures.charts import plain as charts_as_data
 from springcheck.figures.views import MOST_PANELS
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import WallSpring
-from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
+from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import of_runs
@@ -34,10 +34,6 @@ NUMBERS = 12_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
 FEWEST_SHOWN = 50
 """Frames that are kept of each trajectory however many there are."""
-LONGEST = 2_000_000
-"""Steps up to which a browser runs the loops again: about a second."""
-STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
-"""Of a splitting that a page carries out."""
 TAIL = 1 << 20
 """Frames at the end of a run by which it is told whether two of them are one motion, as `run` does."""
 
@@ -168,15 +164,8 @@ def gather(path: Path) -> Content:
         comparison=comparison,
         sha256=_digest(path) if path.is_file() else "",
         stride=max((stride for _, stride in pieces.values()), default=1),
-        data={
-            "runs": [drawn(piece, failed=piece.label in wrong) for piece, _ in pieces.values()],
-            "spring": spring(scene) if scene and labels else None,
-            "linear": linear(scene) if scene and labels else None,
-            "laws": laws(piece.scheme for piece, _ in pieces.values()),
-            "steps": scene.steps if scene else 0,
-            "equal": scene is not None and scene.units == "reduced",
-            "banks": banks,
-        },
+        data=given.to_scripts(scene if labels else None, [piece for piece, _ in pieces.values()], wrong)
+        | {"banks": banks},
     )
 
 
@@ -217,65 +206,6 @@ def _known(summary: Summary) -> dict[str, Any]:
         if isinstance(document, dict) and isinstance(machine := document.get("machine"), dict):
             return machine
     return {}
-
-
-def spring(scene: Scene) -> dict[str, Any] | None:
-    """The numbers of one particle on one wall spring; None for any other scene, or one too long."""
-    if scene.n != 1 or len(scene.terms) != 1 or scene.steps > LONGEST:
-        return None
-    wall = scene.terms[0]
-    if not isinstance(wall, WallSpring) or len(wall) != 1:
-        return None
-    given = {"k": wall.k, "at": wall.at, "m": scene.m, "q": scene.q, "p": scene.p}
-    found: dict[str, Any] = {name: float(values[0]) for name, values in given.items()}
-    # ASE calculates in units of its own
-    return {**found, "h": scene.step, "converted": ["ase"] if scene.units == "md" else []}
-
-
-def linear(scene: Scene) -> dict[str, Any] | None:
-    """The numbers of one particle in any linear force f - k q - c p/m; None for any other scene, or one too
-    long."""
-    system = scene.system
-    if scene.n != 1 or not system.is_linear or scene.steps > LONGEST:
-        return None
-    zero = np.zeros(1)
-    found = {
-        "k": system.hessian_diagonal(zero), "f": system.force(zero, zero),
-        "c": system.friction_rates * scene.m, "m": scene.m, "q": scene.q, "p": scene.p,
-    }  # fmt: skip
-    values = {name: float(x[0]) for name, x in found.items()}
-    return {**values, "tolerance": scene.tolerance} if np.isfinite(list(values.values())).all() else None
-
-
-def laws(names: Iterable[str]) -> dict[str, Any]:
-    """Schemes by name, as their stages or their tableau in doubles; "exact" where they follow that motion."""
-    known, found = schemes.known(), dict[str, Any]()
-    for scheme in (known[name] for name in names if name in known):
-        if scheme.has("flow") or scheme.has("adaptive"):
-            found[scheme.name] = "exact"
-        elif scheme.stages and {kind for kind, _ in scheme.stages} <= STAGES:
-            found[scheme.name] = [(kind, float(schemes.number(c, np.float64))) for kind, c in scheme.stages]
-        elif scheme.b:
-            a = [[float(x) for x in row] for row in scheme.a]
-            found[scheme.name] = {"a": a, "b": [float(x) for x in scheme.b]}
-    return found
-
-
-def drawn(piece: Trajectory, *, failed: bool = False) -> dict[str, Any]:
-    """The first particle of a trajectory."""
-    how = piece.arithmetic
-    return {
-        "label": piece.label,
-        "failed": failed,
-        "roundoff": max(how.state, how.force, how.quantum),
-        "scheme": piece.scheme,
-        "title": schemes.title(piece.scheme),
-        "every": piece.every,
-        "step": piece.step,
-        "t": numbers(piece.t),
-        "q": numbers(piece.q[:, 0]),
-        "p": numbers(piece.p[:, 0]),
-    }
 
 
 def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:

@@ -2,56 +2,29 @@
 // Steps in the order of operations of the methods named: JavaScript's numbers are IEEE doubles.  `s` is
 // {h, k, m, c} and the force f - k q - c p/m, or -k (q - at) - c p/m of a wall spring.
 
-const THREE = {
-  "explicit-euler": { a: [[]], b: [1] },
-  "semi-implicit-euler": [["kick", 1], ["drift", 1]],
-  "velocity-verlet": [["kick", 0.5], ["drift", 1], ["kick", 0.5]],
-};
-
 // ASE multiplies by the step before it divides by the mass, and keeps a force for positions within 1e-15
-function aseVelocityVerlet(s) {
-  let where = NaN, kept = NaN;
-  const forceAt = (q) => {
-    if (!(Math.abs(q - where) <= 1e-15)) {
-      where = q;
-      kept = -s.k * (q - s.at);
-    }
-    return kept;
+function aseVelocityVerlet({ h, k, m, at }) {
+  let [where, kept] = [NaN, NaN];
+  const kick = (q, p) => {
+    if (!(Math.abs(q - where) <= 1e-15)) [where, kept] = [q, -k * (q - at)];
+    return p + 0.5 * h * kept;
   };
   return (q, p) => {
-    const x = 0.5 * s.h;
-    const half = p + x * forceAt(q);
-    const moved = q + (s.h * half) / s.m;
-    return [moved, half + x * forceAt(moved)];
+    const half = kick(q, p), moved = q + (h * half) / m;
+    return [moved, kick(moved, half)];
   };
 }
 
-const LOOPS = {
-  "own:euler": (s) => stepper(THREE["explicit-euler"], s),
-  "own:semi-implicit-euler": (s) => stepper(THREE["semi-implicit-euler"], s),
-  "own:velocity-verlet": (s) => stepper(THREE["velocity-verlet"], s),
-  "ase:velocity-verlet": aseVelocityVerlet,
-};
-
-// The first frame in which a stored run is not what its loop gives here, to the last bit; null where none is.
-function firstDifference(run, spring) {
-  const step = LOOPS[run.label]({ ...spring, h: run.step });
-  let q = spring.q, p = spring.p;
-  for (let i = 0; i < run.t.length; i++) {
-    if (i > 0) {
-      for (let j = 0; j < run.every; j++) [q, p] = step(q, p);
-    }
-    if (!Object.is(q, run.q[i]) || !Object.is(p, run.p[i])) {
-      return { frame: i, t: run.t[i], q, p, fileQ: run.q[i], fileP: run.p[i] };
-    }
-  }
-  return null;
+// The entries of a scheme's one-step matrix on (q, p), by rows.
+function matrixOf(law, s) {
+  const step = law === "exact" ? (q, p) => exactMotion({ ...s, q, p }, [s.h])[0] : stepper(law, s);
+  const [[a, c], [b, d]] = [step(1, 0), step(0, 1)];
+  return [a, b, c, d];
 }
 
 // Spectral radius of a scheme's one-step matrix at h omega = w and damping ratio c / (2 sqrt(k m)) = zeta.
 function radius(law, w, zeta) {
-  const step = stepper(law, { h: w, k: 1, m: 1, at: 0, c: 2 * zeta });
-  const [a, c] = step(1, 0), [b, d] = step(0, 1);
+  const [a, b, c, d] = matrixOf(law, { h: w, k: 1, m: 1, at: 0, c: 2 * zeta });
   const half = (a + d) / 2, rest = half * half - (a * d - b * c);
   return rest < 0 ? Math.sqrt(a * d - b * c) : Math.abs(half) + Math.sqrt(rest);
 }
@@ -59,11 +32,9 @@ function radius(law, w, zeta) {
 // The exact motion of the spring of `s` after each of `times`, [q, p].
 function exactMotion(s, times) {
   const g = (s.c || 0) / (2 * s.m), w2 = s.k / s.m - g * g, w = Math.sqrt(Math.abs(w2));
-  const x0 = s.q - s.at, v0 = s.p / s.m;
+  const x0 = s.q - s.at, v0 = s.p / s.m, [cos, sin] = w2 > 0 ? [Math.cos, Math.sin] : [Math.cosh, Math.sinh];
   return times.map((t) => {
-    const even = w2 > 0 ? Math.cos(w * t) : Math.cosh(w * t);
-    const odd = w === 0 ? t : (w2 > 0 ? Math.sin(w * t) : Math.sinh(w * t)) / w;
-    const decay = Math.exp(-g * t);
+    const even = cos(w * t), odd = w === 0 ? t : sin(w * t) / w, decay = Math.exp(-g * t);
     const x = decay * (x0 * even + (v0 + g * x0) * odd);
     return [s.at + x, s.m * decay * (v0 * even - (g * v0 + (s.k / s.m) * x0) * odd)];
   });
@@ -86,7 +57,7 @@ function stepper(law, s) {
       return [q, p];
     };
   }
-  const sum = (start, row, values) => values.reduce((total, v, i) => (row[i] ? total + row[i] * h * v : total), start);
+  const sum = (first, row, values) => values.reduce((x, v, i) => (row[i] ? x + row[i] * h * v : x), first);
   return (q, p) => {
     const forces = [], speeds = [];
     law.a.forEach((row, i) => {
@@ -102,29 +73,25 @@ function stepper(law, s) {
   };
 }
 
-// How far a stored run is from its scheme computed here, as a fraction of what rounding may do, and where most:
-// an own rounding of either side in each of its steps, as far as the orbit is from a circle, or all its steps.
-// Of an adaptive solver: from the exact motion, as a fraction of a thousand tolerances for each radian.
+// How far a stored run is from its scheme computed here, in parts of what rounding may do, where most; its
+// first frame that is not the same to the last bit.  Of an adaptive solver: from the exact motion, in parts
+// of a thousand tolerances for each radian.
 function departure(run, s, law) {
-  const w = Math.sqrt(Math.abs(s.k) / s.m) || 1, own = { ...s, h: run.step };
-  const step = law === "exact" ? null : stepper(law, own), plain = step && stepper(law, { ...own, f: 0 });
-  let stretch = 1;
-  if (step) {
-    const [a, c] = plain(1, 0), [b, d] = plain(0, 1), half = Math.abs(c / (w * s.m) - b * w * s.m) / 2;
-    const area = -((a - d) ** 2 / 4 + b * c);
-    stretch = area > 0 ? (half + Math.sqrt(Math.max(half * half - area, 0))) / Math.sqrt(area) : run.t.length * run.every;
-  }
-  const at = s.k ? s.f / s.k : 0, exact = step ? null : exactMotion({ ...s, at }, run.t);
-  let [q, p] = [s.q, s.p], size = 0, worst = { share: 0, frame: 0 };
+  const w = Math.sqrt(Math.abs(s.k) / s.m) || 1, own = { ...s, h: run.step }, at = s.at ?? (s.k && s.f / s.k);
+  const motion = law === "exact" && exactMotion({ ...s, at }, run.t);
+  const step = motion ? null : run.loop === "ase" ? aseVelocityVerlet(own) : stepper(law, own);
+  const found = { share: 0, frame: 0, first: null };
+  let [q, p, size] = [s.q, s.p, 0];
   for (let i = 0; i < run.t.length; i++) {
-    if (step && i) for (let j = 0; j < run.every; j++) [q, p] = step(q, p);
-    if (exact) [q, p] = exact[i];
+    for (let j = 0; step && i && j < run.every; j++) [q, p] = step(q, p);
+    if (motion) [q, p] = motion[i];
+    if (!Object.is(q, run.q[i]) || !Object.is(p, run.p[i])) found.first ||= { i, q, p };
     size = Math.max(size, Math.hypot(w * q, p / s.m), Math.hypot(w * (q - at), p / s.m));
-    const rounding = 256 * Math.max(run.roundoff, 2 ** -53) * (1 + i * run.every) * stretch;
-    const allowed = size * (exact ? Math.max(1e3 * s.tolerance * (1 + w * Math.abs(run.t[i])), rounding) : rounding);
+    const tolerance = motion ? 1e3 * s.tolerance * (1 + w * Math.abs(run.t[i])) : 0;
+    const allowed = size * Math.max(tolerance, run.rounding * (1 + i * run.every));
     const share = Math.hypot(w * (q - run.q[i]), (p - run.p[i]) / s.m) / allowed;
     // what is no number is not equal
-    if (!(share <= worst.share)) worst = { share: Number.isNaN(share) ? Infinity : share, frame: i };
+    if (!(share <= found.share)) [found.share, found.frame] = [Number.isNaN(share) ? Infinity : share, i];
   }
-  return worst;
+  return found;
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from markupsafe import Markup
 from springcheck.cli.page.content import Content
 from springcheck.errors import StoreError, plain
 from springcheck.figures import looks
-from springcheck.figures.charts import REJECTED
+from springcheck.figures.charts import BEGIN, EXACTLY, GUIDE, REJECTED, SEPARATRIX
 from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
 from springcheck.text.wording import ordinal
@@ -23,10 +24,20 @@ from springcheck.text.wording import ordinal
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
 """In the first lines of every report: no other file is replaced."""
-SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
+SCRIPTS = ("loops.js", "drawing.js", "charts.js", "files.js", "page.js")
 """In the order in which they need one another."""
-LOOPS = ("explicit-euler", "semi-implicit-euler", "velocity-verlet")
-"""Schemes that the page itself carries out, whatever the store holds."""
+DASHES = ("", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6")
+"""In the order of `looks.LINES`."""
+PLAIN_DASHES = {EXACTLY: "1 5", SEPARATRIX: "3 3", GUIDE: "", BEGIN: ""}
+"""Of what is no scheme's."""
+SHAPES = (
+    "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0",
+    "m-3-3h6v6h-6z",
+    "m0-4l4 7h-8z",
+    "m0-4l4 4l-4 4l-4-4z",
+    "m-3-3l6 6m0-6l-6 6",
+)
+"""Marks, drawn from where they stand."""
 JSON_WORDS = ("Infinity", "-Infinity", "NaN")
 FEWEST_POOLED = 8
 """Numbers that are written where they stand."""
@@ -44,7 +55,15 @@ def html(content: Content) -> str:
         # what a file says is text without control characters
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
+    kept: list[str] = []
+
+    def keep(text: str) -> str:
+        """The text, of which the page's script is told too."""
+        kept.append(Markup(text).unescape().strip() if isinstance(text, Markup) else plain(text).strip())
+        return text
+
     around.filters |= {
+        "kept": keep,
         "short": "{:.3g}".format,
         "fraction": fraction,
         "ordinal": ordinal,
@@ -62,7 +81,8 @@ def html(content: Content) -> str:
         style_digest=_digest(style),
         script=Markup(script),
         script_digest=_digest(script),
-        data=_json(pooled({**content.data, "looks": _looks(content.data)})),
+        # asked for at the end of the page
+        data=lambda: _json(pooled(_with_looks({**content.data, "words": kept}))),
     )
 
 
@@ -85,30 +105,63 @@ def write(content: Content, path: Path) -> int:
     return len(page)
 
 
-def _looks(data: Mapping[str, Any]) -> dict[str, tuple[str, str, int]]:
-    """Of each scheme that is drawn: its colour on white and on black, and the number of its line."""
-    curves = (
-        curve for bank in data["banks"].values() for chart in bank["charts"] for curve in chart["curves"]
-    )
-    names = (*LOOPS, *(curve["group"] for curve in curves if curve["group"] != REJECTED))
-    found = {name: looks.look(name) for name in names}
-    shown = {
-        name: (*looks.ON_SCREEN[look.color], looks.LINES.index(look.linestyle))
-        for name, look in found.items()
-    }
-    return {**shown, "failed": looks.FAILED_ON_SCREEN}
+def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The data with a look of each curve: colours on white and on black, dash, dash in print, mark.
+
+    Curves of one name have one look; those of one scheme share a colour, and their dashes take turns.  In
+    print, where all are black, schemes differ by their dashes in the order in which they come.
+    """
+    order: dict[str, int] = {}
+
+    def look(group: str, count: int) -> dict[str, Any]:
+        if group in PLAIN_DASHES:
+            dash, soft = PLAIN_DASHES[group], "var(--soft)"
+            return {"colours": (soft, soft), "dash": dash, "printed": dash, "mark": SHAPES[-1]}
+        known, place = looks.look(group), order.setdefault(group, len(order)) + count
+        line = looks.LINES.index(known.linestyle)
+        colours = looks.FAILED_ON_SCREEN if group == REJECTED else looks.ON_SCREEN[known.color]
+        return {
+            "colours": colours, "dash": DASHES[(line + count) % len(DASHES)],
+            "printed": DASHES[place % len(DASHES)], "mark": SHAPES[place % len(SHAPES)],
+        }  # fmt: skip
+
+    def seen(bank: Mapping[str, Any]) -> dict[str, Any]:
+        counts: Counter[tuple[str, bool]] = Counter()
+        found: dict[str, dict[str, Any]] = {}
+        for curve in (curve for chart in bank["charts"] for curve in chart["curves"]):
+            if curve["name"] not in found:
+                # a theory's line and the marks on it are of one look
+                kind = curve["group"], curve["line"]
+                found[curve["name"]] = look(curve["group"], counts[kind])
+                counts[kind] += 1
+        return {**bank, "charts": [
+            {**chart, "curves": [{**curve, "look": found[curve["name"]]} for curve in chart["curves"]]}
+            for chart in bank["charts"]
+        ]}  # fmt: skip
+
+    live = data.get("live")
+    return {
+        **data, "live": live and seen(live),
+        "banks": {name: seen(bank) for name, bank in data["banks"].items()},
+    }  # fmt: skip
 
 
 def pooled(data: Any) -> list[Any]:
-    """Every row once: [rows, data], where {"#": i} stands for the i-th row of numbers, {"$": i} of text."""
+    """Every row once: [rows, data], where {"#": i} stands for the i-th row of numbers, {"$": i} of text.
+
+    Looks stand among them too.  Numbers that are no numbers in JSON are among rows alone.
+    """
     rows: dict[str, int] = {}
 
     def put(x: Any) -> Any:
+        if isinstance(x, Mapping) and "colours" in x:
+            return {"$": rows.setdefault(json.dumps(x), len(rows))}
         if isinstance(x, Mapping):
             return {key: put(value) for key, value in x.items()}
         if not isinstance(x, list | tuple):
             return x
-        if len(x) > FEWEST_POOLED and all(type(value) is float or value in JSON_WORDS for value in x):
+        long = len(x) > FEWEST_POOLED or any(type(value) is str for value in x)
+        if long and all(type(value) is float or value in JSON_WORDS for value in x):
             text = json.dumps(x)
             return {"#": rows.setdefault(text, len(rows))}
         if len(x) > FEWEST_POOLED and all(type(value) is str for value in x):

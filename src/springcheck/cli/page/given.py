@@ -1,0 +1,177 @@
+"""What the scripts of a page are given: runs, the numbers of their scene, schemes as their coefficients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.errors import SpringcheckError
+from springcheck.figures import charts
+from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
+from springcheck.formats import columns
+from springcheck.identify.families import title
+from springcheck.identify.hypothesis import distinct
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
+from springcheck.physics.trajectory import Trajectory
+
+LONGEST = 2_000_000
+"""Steps up to which a browser runs the loops again: about a second."""
+STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
+"""Of a splitting that a page carries out."""
+LOOPS = {
+    "own:euler": "own", "own:semi-implicit-euler": "own", "own:velocity-verlet": "own",
+    "ase:velocity-verlet": "ase",
+}  # fmt: skip
+"""Methods of a wall spring whose operations, in their order, a page knows to the last bit."""
+TRIED = {
+    "explicit Euler": "explicit-euler",
+    "semi-implicit Euler": "semi-implicit-euler",
+    "velocity Verlet": "velocity-verlet",
+}
+"""Schemes that run by the reader's own numbers."""
+SLIDING = np.arange(201) / 200
+"""Places of a slider."""
+
+
+def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collection[str]) -> dict[str, Any]:
+    """The data of a page, but for its charts; `wrong` are the methods that some verdict rejects."""
+    one = spring(scene) if scene else None
+    return {
+        "runs": [drawn(piece, scene, failed=piece.label in wrong) for piece in pieces],
+        "spring": one,
+        "sliders": one and {name: [float(f"{x:.6g}") for x in y] for name, y in sliders(**one).items()},
+        "live": one and charts.plain(_live()),
+        "linear": linear(scene) if scene else None,
+        "laws": laws([*(piece.scheme for piece in pieces), *TRIED.values()]),
+        "steps": scene.steps if scene else 0,
+        "equal": scene is not None and scene.units == "reduced",
+        "columns": columns.NAMES,
+        "schemes": plain_schemes(),
+    }
+
+
+def plain_schemes() -> list[dict[str, Any]]:
+    """One scheme of every one-step map that `identify` tells apart where nothing is damped."""
+    known = laws(schemes.SCHEMES)
+    names = [family.scheme for family in distinct(damped=False)]
+    return [{"scheme": name, "title": title(name), "law": known[name]} for name in names]
+
+
+def _live() -> Bank:
+    """Of the sliders; their scripts fill in the numbers of the curves."""
+    curves = [Curve(name=name, group=group, x=[], y=[]) for name, group in TRIED.items()]
+    w = np.arange(301) / 100
+    factors = [Curve(name=name, group=group, x=w, y=0 * w) for name, group in TRIED.items()]
+    orbits = Chart(
+        title="Momentum over position", x=Scale(name="q"), y=Scale(name="p"),
+        curves=[Curve(name=EXACTLY, group=EXACTLY, x=[], y=[]), *curves],
+    )  # fmt: skip
+    growth = Chart(
+        title="Factor by which one step multiplies the motion; above 1 it explodes.",
+        x=Scale(name="h \u03c9", shown=(0, 3)), y=Scale(name="factor a step", shown=(0, 3)), curves=factors,
+        rules=[Rule(axis="x", at=2, name="limit h \u03c9 = 2"), Rule(axis="y", at=1, look="one")],
+    )  # fmt: skip
+    return Bank(title="Drawn", charts=[orbits, growth])
+
+
+def spring(scene: Scene) -> dict[str, float] | None:
+    """The numbers of one particle on one wall spring; None for any other scene, or one too long."""
+    if scene.n != 1 or len(scene.terms) != 1 or scene.steps > LONGEST:
+        return None
+    wall = scene.terms[0]
+    if not isinstance(wall, WallSpring) or len(wall) != 1:
+        return None
+    given = {"k": wall.k, "at": wall.at, "m": scene.m, "q": scene.q, "p": scene.p}
+    return {name: float(values[0]) for name, values in given.items()} | {"h": scene.step}
+
+
+def sliders(*, h: float, k: float, m: float, q: float, p: float, at: float) -> dict[str, Floats]:
+    """Values at each place of each slider, in even ratios where a sign is kept."""
+    w = math.sqrt(abs(k) / m) or 1.0
+
+    def ratios(least: float, most: float, sign: float) -> Floats:
+        return np.asarray(math.copysign(1, sign) * least * (most / least) ** SLIDING)
+
+    start = abs(p) or abs(q - at) * m * w or 1.0
+    return {
+        "h": ratios(min(0.01 / w, abs(h) / 2), max(3 / w, 2 * abs(h)), h),
+        "k": ratios(abs(k) / 10 or 0.1, abs(k) * 10 or 10, k),
+        "m": ratios(m / 10, m * 10, 1),
+        "p": (2 * SLIDING - 1) * 3 * start,
+        "c": SLIDING * 3 * m * w,
+    }
+
+
+def linear(scene: Scene) -> dict[str, Any] | None:
+    """The numbers of one particle in any linear force f - k q - c p/m; None for any other scene, or one too
+    long."""
+    system = scene.system
+    if scene.n != 1 or not system.is_linear or scene.steps > LONGEST:
+        return None
+    zero = np.zeros(1)
+    found = {
+        "k": system.hessian_diagonal(zero), "f": system.force(zero, zero),
+        "c": system.friction_rates * scene.m, "m": scene.m, "q": scene.q, "p": scene.p,
+    }  # fmt: skip
+    values = {name: float(x[0]) for name, x in found.items()}
+    return {**values, "tolerance": scene.tolerance} if np.isfinite(list(values.values())).all() else None
+
+
+def laws(names: Iterable[str]) -> dict[str, Any]:
+    """Schemes by name, as their stages or their tableau in doubles; "exact" where they follow that motion."""
+    known, found = schemes.known(), dict[str, Any]()
+    for scheme in (known[name] for name in names if name in known):
+        if scheme.has("flow") or scheme.has("adaptive"):
+            found[scheme.name] = "exact"
+        elif scheme.stages and {kind for kind, _ in scheme.stages} <= STAGES:
+            found[scheme.name] = [(kind, float(schemes.number(c, np.float64))) for kind, c in scheme.stages]
+        elif scheme.b:
+            a = [[float(x) for x in row] for row in scheme.a]
+            found[scheme.name] = {"a": a, "b": [float(x) for x in scheme.b]}
+    return found
+
+
+def drawn(piece: Trajectory, scene: Scene | None = None, *, failed: bool = False) -> dict[str, Any]:
+    """The first particle of a trajectory, and what rounding may do to it in a step."""
+    how, loop = piece.arithmetic, LOOPS.get(piece.label, "")
+    # ASE calculates in units of its own
+    known = scene and spring(scene) and not (loop == "ase" and scene.units == "md")
+    return {
+        "label": piece.label,
+        "failed": failed,
+        "loop": loop if known else "",
+        "rounding": 256 * max(how.state, how.force, how.quantum, 2.0**-53) * _stretch(piece, scene),
+        "scheme": piece.scheme,
+        "title": schemes.title(piece.scheme),
+        "every": piece.every,
+        "step": piece.step,
+        "t": numbers(piece.t),
+        "q": numbers(piece.q[:, 0]),
+        "p": numbers(piece.p[:, 0]),
+    }
+
+
+def _stretch(piece: Trajectory, scene: Scene | None) -> float:
+    """How much an error of a step may grow as it is carried on: as far as the orbit of the scheme's map is
+    from a circle; where it is no ellipse, as many times as there are steps."""
+    known = linear(scene) if scene else None
+    if known is None or laws([piece.scheme]).get(piece.scheme, "exact") == "exact":
+        return 1.0
+    m = known["m"]
+    w = math.sqrt(abs(known["k"]) / m) or 1.0
+    k, c = (np.array([known[name] / m]) for name in "kc")
+    try:
+        found = schemes.matrix(schemes.known()[piece.scheme], h=piece.step, m=np.ones(1), k=k, c=c)
+    except SpringcheckError:
+        return float(len(piece.t) * piece.every)
+    (a, b), (c, d) = found[0].astype(float)
+    half, area = abs(c / w - b * w) / 2, -((a - d) ** 2 / 4 + b * c)
+    if not area > 0:
+        return float(len(piece.t) * piece.every)
+    return float(half + math.sqrt(max(half * half - area, 0.0))) / math.sqrt(area)
