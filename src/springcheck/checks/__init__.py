@@ -32,7 +32,6 @@ from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step_defect
-from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW
@@ -168,10 +167,7 @@ def judge_thoroughly(
     bench = Bench(scene=scene, label=label, run=run)
     verdicts = []
     for experiment in experiments:
-        try:
-            verdicts.append(experiment(bench))
-        except MethodError as error:
-            verdicts.append(check.verdict(label, experiment.name, str(error)))
+        verdicts.append(experiment(bench))
         if progress:
             progress(1)
     return shared(verdicts)
@@ -181,13 +177,8 @@ def judge_seeds(scene: Scene, label: str, seed: int) -> list[Verdict]:
     """Every experiment with the seeds of a random method; one that it cannot serve does not apply."""
     from springcheck.checks.seeds import SEEDED, by_engine
 
-    found, subject = [], by_engine(scene, label, seed)
-    for one in SEEDED:
-        try:
-            found.append(one(subject))
-        except MethodError as error:
-            found.append(check.verdict(label, one.name, str(error)))
-    return shared(found)
+    subject = by_engine(scene, label, seed)
+    return shared([one(subject) for one in SEEDED])
 
 
 def judge(

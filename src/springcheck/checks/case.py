@@ -16,6 +16,7 @@ from springcheck.checks.stretch import DEVIATIONS, Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.term import Term
+from springcheck.physics.trajectory import Trajectory
 
 T = TypeVar("T")
 
@@ -305,6 +306,16 @@ def least_moved(moved: Reals) -> Reals:
     Twice what an engine overlooks bounds it: a position may have come back past where its force was computed.
     """
     return np.asarray(np.minimum(moved, np.append(moved[:1], moved[:-1])))
+
+
+def small_move(run: Trajectory) -> str:
+    """That an engine took a force again within some step, where it moved that little; or nothing."""
+    how = run.arithmetic
+    if how.stale and run.every == 1 and len(run.q) > 1:
+        moved = np.max(np.abs(np.diff(run.q, axis=0)), axis=1)
+        if np.any((moved > 0) & (moved <= 2 * how.stale)):
+            return f"the engine's limit: {keeps(how)}, and a step moves by {np.min(moved[moved > 0]):.3g}"
+    return ""
 
 
 REPEATED = 2000

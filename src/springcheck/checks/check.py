@@ -9,6 +9,7 @@ from typing import Generic, Literal, Protocol, TypeAlias, TypeVar
 import numpy as np
 
 from springcheck.checks.requires import REQUIREMENTS, missing
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 
@@ -103,7 +104,12 @@ class Check(Generic[Subject_contra]):
         return ", ".join(words) or "every run"
 
     def __call__(self, subject: Subject_contra) -> Verdict:
-        return verdict(subject.label, self.name, missing(subject, self.requires) or self.judge(subject))
+        try:
+            found = missing(subject, self.requires) or self.judge(subject)
+        except MethodError as error:
+            # an experiment that the method cannot serve does not apply
+            found = str(error)
+        return verdict(subject.label, self.name, found)
 
 
 def check(

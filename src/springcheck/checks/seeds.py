@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from springcheck import driver, engines
-from springcheck.checks.case import Case
+from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, SMALLEST, law_of, read
+from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, law_of, one_rounding, read
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""
@@ -44,8 +45,13 @@ class Seeded:
     """A run of a scene, by a seed or a generator.  May raise MethodError."""
 
     def run(self, scene: Scene, steps: int, seed: Any = None) -> Trajectory:
-        """A run of so many steps, each recorded."""
-        return self.play(replace(scene, steps=steps, every=1), seed or self.seed)
+        """A run of so many steps, each recorded.  MethodError where it diverges, or takes forces again."""
+        run = self.play(replace(scene, steps=steps, every=1), seed or self.seed)
+        if limit := small_move(run):
+            raise MethodError(limit)
+        if len(run.t) <= steps:
+            raise MethodError(f"it diverges within {steps} steps")
+        return run
 
     def at_rest(self) -> Scene:
         """The scene, every particle at rest in 0."""
@@ -63,19 +69,17 @@ class Seeded:
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
         """What a step from a frame of a run may be off by; `factor` is that of all momenta, if any."""
-        q, p, how = run.q[row], run.p[row], run.arithmetic
-        unit = (IN_AND_OUT + PER_ACT * len(self.scheme.acts)) * max(how.state, how.force)
-        draws = [np.full(len(q), LARGEST_DRAW)] * self.scheme.draws
-        of_q, of_p = self.stepper(self.scene, absolute=True)(
-            np.abs(q).astype(np.longdouble), np.abs(p).astype(np.longdouble),
-            self.scene.system.magnitude(), draws, factor,
+        start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
+        draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
+        of_q, of_p = one_rounding(
+            self.scene, self.stepper(self.scene, absolute=True), start, draws, factor, run.arithmetic,
+            run.rebuilds_velocity,
         )  # fmt: skip
-        if run.rebuilds_velocity:
-            of_p = of_p + self.scene.m * of_q / abs(self.scene.step)
         if self.scheme.rescales_after:
             # the kinetic energy that the factor is of has the roundings of all that came before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
-        return unit * of_q + SMALLEST, unit * of_p + SMALLEST
+        many = IN_AND_OUT + PER_ACT * len(self.scheme.acts)
+        return many * of_q, many * of_p
 
 
 def by_engine(scene: Scene, label: str, seed: int) -> Seeded:
@@ -175,14 +179,15 @@ def _redrawn(subject: Seeded, one: Trajectory) -> float:
     factor = 4.0 if 4 * x <= 1 else 0.25
     other = replace(scene, bath=replace(bath, friction=factor * bath.friction))
     both = [
-        read(
-            subject.scheme, at, run.q, run.p, unit=max(run.arithmetic.state, run.arithmetic.force),
-            rebuilt=run.rebuilds_velocity,
-        )
+        read(subject.scheme, at, run.q, run.p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
         for at, run in ((scene, one), (other, subject.run(other, 1)))
-    ]  # fmt: skip
-    unit = max(one.arithmetic.state, one.arithmetic.force)
-    lost = unit * np.abs(both[0].draws) / min(1.0, x, factor * x) ** 2
+    ]
+    # a sum of two draws has the roundings of both, however near it is to 0
+    size = np.maximum(np.abs(both[0].draws), LARGEST_DRAW * (subject.scheme.carried > 0))
+    if both[0].draws.shape != both[1].draws.shape:
+        # friction so small that a state tells fewer draws apart
+        return 0.0
+    lost = one.arithmetic.unit * size / min(1.0, x, factor * x) ** 2
     error = np.sum([y.error for y in both], axis=0).reshape(lost.shape)
     return float(np.max(np.abs(both[0].draws - both[1].draws) / (lost + error)))
 
@@ -212,6 +217,7 @@ def noise_matrix(subject: Seeded) -> Finding | str:
     if not subject.scripted or not scheme.draws or scheme.uniform or scheme.collides:
         return "it takes no generator of normal numbers"
     worst = 0.0
+    assert scene.bath is not None
     for j in range(scheme.draws):
         unit = np.eye(scheme.draws)[j]
         run = subject.run(scene, 1, Script(unit))
@@ -223,7 +229,14 @@ def noise_matrix(subject: Seeded) -> Finding | str:
             force = scene.system.potential_force if scheme.rescales_after else lambda q, p: 0 * q
             both = [subject.stepper(scene)(*start, force, draws, hit)[1] for hit in (None, 1.0)]
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
-        worst = max(worst, _off((run.q[1], run.p[1]), ideal, subject.allowed(run, factor=factor)))
+        # of a noise that comes of 1 - c, taken from c
+        none = subject.stepper(scene)(*start, scene.system.potential_force, [0 * x for x in draws])
+        lost = run.arithmetic.unit / min(1.0, scene.bath.friction * scene.step)
+        allowed = [
+            x + lost * np.abs(y - z)
+            for x, y, z in zip(subject.allowed(run, factor=factor), ideal, none, strict=True)
+        ]
+        worst = max(worst, _off((run.q[1], run.p[1]), ideal, (allowed[0], allowed[1])))
     return Finding(worst, 1.0, "of what rounding allows", f"{scheme.draws} unit draws")
 
 
@@ -240,8 +253,11 @@ def seed_kept(subject: Seeded) -> Finding | str:
         if steps > LONGEST_WAIT:
             return f"in {LONGEST_WAIT} steps a collision is not certain"
     one, same, other = (subject.run(subject.scene, steps, subject.seed + i) for i in (0, 0, 1))
-    differ = np.count_nonzero(np.any((one.q != same.q) | (one.p != same.p), axis=1))
-    if np.array_equal(one.p, other.p):
+    rows = [np.concatenate([run.q, run.p], axis=1) for run in (one, same, other)]
+    differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(rows[0], rows[1], strict=True))
+    if np.array_equal(rows[0], rows[2], equal_nan=True):
+        if not np.isfinite(rows[0]).all():
+            return "it diverges before a draw shows"
         return Finding(steps + 1, 0.0, "frames", "another seed changes nothing: it is ignored")
     return Finding(differ, 0.0, "frames", "the same draws in the same order")
 

@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from springcheck.checks.case import Case
+from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS, chance
-from springcheck.thermal.draws import Reading, law_of, read
+from springcheck.thermal.draws import SMALLEST, Reading, law_of, read
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
@@ -32,9 +32,8 @@ def _reading(case: Case) -> Reading:
     # where a draw acts in two steps, that of the start is not in the record
     skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
     q, p = run.q[skipped:], run.p[skipped:]
-    unit = max(run.arithmetic.state, run.arithmetic.force)
     with np.errstate(all="ignore"):
-        return read(scheme, case.judged, q, p, unit=unit, rebuilt=run.rebuilds_velocity)
+        return read(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
 
 
 @check("across", family="noise", requires={"every-step"})
@@ -45,14 +44,23 @@ def noise_direction(case: Case) -> Finding | str:
     follows from each; a step without a collision has none.  A chain takes none at all: its own state, at rest
     before the start, is carried along the states and predicts the next.  Any temperature, any potential.
     """
-    if THERMOSTATS[case.trajectory.scheme].chain and case.steps[0] != 0:
-        return "the state of its chain is known from the start alone"
+    if THERMOSTATS[case.trajectory.scheme].chain:
+        if case.steps[0] != 0:
+            return "the state of its chain is known from the start alone"
+        scene, bath = case.scene, case.scene.bath
+        assert bath is not None
+        # of momenta, and of the links
+        squares = scene.thermal * min(np.min(scene.m), scene.thermal / bath.friction**2)
+        if not squares > SMALLEST / case.trajectory.arithmetic.unit:
+            return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
         return "two fresh draws a step reach every state: their covariance is judged"
     worst = np.where(np.isfinite(found.across), found.across, np.inf).max(axis=1)
     off = np.flatnonzero(~(worst <= found.roundings))
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
+    if limit := small_move(case.trajectory) if where else "":
+        return limit
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run{where}"
     return Finding(float(np.max(worst)), found.roundings, "roundings", why)
 
@@ -61,6 +69,8 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
     """Draws (f, n) as standard normal numbers."""
     if not THERMOSTATS[case.trajectory.scheme].draws:
         return NO_DRAWS
+    if limit := small_move(case.trajectory):
+        return limit
     found = reading(case)
     if not found.known:
         return HIDDEN

@@ -66,8 +66,16 @@ class Arithmetic:
     """Forces are kept while no position has moved by more than this since they were computed [L]."""
     lengths: float = 0.0
     """Relative tolerance to which rods keep their lengths, where that is coarser than rounding."""
+    cancels: int = 0
+    """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients:
+    of what comes of 1 - c, where c itself is rounded."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
+
+    @property
+    def unit(self) -> float:
+        """The coarser of both unit roundoffs."""
+        return max(self.state, self.force)
 
     def __str__(self) -> str:
         """What of it is not double precision, in words, or nothing."""
@@ -79,6 +87,7 @@ class Arithmetic:
             "excess": f"every force {self.excess:.2g} too large",
             "stale": f"forces kept within {self.stale:.2g}",
             "lengths": f"lengths of rods kept to {self.lengths:.2g}",
+            "cancels": "coefficients of the bath from 1 - exp(-friction h) as a difference",
         }
         plain = Arithmetic()
         return ", ".join(said for name, said in named.items() if getattr(self, name) != getattr(plain, name))

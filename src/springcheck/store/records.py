@@ -41,6 +41,7 @@ KEPT = {
     "force_excess": "arithmetic.excess",
     "forces_kept_within": "arithmetic.stale",
     "rod_tolerance": "arithmetic.lengths",
+    "bath_cancels": "arithmetic.cancels",
     "keeps_displacement": "arithmetic.keeps_displacement",
     "rebuilds_velocity": "rebuilds_velocity",
     "off_axis": "off_axis",
@@ -82,6 +83,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     force_excess: float = _DOUBLE.excess
     forces_kept_within: float = _DOUBLE.stale
     rod_tolerance: float = 0.0
+    bath_cancels: int = 0
     keeps_displacement: bool = False
     rebuilds_velocity: bool = False
     off_axis: float | None = None

@@ -17,13 +17,14 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
 from springcheck.thermal.chain import FOURTH, SIXTH, Chain
-from springcheck.thermal.decays import GJ, Decay, decay
+from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
 Part: TypeAlias = Fraction | Callable[[Any], Any]
 """A share of the step, or a function of x = gamma h."""
@@ -70,6 +71,8 @@ class Thermostat:
     synchronised: bool = True
     """Whether the momentum that it stores belongs to the time of the position."""
     source: str = ""
+    most: float = inf
+    """gamma h below which it is a thermostat: from there on its noise has no real size."""
     chain: Chain | None = None
     """The bath of a scheme that takes no draws."""
 
@@ -100,7 +103,7 @@ class Thermostat:
 
 def _stretch(c2: Decay) -> Callable[[Any], Any]:
     """How much longer than its step a GJ scheme kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
-    return lambda x: np.sqrt(2 * c2.lost(x) / ((2 - c2.lost(x)) * x))
+    return lambda x: np.sqrt(2 * c2.lost(x) / (c2.both(x) * x))
 
 
 def value_of(part: Part, x: Any) -> Any:
@@ -140,7 +143,7 @@ class Stepper:
         for kind, part, number in scheme.acts:
             c = value_of(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
-            noise = np.sqrt(lost * (2 - lost)) * size if kind == "exchange" else size
+            noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
             if kind in ("rescale", "scale"):
                 noise = lost * width(thermal)
             if absolute and kind != "undamp":
@@ -176,7 +179,7 @@ class Stepper:
             elif kind == "damp":
                 p = p * (1 - c)
             elif kind == "undamp":
-                p = p / (1 + c)
+                p = p / (np.abs(1 + c) if self._sign > 0 else 1 + c)
             elif kind == "jump":
                 q = q + c * draws[number]
             elif kind == "held":
@@ -250,8 +253,9 @@ def _gj(number: str) -> Thermostat:
     half = _times(HALF, _stretch(c2))
     acts = (Act("kick", half), Act("drift", half), Act("exchange", c2), Act("drift", half), Act("kick", half))
     return Thermostat(
-        name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts, source=_GJ_SOURCE
-    )
+        name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts,
+        most=MOST_FRICTION.get(number, inf), source=_GJ_SOURCE,
+    )  # fmt: skip
 
 
 def _gj_half(number: str) -> Thermostat:
@@ -268,7 +272,7 @@ def _gj_half(number: str) -> Thermostat:
     )  # fmt: skip
     return Thermostat(
         name=f"gj-{number}-half", title=f"GJ-{number.upper()}, half-step velocity", acts=acts, draws=2,
-        carried=1, synchronised=False, source=_GJ_SOURCE,
+        carried=1, synchronised=False, most=MOST_FRICTION.get(number, inf), source=_GJ_SOURCE,
     )  # fmt: skip
 
 

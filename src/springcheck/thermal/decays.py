@@ -15,10 +15,16 @@ class Decay:
 
     left: Callable[[Any], Any]
     lost: Callable[[Any], Any]
+    added: Callable[[Any], Any] | None = None
+    """1 + c(x), where it loses digits beside 2 - lost(x)."""
 
     def __call__(self, x: Any) -> Any:
         """What is left."""
         return self.left(x)
+
+    def both(self, x: Any) -> Any:
+        """1 + c(x)."""
+        return self.added(x) if self.added else 2 - self.lost(x)
 
 
 def decay(share: int) -> Decay:
@@ -42,7 +48,7 @@ def _root(x: Any) -> Any:
 
 
 GJ: dict[str, Decay] = {
-    "i": Decay(lambda x: (1 - x / 2) / (1 + x / 2), lambda x: x / (1 + x / 2)),
+    "i": Decay(lambda x: (1 - x / 2) / (1 + x / 2), lambda x: x / (1 + x / 2), lambda x: 2 / (1 + x / 2)),
     "ii": decay(1),
     "iii": Decay(lambda x: 1 - x, lambda x: x),
     "iv": Decay(lambda x: 2 / (1 + _root(x)), lambda x: 4 * x / (1 + _root(x)) ** 2),
@@ -55,3 +61,6 @@ GJ: dict[str, Decay] = {
     ),
 }
 """The decay c2 of each GJ scheme as a function of x = gamma h."""
+
+MOST_FRICTION = {"iii": 2.0}
+"""The x up to which such a decay is above -1, where it is not so everywhere."""

@@ -6,14 +6,14 @@ acts in two steps, they over-determine it: what is left over is rounding, at eve
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.thermal.catalogue import ENERGY_LEFT, Stepper, Thermostat, value_of
 from springcheck.thermal.laws import Law
@@ -73,19 +73,37 @@ def law_of(scheme: Thermostat, scene: Scene) -> Law:
 
 
 def read(
-    scheme: Thermostat, scene: Scene, q: Floats, p: Floats, *, unit: float = 2.0**-53, rebuilt: bool = False
-) -> Reading:
-    """The draws behind frames q, p (f, n), one step apart; `unit` is the unit roundoff of the engine.
+    scheme: Thermostat, scene: Scene, q: Floats, p: Floats, *, how: Arithmetic | None = None,
+    rebuilt: bool = False,
+) -> Reading:  # fmt: skip
+    """The draws behind frames q, p (f, n), one step apart; `how` the engine rounds.
 
     With `rebuilt` velocities are differences of positions over the step.
     """
-    return _Reader(scheme, scene, unit, rebuilt).read(q, p)
+    return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
+
+
+def one_rounding(
+    scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
+    how: Arithmetic, rebuilt: bool,
+) -> tuple[Extended, Extended]:  # fmt: skip
+    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n)."""
+    assert scene.bath is not None
+    size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
+    q, p = sizer(size, np.abs(start[1]), scene.system.magnitude(), draws, hit)
+    if how.cancels:
+        # coefficients of all that is added to q, and of p
+        lost = max(x, 1 / x) ** how.cancels
+        q, p = q + lost * (q - size), p + lost * p
+    if rebuilt:
+        p = p + scene.m * q / abs(scene.step)
+    return np.asarray(unit * q + SMALLEST), np.asarray(unit * p + SMALLEST)
 
 
 class _Reader:
-    def __init__(self, scheme: Thermostat, scene: Scene, unit: float, rebuilt: bool) -> None:
+    def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
         assert scene.bath is not None
-        self.scheme, self.scene, self.unit, self.rebuilt = scheme, scene, unit, rebuilt
+        self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
         about: dict[str, Any] = {
             "h": scene.step,
             "m": scene.m,
@@ -198,24 +216,26 @@ class _Reader:
         squares, across = np.zeros((M, M)), np.empty((len(q) - 1, len(m)))
         state, usual = chain.start(), np.sqrt(about["Q"] * about["thermal"])
         for i in range(len(q) - 1):
-            moved = 1e4 * self.unit * (usual + np.abs(state[:M]))
+            moved = 1e4 * self.how.unit * (usual + np.abs(state[:M]))
             stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
             stepper.chain[range(M), range(1, M + 1)] += moved
             both = np.stack(stepper(q[i], np.tile(p[i], (M + 1, 1)), self._force, []))
             after, state = stepper.chain, stepper.chain[:, 0]
             # (q or p, particle, link): what a change of a link moves
-            moves = ((both[:, 1:] - both[:, :1]) / moved[:, None]).transpose(0, 2, 1).astype(np.float64)
+            moves = ((both[:, 1:] - both[:, :1]) / moved[:, None]).transpose(0, 2, 1)
             grown = np.max(np.abs(both[1, 0])) / max(float(np.max(np.abs(p[i]))), float(SMALLEST))
             of = np.stack(self._allowed((q[i], p[i]), [], np.clip(grown, 1, 2)))
-            hidden = np.sqrt(M * i * np.einsum("znj,jk,znk->zn", moves, squares, moves))
+            # in units of what a frame rounds to and of the usual link: squares of small ones underflow
+            moves = np.asarray((moves * usual) / of[:, :, None], np.float64)
+            hidden = 1 + np.sqrt(M * i * np.einsum("znj,jk,znk->zn", moves, squares, moves)) / self.roundings
             off = np.abs(np.stack([q[i + 1], p[i + 1]]) - both[:, 0])
-            across[i] = np.max(off / (of + hidden / self.roundings), axis=0)
+            across[i] = np.max(off / (of * hidden), axis=0)
             twice = np.sum(np.maximum(p[i] ** 2, both[1, 0] ** 2) / m)
-            new = self.unit * chain.rounding(state, twice, part * h, **about)
+            new = self.how.unit * chain.rounding(state, twice, part * h, **about)
             # and those of the momenta that it begins from
             new[0] += part * h * self.roundings * np.sum(2 * np.abs(both[1, 0]) * of[1] / m)
-            J = ((after[:M, 1:] - after[:M, :1]) / moved).astype(np.float64)
-            squares = J @ squares @ J.T + np.diag(new.astype(np.float64) ** 2)
+            J = ((after[:M, 1:] - after[:M, :1]) / moved * usual / usual[:, None]).astype(np.float64)
+            squares = J @ squares @ J.T + np.diag((new / usual).astype(np.float64) ** 2)
         none = np.empty((0, len(m)))
         return self._reading(none, across, none)
 
@@ -226,11 +246,7 @@ class _Reader:
         self, start: tuple[Extended, Extended], draws: Any, hit: Any = True
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that a step adds up."""
-        sizes = self.scene.system.magnitude()
-        q, p = self.sizer(np.abs(start[0]), np.abs(start[1]), sizes, list(np.abs(draws)), hit)
-        if self.rebuilt:
-            p = p + self.scene.m * q / abs(self.scene.step)
-        return np.asarray(self.unit * q + SMALLEST), np.asarray(self.unit * p + SMALLEST)
+        return one_rounding(self.scene, self.sizer, start, list(np.abs(draws)), hit, self.how, self.rebuilt)
 
     def _solved(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool

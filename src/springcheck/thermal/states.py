@@ -27,6 +27,9 @@ gamma h of 5e-7."""
 WHITE = 1e-9
 """Chance below which draws are no draws: deterministic motion that does not close in one frame."""
 
+EVEN = 1e-4
+"""Chance below which what acts on momenta may be a factor, and no draw is told of it."""
+
 SPARSE = 0.1
 """Median of the draws, of variance 1, below which most steps have none: 0.67 for normal ones."""
 
@@ -79,7 +82,8 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
     if weights[3] < NOISE * weights[0]:
         return None
     z = np.stack([x, u])
-    left = _left(z)
+    sizes_left, left = _left_of(z, np.empty((0, z.shape[1] - 1)))
+    even = _is_even(sizes_left[1] * left[1], u[1:])
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
@@ -94,11 +98,11 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         # what digits leave of it is white but for neighbours, which share a frame
         digits = misfit < 1e-9 or _is_white(rest[::2])
         # of one draw the position and the momentum leave the same
-        return _of_one(q, v, h, free / free[0], misfit, left[1]) if free[0] and digits else None
+        return _of_one(q, v, h, free / free[0], misfit, left[1], even) if free[0] and digits else None
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
         return _of_two_halves(q, h, float(np.std(jump) / sizes[0]))
-    if not all(map(_is_white, left)):
+    if not all(map(_is_white, left)) or not even:
         return None
     found = Thermal(candidates=tuple(likely(TWO, q, v, h)), free=(), misfit=nan, uniform=_is_uniform(left[1]))
     return replace(found, sparser=sparser(found.candidates[0], q, v, h)) if found.named else found
@@ -115,11 +119,6 @@ def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
     return False
 
 
-def _left(z: Floats) -> Floats:
-    """What the best linear map leaves of each frame, of variance 1, (2, f-1)."""
-    return _left_of(z, np.empty((0, z.shape[1] - 1)))[1]
-
-
 def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
     """What the best linear map of states and of more beside them (k, f-1) leaves: its standard deviations
     (2,), and what is left over these (2, f-1)."""
@@ -127,6 +126,17 @@ def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
     left = (z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]).T
     size = np.std(left, axis=1)
     return np.asarray(size), np.asarray(left / np.maximum(size, 1e-300)[:, None])
+
+
+def _is_even(left: Floats, u: Floats) -> bool:
+    """Whether what is left is added to the momenta u - left, and no factor of them: its size says nothing of
+    theirs, and its sign over theirs nothing of the next one's."""
+    made = u - np.mean(u) - left
+    large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
+    after = [
+        chance.neighbours(x[:, None]) for x in (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
+    ]
+    return min(chance.mean(large[0] * large[1]), *after) > EVEN
 
 
 def _is_white(x: Floats) -> bool:
@@ -137,7 +147,9 @@ def _is_uniform(x: Floats) -> bool:
     return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x) < WHITE)
 
 
-def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats) -> Thermal | None:
+def _of_one(
+    q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats, even: bool
+) -> Thermal | None:
     """Of a single draw a step: the schemes of whose null vector this is one."""
     _, b, c, d = free
     close = max(1e-9, 100 * misfit)
@@ -147,25 +159,29 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
 
     found: list[Candidate] = []
     if near(b, d) and near(c, -1):
-        half = near(b, -h / 2)
+        half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
         if half:
-            found = likely(("aboba", "aoboa"), q, v, h)
-        if -b > h / 2 and not half:
+            # without a spring these all are one
+            names = ("aboba", "aoboa", *(("baoab", "baoa") if slow < error else ()))
+            found = likely(names, q, v, h)
+        if -b > h / 2 and not half and decay + error > 0:
             found = likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
-        if not half or close > 1e-6:
+        if not half or close > 1e-6 or slow < error:
             # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-            found += [y for number in GJ if (y := _as_gj(number, _decay(q, v), -b, h, len(q)))]
+            found += [y for number in GJ if (y := _as_gj(number, decay, error, -b, h))]
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
         found = likely(("baoa",), q, v, h, turn=2 * (1 + c))
     elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
-        found = likely(("euler-maruyama",), q, v, h)
+        decay, slow, error = _decay(q, v)
+        # without a spring Bussi's factor leaves the same
+        found = [*likely(("euler-maruyama",), q, v, h), *[Candidate(scheme="bussi-after")] * (slow < error)]
     elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
         # what a collision has left of the momentum, the rest of the step takes on without noise
         w = float(np.sqrt(2 * (1 + 1 / c)) / h)
         known = {"omega": w, "omega_error": 0.0}
-        # some steps have no collision, unless these are many; a factor acts in every step
+        # some steps have no collision, unless these are many; a factor acts in every step, if little
         still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
-        often = float(np.quantile(still, 0.05)) > 1e-3 * float(np.std(v))
+        often = float(np.quantile(still, 0.05)) > close * float(np.std(v))
         names = ("andersen", "andersen-after-kick", *(("bussi", "bussi-unsigned") if often else ()))
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
@@ -186,6 +202,9 @@ def _of_one(q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: F
             left = np.empty(0)
     if len(left) and not _is_white(left):
         return None
+    now_and_then = any(x.scheme == "andersen-leapfrog" for x in found)
+    if len(left) and not now_and_then and not even:
+        return None
     if not found and float(np.median(np.abs(left))) < SPARSE:
         # few steps are off, and all others are not
         return None
@@ -203,7 +222,7 @@ def _is_correlated(x: Floats) -> bool:
 
 def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
     """The x = gamma h at which a function that falls is `wanted`, by halving."""
-    low, high = 1e-9, 1.9
+    low, high = 1e-9, 1e4
     if not of(np.asarray(high)) < wanted < of(np.asarray(low)):
         return None
     for _ in range(200):
@@ -212,28 +231,33 @@ def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
     return x
 
 
-def _decay(q: Floats, v: Floats) -> float:
-    """The determinant of the best linear map, that of the decay of momenta."""
+def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
+    """Of the best linear map the determinant, that of the decay of momenta, (h w)**2 as its trace has it, and
+    what either is off by at most: five standard errors, and 20/n, as far as a root near 1 is underestimated
+    (Dickey & Fuller, J. Am. Stat. Assoc. 74 (1979) 427)."""
     z = np.stack([q - np.mean(q), v - np.mean(v)])
-    return float(np.linalg.det(np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0]))
+    A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
+    decay = float(np.linalg.det(A))
+    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + 20 / n
+    return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
-def _as_gj(number: str, decay: float, t: float, h: float, n: int) -> Candidate | None:
-    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay known from n frames."""
-    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n))
-    for of_decay in (decay, decay - error, decay + error):
-        x = _rate(GJ[number], of_decay)
-        if not x:
-            continue
-        stretch = float(np.sqrt(2 * (1 - of_decay) / ((1 + of_decay) * x)))
+def _as_gj(number: str, decay: float, error: float, t: float, h: float) -> Candidate | None:
+    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay known to an error."""
+    x = np.geomspace(1e-9, 1e4, 4000)
+    if near := _rate(GJ[number], decay):
+        x = np.append(x, near)
+    with np.errstate(all="ignore"):
+        stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
         a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
-        if a > 0:
-            # GJ-I does not stretch, and knows its spring whatever its friction
-            known = 0.0 if number == "i" else nan
-            return Candidate(
-                scheme=f"gj-{number}", omega=float(np.sqrt(a) / h), omega_error=known, friction=x / h
-            )
-    return None
+        off = np.where(a > 0, np.abs(GJ[number](x) - decay), np.inf)
+    best = int(np.argmin(off))
+    if not off[best] <= error:
+        return None
+    # GJ-I does not stretch, and knows its spring whatever its friction
+    known = 0.0 if number == "i" else nan
+    omega = float(np.sqrt(a[best]) / h)
+    return Candidate(scheme=f"gj-{number}", omega=omega, omega_error=known, friction=float(x[best] / h))
 
 
 def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
@@ -253,7 +277,8 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
     if abs(memory) > 5:
         # digits may hide that five steps of leapfrog have one slope
         return () if close < 1e-6 else ("andersen-leapfrog",)
-    return ("brownian",) if close < 1e-6 else ("brownian", "andersen-leapfrog")
+    # a collision in every step leaves what Brownian motion does
+    return ("brownian", "andersen-leapfrog")
 
 
 def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:

@@ -1,0 +1,120 @@
+"""Baths far from the usual: friction next to nothing or huge, next to no heat, free particles, divergence.
+
+What is right there passes, or says why it is not judged; no file of it gets a wrong name.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springcheck import checks, driver, engines
+from springcheck.checks.seeds import by_engine, noise_size, seed_kept
+from springcheck.errors import MethodError
+from springcheck.identify.thermal import of_bath
+from springcheck.physics.arrays import WIDE
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic, WallSpring
+
+needs_lammps = pytest.mark.skipif(bool(engines.absence("lammps")), reason="needs LAMMPS")
+
+
+def scene(*, x: float = 0.3, turn: float = 0.4, thermal: float = 1.7, steps: int = 60, **more: Any) -> Scene:
+    """Two unlike particles on springs of their own, of gamma h = x and h omega = turn."""
+    m, w = np.array([3.7, 0.4]), 1.3
+    size = np.sqrt(thermal / m) / w
+    given = {
+        "q": np.array([0.7, -0.4]) * size, "p": np.array([0.3, 1.1]) * m * w * size, "step": turn / w,
+        "terms": (WallSpring(i=np.arange(2), k=m * w * w, at=np.zeros(2)),),
+        "bath": Bath(temperature=thermal, friction=x * w / turn),
+    }  # fmt: skip
+    return Scene(m=m, steps=steps, name="extreme", **{**given, **more})
+
+
+RIGHT: tuple[tuple[str, dict[str, float]], ...] = (
+    ("own:gj-i", {"x": 900.0}),
+    ("own:gj-viii", {"x": 900.0}),
+    ("own:lammps-langevin", {"x": 12.0}),
+    ("own:lammps-langevin", {"x": 2.0}),
+    ("own:nose-hoover", {"thermal": 1e-130}),
+    ("own:nose-hoover-middle", {"thermal": 1e-200}),
+    ("ase:langevin", {"thermal": 1e-60}),
+    ("ase:langevin-baoab", {"thermal": 1e-60}),
+    ("ase:bussi", {"x": 1e-13}),
+    ("openmm:nose-hoover-bath", {"thermal": 1e-200}),
+    *((f"lammps:gjf-{number}", {"x": x}) for number in range(1, 9) for x in (1e-10, 1e-3)),
+    ("lammps:gjf-4-half", {"x": 0.01}),
+    ("lammps:gjf-1", {"x": 700.0}),
+    ("lammps:gjf-8-half", {"x": 70.0}),
+)
+
+
+@pytest.mark.skipif(not WIDE, reason="bounds are those of 80-bit long double")
+@pytest.mark.parametrize(("label", "given"), RIGHT)
+def test_a_right_thermostat_passes_however_far_its_numbers_are(label: str, given: dict[str, float]) -> None:
+    if engines.absence(label.partition(":")[0]):
+        pytest.skip("not installed")
+    where = scene(**given)
+    verdicts = checks.judge(where, driver.run(where, label, seed=5)) + checks.judge_seeds(where, label, 5)
+    assert [
+        f"{v.check}: {v.value} of {v.bound}, {v.why}" for v in checks.shared(verdicts) if v.passed is False
+    ] == []
+
+
+def test_an_engine_that_takes_its_forces_again_is_not_judged_by_its_draws_and_says_why() -> None:
+    where = scene(thermal=1e-60)
+    verdicts = checks.judge(where, driver.run(where, "ase:langevin-baoab", seed=5))
+    assert any("forces are kept while no position moves" in v.why for v in verdicts)
+
+
+def test_draws_whose_sum_is_next_to_nothing_are_held_against_their_own_roundings() -> None:
+    for seed in range(40):
+        found = noise_size(by_engine(scene(x=0.2459, turn=0.05), "own:gj-vi-half", seed + 1))
+        assert found.passed, found
+
+
+def test_seeds_of_a_run_that_diverges_before_its_first_collision_are_not_said_to_be_ignored() -> None:
+    quartic = Quartic(i=np.arange(2), b=np.full(2, 900.0), at=np.zeros(2))
+    where = scene(x=0.05)
+    found = seed_kept(by_engine(replace(where, terms=(*where.terms, quartic)), "own:andersen", 1))
+    assert found.passed is None
+    assert "diverges" in found.why
+
+
+def test_a_scheme_without_a_noise_of_real_size_is_refused() -> None:
+    with pytest.raises(
+        MethodError, match=r"from friction \* step = 2 on it is no thermostat, and here that is 2.5"
+    ):
+        driver.run(scene(x=2.5), "own:gj-iii", seed=1)
+
+
+LISTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("gj-iii", {"x": 4e-6}),
+    ("gj-vi", {"x": 2e-6}),
+    ("gj-i", {"x": 4.5}),
+    ("gj-viii", {"x": 2.5}),
+    ("gj-viii-half", {"x": 2.6}),
+    ("bussi", {"x": 3e-6}),
+    ("bussi-unsigned", {"x": 2.5e-5}),
+    ("andersen-leapfrog", {"x": 12.0}),
+    ("gj-ii", {"x": 96.0}),
+    *((name, {"terms": ()}) for name in ("baoab", "baoa", "aboba", "gj-i", "gj-iii", "gj-v", "bussi-after")),
+)
+
+
+@pytest.mark.parametrize(("name", "given"), LISTS)
+def test_a_file_is_given_every_scheme_that_may_have_made_it(name: str, given: dict[str, Any]) -> None:
+    run = driver.run(scene(steps=1000, **given), f"own:{name}", seed=3)
+    found = of_bath(run.t, run.q[:, :1], run.p[:, :1], None, scene().m[:1])
+    assert found is None or name in [one.scheme for one in found.candidates], found.statement
+
+
+@pytest.mark.parametrize("name", ["nose-hoover", "nose-hoover-fourth", "nose-hoover-middle"])
+def test_a_bath_that_acts_by_a_factor_is_not_taken_for_draws(name: str) -> None:
+    for seed, (x, turn) in enumerate(((0.6, 0.45), (0.72, 0.75), (0.78, 0.35), (0.2, 0.9))):
+        where = scene(x=x, turn=turn, steps=220)
+        run = driver.run(where, f"own:{name}", seed=seed + 1)
+        found = of_bath(run.t, run.q[:, :1], run.p[:, :1], None, where.m[:1])
+        assert found is None or not found.candidates, found.statement
