@@ -19,6 +19,8 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Cosine, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
 
+pytestmark = pytest.mark.slow
+
 Need = Callable[[str], None]
 
 NAMES = ("mujoco", "pymunk", "rebound", "dart", "box2d", "rapier", "drake", "lammps", "heyoka")

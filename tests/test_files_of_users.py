@@ -19,7 +19,7 @@ from springcheck.physics.scenefile import folder
 from springcheck.store import files, parts
 from stores import LABELS, scene, trajectory, written
 
-pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here", "sketched")]
 
 OWN = ["--method", "own:euler", "--quiet"]
 

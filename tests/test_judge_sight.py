@@ -24,6 +24,8 @@ from springcheck.physics.trajectory import NOT_KNOWN, Limits, Trajectory, Verdic
 from springcheck.store import tables
 from springcheck.studies.faults import clean
 
+pytestmark = pytest.mark.slow
+
 VALIDATION = Path(__file__).parent.parent / "validation"
 sys.path.insert(0, str(VALIDATION))
 _spec = importlib.util.spec_from_file_location("detection", VALIDATION / "detection.py")

@@ -80,6 +80,7 @@ def made_up(
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("label", "name"), serving(FIXED, SINGLE))
 def test_every_method_has_the_order_of_its_scheme(label: str, name: str, need: Callable[[str], None]) -> None:
     need(label)

@@ -282,6 +282,7 @@ def test_the_modes_of_a_uniform_chain_are_sines() -> None:
     assert np.max(np.abs(there[0] - (y * waves.root_m) @ shapes)) < 64 * scene.n * exact.EPS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in scenes.names() if scenes.load_scene(name).bath is None])
 def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -> None:
     pytest.importorskip("numba")
