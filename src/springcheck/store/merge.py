@@ -21,11 +21,7 @@ _INCOMING = "incoming"
 
 
 def collection(
-    path: Path,
-    found: Parts,
-    root: Mapping[str, Scalar],
-    extra: Sequence[Table],
-    documents: Mapping[str, str],
+    path: Path, found: Parts, root: Mapping[str, Scalar], extra: Sequence[Table], documents: Mapping[str, str]
 ) -> None:
     """Write a sealed file of everything in `found`, of the tables in `extra` and of the documents.
 

@@ -141,14 +141,7 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
             optional = True
         if get_origin(hint) is Literal:
             hint = str
-        found.append(
-            _Field(
-                name=one.name,
-                hint=hint,
-                optional=optional,
-                keys=one.metadata.get("keys", ()),
-            )
-        )
+        found.append(_Field(name=one.name, hint=hint, optional=optional, keys=one.metadata.get("keys", ())))
     return tuple(found)
 
 

@@ -31,6 +31,13 @@ def either(names: Sequence[str]) -> str:
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
+def number(x: float | None, form: str, infinite: str = "inf") -> str:
+    """A number in this form; "-" where it is not known."""
+    if x is None or math.isnan(x):
+        return "-"
+    return infinite if x == math.inf else f"{x:{form}}"
+
+
 def seconds(value: float | None) -> str:
     """A time with three digits and its unit."""
     if value is None or not math.isfinite(value):

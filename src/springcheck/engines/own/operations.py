@@ -16,15 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.engines.own.kernels import (
-    DRIFT,
-    EULER,
-    FRICTION,
-    IMPLICIT,
-    KICK,
-    KICK_DRIFT,
-    MIDPOINT,
-)
+from springcheck.engines.own.kernels import DRIFT, EULER, FRICTION, IMPLICIT, KICK, KICK_DRIFT, MIDPOINT
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene

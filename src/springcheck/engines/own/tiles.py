@@ -148,14 +148,7 @@ class Tiled:
         self._q[:], self._p[:] = q[-1], p[-1]
 
     def _each(
-        self,
-        go: Callable[..., None],
-        width: int,
-        margin: int,
-        every: int,
-        q: Floats,
-        p: Floats,
-        steps: int,
+        self, go: Callable[..., None], width: int, margin: int, every: int, q: Floats, p: Floats, steps: int
     ) -> None:
         tiles = self._cut(width, margin)
         if self._threads > 1 and len(tiles) > 1 and steps * self._job.n >= PARALLEL:

@@ -134,15 +134,7 @@ def held_implicit(
 
 
 def chain_implicit(
-    x: float,
-    y: float,
-    twice: bool,
-    factors: Any,
-    t: Numbers,
-    f: Numbers,
-    m: Numbers,
-    q: Numbers,
-    p: Numbers,
+    x: float, y: float, twice: bool, factors: Any, t: Numbers, f: Numbers, m: Numbers, q: Numbers, p: Numbers
 ) -> None:
     """`implicit` by the tensions of a chain."""
     below, inverse, above = factors

@@ -13,6 +13,7 @@ from typing import Any
 
 from springcheck import interrupts, schemes
 from springcheck.errors import SpringcheckError, StoreError, plain
+from springcheck.text.wording import number
 
 Row = Mapping[str, Any]
 
@@ -92,7 +93,7 @@ def rows(*documents: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def _row(x: Row) -> dict[str, str]:
     named = x["found"] != "none that is known"
-    limit = "none up to 4" if x["bounded"] else "-" if x["limit"] is None else f"{x['limit']:.4f}"
+    limit = "none up to 4" if x["bounded"] else number(x["limit"], ".4f")
     offset = x["velocity_offset"]
     return {
         "method": x["method"],
@@ -108,7 +109,7 @@ def _row(x: Row) -> dict[str, str]:
         "det": _number(x["area"], 1e-6 if x["precision"] == "single" else 1e-12),
         "precision": x["precision"],
         "limit": limit,
-        "amplitude": "-" if x["amplitude"] is None else f"{x['amplitude']:.4f}",
+        "amplitude": number(x["amplitude"], ".4f"),
         "configurational": _share(x, "configurational"),
         "kinetic": _share(x, "kinetic"),
         "forces": f"{x['force_calls']:.3g}",

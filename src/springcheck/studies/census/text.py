@@ -11,7 +11,7 @@ from springcheck.figures.looks import title
 from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, hanging, plain, table
-from springcheck.text.wording import few, seconds
+from springcheck.text.wording import few, number, seconds
 
 TITLES = (
     "method", "amplitude", "det - 1", "velocity", "friction", "limit", "arithmetic", "forces", "time",
@@ -86,11 +86,11 @@ def _heated(x: Entry) -> Row:
 def _row(x: Entry, partners: tuple[str, ...]) -> Row:
     return [
         plain("  " + x.method, "" if x.agrees else "bold red"),
-        "-" if np.isnan(x.amplitude) else f"{x.amplitude:.4f}",
+        number(x.amplitude, ".4f"),
         _number(x.area, 1e-13),
         "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
         _number(x.friction, 1e-9),
-        "-" if np.isnan(x.limit) else "none" if np.isinf(x.limit) else f"{x.limit:.3f}",
+        number(x.limit, ".3f", "none"),
         x.precision,
         f"{x.force_calls:.3g}",
         seconds(x.seconds),
@@ -99,6 +99,4 @@ def _row(x: Entry, partners: tuple[str, ...]) -> Row:
 
 
 def _number(x: float, least: float) -> str:
-    if np.isnan(x):
-        return "-"
-    return "0" if abs(x) < least else f"{x:+.2e}"
+    return "0" if abs(x) < least else number(x, "+.2e")

@@ -45,11 +45,7 @@ def perform(options: Namespace, progress: Progress | None) -> Ensemble:
 
 
 def record(
-    scene: Scene,
-    cells: Plan,
-    path: str | Path | None,
-    methods: Sequence[str] = (),
-    **how: Unpack[How],
+    scene: Scene, cells: Plan, path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]
 ) -> Ensemble:
     """Run every cell by every method and keep its numbers; chunks that are finished are reused.
 

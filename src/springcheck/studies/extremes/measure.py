@@ -40,11 +40,7 @@ CALM = (0.01, 1.9)
 
 
 def measure(
-    methods: Sequence[str] = (),
-    *,
-    quick: bool = False,
-    cells: int = 0,
-    kept: Keeper | None = None,
+    methods: Sequence[str] = (), *, quick: bool = False, cells: int = 0, kept: Keeper | None = None
 ) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 

@@ -21,18 +21,9 @@ from springcheck.studies.faults.steppers import State, Step, energies, record, t
 
 Make: TypeAlias = Callable[..., Trajectory]
 Where: TypeAlias = Literal[
-    "spring",
-    "chain",
-    "long spring",
-    "orbit",
-    "driven",
-    "box",
-    "dumbbell",
-    "triangle",
-    "field",
-    "bath",
+    "spring", "chain", "long spring", "orbit", "driven", "box", "dumbbell", "triangle", "field", "bath",
     "wide bath",
-]
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +224,19 @@ def doubled(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     return lambda i, q, p: right(i, *right(i, q, p)) if i % 1000 == 999 else right(i, q, p)
 
 
+def single(x: Reals) -> Floats:
+    """Rounded to single precision."""
+    return x.astype(np.float32).astype(np.float64)
+
+
 def single_state(scene: Scene, size: float, i: int, state: State) -> State:
     """Both q and p rounded to single precision."""
-    return tuple(x.astype(np.float32).astype(np.float64) for x in state)  # type: ignore[return-value]
+    return single(state[0]), single(state[1])
+
+
+def braked(scene: Scene, size: float, i: int, state: State) -> State:
+    """Momenta lose a fraction."""
+    return state[0], state[1] * (1 - size)
 
 
 def significant(x: Floats, size: float) -> Floats:

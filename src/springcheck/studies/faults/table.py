@@ -49,7 +49,7 @@ PARAMETERS = (
 FORCES = (
     Fault("friction", "momenta lose a fraction at every step",
           ("step-defect", "shadow-energy", "determinant", "symplecticity", "rounding-bias"),
-          seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), size=1e-12),
+          seeded.following(seeded.braked), size=1e-12),
     Fault("heating", "positions gain a fraction at every step",
           ("step-defect", "shadow-energy", "determinant", "symplecticity", "rounding-bias"),
           seeded.following(lambda s, x, i, z: (z[0] * (1 + x), z[1])), size=1e-12),
@@ -69,7 +69,7 @@ FORCES = (
           ("step-defect", "closed-form"),
           seeded.pulling(lambda top, x, f: np.clip(f, -0.9 * top, 0.9 * top))),
     Fault("single-force", "forces in single precision",
-          STEP, seeded.pulling(lambda top, x, f: f.astype(np.float32).astype(np.float64))),
+          STEP, seeded.pulling(lambda top, x, f: seeded.single(f))),
     Fault("stale-force", "forces come from a buffer one step old",
           ("step-defect", "closed-form"), seeded.stepping(seeded.stale_force), scheme="semi-implicit-euler"),
 )  # fmt: skip
@@ -151,8 +151,7 @@ REPORTS = (
           seeded.reporting(lambda s, x, r: replace(r, q=r.q * (1 + x))), size=1e-12),
     Fault("single-file", "states are written in single precision",
           ("step-defect",),
-          seeded.reporting(lambda s, x, r: replace(r, q=r.q.astype(np.float32).astype(np.float64),
-              p=r.p.astype(np.float32).astype(np.float64)))),
+          seeded.reporting(lambda s, x, r: replace(r, q=seeded.single(r.q), p=seeded.single(r.p)))),
     Fault("text-file", "states are written with so many digits",
           ("step-defect", "closed-form"),
           seeded.reporting(lambda s, x, r: replace(r, q=seeded.significant(r.q, x),
@@ -177,26 +176,21 @@ _MOTION_CHECKS = ("step-defect", "closed-form")
 
 AXES = (
     Fault("stiff-y", "forces along y are too large",
-          SPACE, seeded.moving(space.stiffer("y")), size=1e-11,
-          scene="orbit"),
+          SPACE, seeded.moving(space.stiffer("y")), size=1e-11, scene="orbit"),
     Fault("stiff-z-alone",
           "forces along z are too large, along which nothing moves until the scene is turned",
           ("orientation",), seeded.moving(space.stiffer("z")), size=1e-12),
     Fault("heavy-y", "the mass along y is too large, as in a mass matrix that is not isotropic",
-          SPACE, seeded.moving(space.heavier("y")), size=1e-11,
-          scene="orbit"),
+          SPACE, seeded.moving(space.heavier("y")), size=1e-11, scene="orbit"),
     Fault("flat", "forces along z are left out",
-          SPACE, seeded.stepping(space.along("z", lambda f: 0 * f)),
-          scene="orbit"),
+          SPACE, seeded.stepping(space.along("z", lambda f: 0 * f)), scene="orbit"),
     Fault("flat-turned", "forces along y are left out, along which nothing moves until the scene is turned",
           ("orientation",), seeded.stepping(space.along("y", lambda f: 0 * f))),
     Fault("mirrored-y", "the force along y has the wrong sign",
-          SPACE, seeded.stepping(space.along("y", lambda f: -f)),
-          scene="orbit"),
+          SPACE, seeded.stepping(space.along("y", lambda f: -f)), scene="orbit"),
     Fault("single-z", "forces along z in single precision",
           ("step-defect", "closed-form"),
-          seeded.stepping(space.along("z", lambda f: f.astype(np.float32).astype(np.float64))),
-          scene="orbit"),
+          seeded.stepping(space.along("z", seeded.single)), scene="orbit"),
     Fault("swapped-axes", "the force along y acts along z, and that along z along y",
           SPACE, seeded.stepping(space.swapped_axes), scene="orbit"),
     Fault("velocity-order", "the momenta are written in the order y, x, z",
@@ -252,7 +246,7 @@ RIGID = (
     _rod("rod-a-step-late", "SHAKE along the rod as it lay a step before",
          _TURNED, Rattle(way=lambda r, s, older: older).make),
     _rod("rod-in-single", "the rod's direction is kept in single precision",
-         ("angular-momentum",), Rattle(way=lambda r, s, older: r.astype(np.float32).astype(np.float64)).make),
+         ("angular-momentum",), Rattle(way=lambda r, s, older: seeded.single(r)).make),
     _rod("rod-one-iteration", "one iteration of SHAKE instead of a solution",
          _LENGTH, Rattle(solve=rigid.iterated(1)).make),
     _rod("rod-one-too-few", "two iterations of SHAKE, one too few",
@@ -291,10 +285,9 @@ RIGID = (
     _rod("triangle-masses-alike", "the rods of a triangle take its masses for equal",
          _ALONG, rigid.solved(Rods, lambda m: np.full_like(m, np.mean(m))), scene="triangle"),
     _rod("triangle-friction", "momenta of a turning triangle lose a fraction at every step",
-         ("turn", "angular-momentum"), seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), 1e-10,
-         scene="triangle"),
+         ("turn", "angular-momentum"), seeded.following(seeded.braked), 1e-10, scene="triangle"),
     _rod("rod-friction", "momenta of a turning rod lose a fraction at every step",
-         ("turn", "angular-momentum"), seeded.following(lambda s, x, i, z: (z[0], z[1] * (1 - x))), 1e-10),
+         ("turn", "angular-momentum"), seeded.following(seeded.braked), 1e-10),
 )  # fmt: skip
 
 BOX = (
@@ -321,17 +314,6 @@ ADAPTIVE = (
 )  # fmt: skip
 
 FAULTS: tuple[Fault, ...] = (
-    PARAMETERS
-    + FORCES
-    + STEPS
-    + ARITHMETIC
-    + REPORTS
-    + AXES
-    + BOX
-    + DRIVES
-    + RIGID
-    + FIELDS
-    + ADAPTIVE
-    + OF_NOISE
-    + THERMAL_STEPS
-)
+    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *FIELDS, *ADAPTIVE,
+    *OF_NOISE, *THERMAL_STEPS,
+)  # fmt: skip

@@ -37,15 +37,7 @@ from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
 from springcheck.studies.precision.points import POINTS, Place, Point, points_of
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
-from springcheck.studies.precision.sweeps import (
-    PLANNED,
-    Sweep,
-    affordable,
-    begin,
-    blank,
-    take,
-    to_time,
-)
+from springcheck.studies.precision.sweeps import PLANNED, Sweep, affordable, begin, blank, take, to_time
 from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.text.wording import count
 
@@ -60,11 +52,7 @@ CUT_OFF = "cut off"
 
 
 def study(
-    scene: Scene,
-    labels: Sequence[Label],
-    *,
-    budget: float = BUDGET,
-    kept: Keeper | None = None,
+    scene: Scene, labels: Sequence[Label], *, budget: float = BUDGET, kept: Keeper | None = None
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 

@@ -9,7 +9,7 @@ from springcheck.studies.precision.points import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
-from springcheck.text.wording import count, duration, seconds
+from springcheck.text.wording import count, duration, number, seconds
 
 
 def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
@@ -56,8 +56,8 @@ def _methods(methods: Sequence[MethodSummary]) -> TextTable:
         (
             m.method,
             "-" if m.order is None else f"{m.order:.4f}({m.order_standard_error:.0e})",
-            "-" if m.floor is None else f"{m.floor:.1e}",
-            "-" if m.floor_ratio is None else f"{m.floor_ratio:.2g}",
+            number(m.floor, ".1e"),
+            number(m.floor_ratio, ".2g"),
             *map(seconds, (m.seconds_per_step, m.read_seconds_per_step, m.start_seconds)),
         )
         for m in methods
@@ -100,7 +100,7 @@ def _points(points: Sequence[Point]) -> TextTable:
             where,
             f"{found.max_error:.1e}",
             f"{found.end_error:.1e}",
-            "-" if found.phase_error is None else f"{found.phase_error:+.0e}",
+            number(found.phase_error, "+.0e"),
             f"{found.energy_error:.0e}",
             seconds(point.seconds),
             str(point.force_calls),

@@ -18,7 +18,7 @@ from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Row, TextTable, hanging, plain, table
-from springcheck.text.wording import count, seconds
+from springcheck.text.wording import count, number, seconds
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -182,8 +182,8 @@ def _temperatures(report: Report) -> Lines:
     rows: list[Row] = [
         (
             one.method,
-            _law(one.configurational_law), _measured(one.configurational, one.configurational_error),
-            _law(one.kinetic_law), _measured(one.kinetic, one.kinetic_error),
+            number(one.configurational_law, ".6f"), _measured(one.configurational, one.configurational_error),
+            number(one.kinetic_law, ".6f"), _measured(one.kinetic, one.kinetic_error),
         )
         for one in report.temperatures
     ]  # fmt: skip
@@ -195,14 +195,8 @@ def _temperatures(report: Report) -> Lines:
     ]
 
 
-def _law(x: float) -> str:
-    return "-" if np.isnan(x) else f"{x:.6f}"
-
-
 def _measured(x: float, error: float) -> str:
-    if np.isnan(x):
-        return "-"
-    return f"{x:.4f}" if np.isnan(error) else f"{x:.4f} +- {error:.4f}"
+    return number(x, ".4f") if np.isnan(x + error) else f"{x:.4f} +- {error:.4f}"
 
 
 def ratio(verdict: Verdict) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -91,7 +91,4 @@ class Sampling(Shown):
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        names = [field.name for field in fields(Sampled)]
-        return keeper.document(
-            methods=[{name: getattr(x, name) for name in names} for x in self.methods], left_out=self.left_out
-        )
+        return keeper.document(methods=self.methods, left_out=self.left_out)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-import numpy as np
-
 from springcheck.figures.looks import title
 from springcheck.studies.sampling.result import Sampled, Sampling
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, plain, table
-from springcheck.text.wording import seconds
+from springcheck.text.wording import number, seconds
 
 TITLES = ("method", "configurational", "law", "kinetic", "law ", "off", "law  ", "limit", "law   ", "forces",
           "time")  # fmt: skip
@@ -39,13 +37,11 @@ def lines(found: Sampling, options: Namespace | None = None) -> Lines:
 
 def _row(x: Sampled) -> Row:
     at = list(x.friction).index(1.0)
+    measured = (
+        x.configurational[1], x.configurational_law[1], x.kinetic[1], x.kinetic_law[1], x.off[-1],
+        x.off_law[-1], x.limit[at], x.limit_law[at],
+    )  # fmt: skip
     return [
         plain("  " + x.method, "bold red" if x.departs else ""),
-        _number(x.configurational[1]), _number(x.configurational_law[1]),
-        _number(x.kinetic[1]), _number(x.kinetic_law[1]), _number(x.off[-1]), _number(x.off_law[-1]),
-        _number(x.limit[at]), _number(x.limit_law[at]), f"{x.force_calls:.3g}", seconds(x.seconds),
+        *(number(one, ".4f", "none") for one in measured), f"{x.force_calls:.3g}", seconds(x.seconds),
     ]  # fmt: skip
-
-
-def _number(x: float) -> str:
-    return "-" if np.isnan(x) else "none" if np.isinf(x) else f"{x:.4f}"

@@ -87,10 +87,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
 
 
 def record(
-    scene: Scene,
-    path: str | Path | None,
-    methods: Sequence[str] = (),
-    **how: Unpack[How],
+    scene: Scene, path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]
 ) -> Stability:
     """Like `measure`, kept in a store (see `keeper.kept`): tables under /stability, and the document."""
     labels = engines.match(tuple(methods) or ("*",))

@@ -12,6 +12,7 @@ from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import number
 
 
 def lines(study: Stability, options: Namespace | None = None) -> Lines:
@@ -31,13 +32,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
                 "-" if np.isnan(x.growth_above) else f"{y:.7f}" for y in (x.growth_above, x.growth_predicted)
             ]
             style = "" if x.agrees else "bold red"
-            cells = (
-                x.method,
-                *places,
-                f"{off:.0e}",
-                *grown,
-                _largest_step(study.largest(x)),
-            )
+            cells = (x.method, *places, f"{off:.0e}", *grown, _largest_step(study.largest(x)))
             rows.append([plain(cell, style) for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
         out += [table(titles, rows), plain()]
@@ -45,7 +40,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         costs = [
             (
                 x.method, f"{x.ratio:.0e}", str(x.steps), str(x.rejected), str(x.force_calls),
-                "-" if np.isnan(x.error) else f"{x.error:.1e}", x.outcome.partition(":")[0],
+                number(x.error, ".1e"), x.outcome.partition(":")[0],
             )
             for x in study.costs
         ]  # fmt: skip
