@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1215,
     ("engines",): 2589,
     ("driver", "conformance", "doors"): 1190,
-    ("checks",): 4402,
+    ("checks",): 4453,
     ("identify",): 7825,
     ("formats", "store"): 5101,
     ("studies",): 1600,

@@ -217,3 +217,22 @@ def test_an_explosion_with_friction_has_no_closed_form_beyond_the_digits_of_its_
     passed = {v.check: v.passed for v in verdicts}
     assert passed["step-defect"]
     assert passed["closed-form"] is None
+
+
+@pytest.mark.parametrize("stretched", [2.0, 4.0, 8.0, 12.0])
+@pytest.mark.parametrize("label", ["own:velocity-verlet", "own:rk4", "ase:velocity-verlet", "openmm:verlet"])
+def test_bonds_that_are_torn_apart_pull_to_a_rounding_of_what_is_subtracted(
+    label: str, stretched: float
+) -> None:
+    """exp(-a u) by way of 1 - exp(-a u), as good engines have it for small u, is known to a rounding of 1."""
+    pytest.importorskip(label.partition(":")[0].replace("own", "numpy"))
+    bond = Morse(
+        a=np.array([0]),
+        b=np.array([1]),
+        depth=np.array([2.3]),
+        steepness=np.array([1.7]),
+        rest=np.array([0.9]),
+    )
+    q = np.array([0.1, 1.0 + stretched])
+    scene = clean.scene(np.array([1.3, 2.1]), (bond,), q, np.zeros(2), step=0.1, steps=20)
+    assert alarms(checks.judge(scene, springcheck.simulate(scene, label))) == []

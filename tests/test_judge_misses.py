@@ -298,3 +298,26 @@ def test_a_light_one_among_many_joined_particles_is_seen() -> None:
     p = run.p.copy()
     p[3:, 0] *= 1 + 1e-9
     assert "step-defect" in failed(scene, replace(run, p=p))
+
+
+SHARP = [("rk4", 3), ("forest-ruth", 3), ("yoshida4", 3)]
+SHARP += [(name, 1) for name in ("rk2-heun", "rk4", "ruth3", "forest-ruth", "langevin-middle", "trapezoidal")]
+
+
+@EXTENDED
+@pytest.mark.parametrize(("name", "every"), SHARP)
+def test_a_kick_below_the_worst_that_all_roundings_could_do_together_is_seen(name: str, every: int) -> None:
+    """As good as random, they stay far below."""
+    terms = (WallSpring(i=np.array([0, 1]), k=np.array([2.9, 1.1]), at=np.zeros(2)),)
+    start = np.array([0.31, -0.7]), np.array([1.23, 2.1])
+    grid = {"step": 0.003, "steps": 30 * every}
+    scene = replace(clean.scene(np.array([3.7, 1.3]), terms, *start, **grid), every=every)
+    run = plain(scene, name)
+    assert failed(scene, run) == []
+    (right,) = checks.judge(scene, run, [checks.step_defect])
+    assert right.value < right.bound / 2
+    most = checks.Case(trajectory=run, scene=scene).roundings * 2.0**-53
+    p = run.p.copy()
+    p[7, 1] *= 1 + 0.8 * most
+    (wrong,) = checks.judge(scene, replace(run, p=p), [checks.step_defect])
+    assert wrong.passed is False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from springcheck.checks import experiments
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic
+from springcheck.physics.terms import Quartic, WallSpring
 from springcheck.studies.extremes import grid, running
 from springcheck.studies.faults import clean
 from springcheck.studies.run import measure, text
@@ -216,6 +217,30 @@ def test_a_motion_below_the_rounding_of_its_place_is_named(tmp_path: Path) -> No
     report = measure.run(scene, tmp_path / "a.h5", methods=["own:velocity-verlet"])
     said = "\n".join(str(line) for line in text.lines(report))
     assert f"own:velocity-verlet: q of particle 0, p of particle 0 {checks.BLIND}" in said
+
+
+@pytest.mark.parametrize("at", [1e6, 1e9])
+def test_what_far_walls_hide_of_a_motion_is_named_with_its_size(at: float) -> None:
+    k = np.array([2.9, 2.9, 1.7])
+    walls = WallSpring(i=np.array([0, 0, 1]), k=k, at=np.array([at, -at, 0.0]))
+    start = np.array([0.3, 0.3]), np.array([0.2, 0.7])
+    scene = clean.scene(np.array([3.7, 1.3]), (walls,), *start, step=0.1, steps=60)
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    (right,) = checks.judge(scene, run, [checks.step_defect])
+    assert right.passed is True
+    found = re.search(
+        r"; q of particle 0 \((\S+)\), p of particle 0 \((\S+)\) cannot be judged to", right.why
+    )
+    assert found is not None
+    assert "particle 1" not in right.why
+    # what passes of either is below what is said of it, and a little more fails
+    for name, size in zip("qp", map(float, found.groups()), strict=True):
+        for part, passed in ((0.4, True), (2.0, False)):
+            states = getattr(run, name).copy()
+            states[7, 0] += part * size
+            (kicked,) = checks.judge(scene, replace(run, **{name: states}), [checks.step_defect])
+            assert kicked.passed is passed, (name, part)
+    assert float(found[1]) < 1e-14 * at
 
 
 def test_nothing_is_named_that_stays_by_right() -> None:

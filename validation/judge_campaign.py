@@ -20,8 +20,8 @@ frames are from the scheme's own steps, in extended precision, from the frame be
 largest defect that any legal engine has in it on that scene, all forms tried, of few frames also from starts
 beside the scene's, and half an ulp of it at least.  A fault counts where its defect in some coordinate is
 more than 20 times the noise.  It is told where a verdict fails, or where each such coordinate is named as one
-that cannot be judged, or the step defect says that it cannot tell; else it is missed, and by which factor of
-the noise is counted in decades.
+that cannot be judged, or to no better than what it is off by, or the step defect says that it cannot tell;
+else it is missed, and by which factor of the noise is counted in decades.
 
 With `thorough` a set is all experiments of `run --thorough` with one own method on one such scene; FILE,
 which holds blocks of one kind, may be - for none.
@@ -33,6 +33,7 @@ again, and what is printed is the sum of all blocks of the file.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -44,6 +45,7 @@ import numpy as np
 import implicit_forms
 from arguments import arguments
 from springcheck import checks, driver, engines, schemes
+from springcheck.checks import steps
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
@@ -803,12 +805,10 @@ def _fault(
 
 
 def _named(why: str, off: Any) -> bool:
-    """Whether every coordinate that is off (2, n) is named as one that cannot be judged."""
-    said = next((part for part in why.split("; ") if part.endswith(checks.BLIND)), "")
+    """Whether every coordinate that is off (2, n) is named as one that cannot be judged, or no better."""
+    said = [part for part in why.split("; ") if part.endswith((steps.BLIND, steps.NO_BETTER))]
     names = [f"{'qp'[i]} of particle {j}" for i, j in np.argwhere(off)]
-    return bool(said) and (
-        " more cannot" in said or all(f"{name}," in f"{said}," or name in said for name in names)
-    )
+    return all(any(re.search(rf"{name}\b", part) for part in said) for name in names)
 
 
 def experiments(seed: int, counts: Counts) -> None:
@@ -822,6 +822,9 @@ def experiments(seed: int, counts: Counts) -> None:
     what = f"seed {seed}, {label}, every {scene.every}"
     _legal(counts, checks.judge_thoroughly(scene, str(label), driver.run), what)
 
+
+steps.MOST_NAMED = 10**6
+"""Every name is told, not the first few."""
 
 BLOCK = 250
 """Scenes of one line of the file."""

@@ -142,7 +142,7 @@ class Case(Claim):
     def allowance(self) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from each frame but the last adds up, (f-1, n) each."""
         if self.trajectory.every == 1 and self.ahead is not None:
-            of_q, of_p = self.ahead.allowance
+            of_q, of_p = self.ahead.last
             return of_q, of_p
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 

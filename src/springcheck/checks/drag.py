@@ -41,7 +41,7 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
     assert plain is not None
     p = run.p[:-1][told].astype(np.longdouble)
     lacks = (run.p[1:].astype(np.longdouble) - ahead.end[1])[told] * p
-    size, unit = p * p, np.sum(np.abs(p) * plain.allowance[1][told], axis=0)
+    size, unit = p * p, np.sum(np.abs(p) * plain.last[1][told], axis=0)
     with np.errstate(all="ignore"):
         rate = np.sum(lacks, axis=0) / np.sum(size, axis=0)
         # a friction that is the same everywhere explains the parts; the rest is noise

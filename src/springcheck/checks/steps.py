@@ -84,17 +84,38 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
 BLIND = "cannot be judged by single steps here: rounding may be as large as they are"
 
 
+NO_BETTER = "cannot be judged to better than that here: rounding is as large"
+
+
 def _blind(case: Case, told: NDArray[np.bool_]) -> str:
-    """Which positions and momenta move, and by no more in any step than rounding may."""
+    """Which positions and momenta move by no more in any step than rounding may, and of which others it is
+    much more than that of their own digits, or no small part of how far they move."""
     ahead, run = case.ahead, case.trajectory
     if ahead is None:
         return ""
+    states, most = np.stack([run.q, run.p]), case.roundings * ahead.allowance[:, told]
     with np.errstate(all="ignore"):
-        moves = np.abs(ahead.end - np.stack([run.q[:-1], run.p[:-1]]))[:, told]
-        seen = np.any(moves > case.roundings * ahead.allowance[:, told], axis=1)
-    names = [f"{'qp'[i]} of particle {j}" for i, j in np.argwhere(~seen & np.any(moves > 0, axis=1))]
+        moves = np.abs(ahead.end - states[:, :-1])[:, told]
+        hidden = ~np.any(moves > most, axis=1) & np.any(moves > 0, axis=1)
+        worst = np.max(most, axis=1)
+        digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
+        known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
+        coarse = (way > 0) & ~hidden & ~known
+    return _list(hidden, BLIND) + _list(coarse, NO_BETTER, worst)
+
+
+OF_DIGITS, OF_WAY = 512.0, 1e-9
+"""Roundings of a number, and part of its way, above which what rounding hides of it is said."""
+
+
+def _list(which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
+    """What is said of these positions and momenta (2, n), each with its size, or nothing."""
+    names = [
+        f"{'qp'[i]} of particle {j}" + ("" if size is None else f" ({float(size[i, j]):.1e})")
+        for i, j in np.argwhere(which)
+    ]
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"; {', '.join(names[:MOST_NAMED])}{more} {BLIND}" if names else ""
+    return f"; {', '.join(names[:MOST_NAMED])}{more} {said}" if names else ""
 
 
 MOST_NAMED = 4

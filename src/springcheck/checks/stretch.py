@@ -6,8 +6,9 @@ With A the allowance of one step (see `rounding`), s steps later it is at most t
 |D Phi^(s-1-i)| A(z_i), each degree of freedom by itself: in a norm over all of them a heavy body would
 hide a light one, and a bound by norms of single steps grows exponentially on a motion that merely turns.
 
-That takes all roundings for of one sign.  In double precision they are as good as random, and of the steps
-before the last one 5 standard deviations are allowed.  Three parts add up their variances:
+That takes all roundings for of one sign.  In double precision they are as good as random, and 5 standard
+deviations are allowed, and one more, or the worst of the last step if that is less.  Three parts add up their
+variances:
 
 * what a step rounds is uniform within its unit, and a position or momentum is rounded once by each stage
   that moves it and once by what it moves by: a walk, a third of A**2 for each;
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 
 from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
-from springcheck.physics.arrays import WIDE, Extended, Force, Reals
+from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
@@ -44,7 +45,10 @@ SAMPLES = 16
 """Tangent vectors of more than these, whose every rounding has a random sign."""
 
 DEVIATIONS = 5.0
-"""Standard deviations of roundings as good as random that are allowed: more once in 1.7 million."""
+"""Standard deviations of roundings as good as random that are allowed: more once in 1.7 million; one more, as
+few steps have, once in 500 million.  In a step of h w << 1 that is above the worst that there can be, a
+rounding by each stage that moves a coordinate, two on its way in and two out: numbers whose roundings are not
+random raise no alarm."""
 
 T_SIXTEEN = 7.98
 """The same where `SAMPLES` tell the standard deviation, by Student's t."""
@@ -96,7 +100,14 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         end, bound = _one(case, q, p, near=near)
         reach = np.maximum(np.abs([q, p]), np.abs(end))
         turns = np.zeros(len(q), dtype=np.longdouble)
-        return Stretch(end=end, allowance=bound, last=bound, reach=reach, turns=turns)
+        # of an implicit step the sums of n products that its solver has
+        implicit, separate = case.law.has("implicit"), case.system.is_separate
+        solved = (1 if separate else q.shape[1]) * implicit
+        spread = bound * np.sqrt(_walk(case) + _to_one_side(case) ** 2 + (2 + solved) / 3)
+        # stiff bonds carry what a solver leaves along few directions, all of a sign
+        random = not implicit or separate or bool(np.max(_turn(case, q)) < 1)
+        allowance = _allowed(case, bound, bound, spread, DEVIATIONS, random=random)
+        return Stretch(end=end, allowance=allowance, last=bound, reach=reach, turns=turns)
     n, many = q.shape[1], _many
     if case.system.is_separate or n <= JOINED:
         wide = 2 if case.system.is_separate else 2 * n
@@ -153,8 +164,8 @@ def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
             drifts = drifts + power * (alike[:, i] * bounds[i])[..., None, :]
             if i:
                 power = power @ maps[i]
-        spread = np.sqrt(walk * 2 * _times(case) / 3 + np.sum(drifts * drifts, axis=(0, -1)))
-        carried = _allowed(case, worst, bounds[-1], spread, DEVIATIONS)
+        spread = np.sqrt(walk * _walk(case) + np.sum(drifts * drifts, axis=(0, -1)))
+        carried = _allowed(case, worst, bounds[-1], spread, DEVIATIONS, random=not case.law.has("implicit"))
     allowance = np.moveaxis(carried, -1, 0) if separate else np.stack(np.split(carried, 2, axis=-1))
     reach = np.max(np.abs(on), axis=1)
     return Stretch(end=on[:, -1], allowance=allowance, last=each[:, -1], reach=reach, turns=turns)
@@ -167,7 +178,7 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     """
     rng = np.random.default_rng(0)
     signs = np.array([-1.0, 1.0])
-    fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(2 * _times(case) / 3)
+    fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(_walk(case))
     off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble)
     on, forces = np.stack([q, p]), variational(case.system)
     reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
@@ -189,7 +200,7 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
                 turns = np.maximum(turns, _turn(case, on[0]))
         spread = np.sqrt(np.mean(off * off, axis=1))
         worst = np.maximum(last, spread * np.sqrt(2 * q.shape[1] * steps) / walk * WIDENED)
-        allowance = _allowed(case, worst, last, spread, T_SIXTEEN)
+        allowance = _allowed(case, worst, last, spread, T_SIXTEEN, random=not case.law.has("implicit"))
     return Stretch(end=on, allowance=allowance, last=last, reach=reach, turns=turns)
 
 
@@ -198,8 +209,17 @@ def _alike(case: Claim, before: Reals, after: Reals) -> Extended:
 
     Of those to one side each may be as large as it can; the others are as good as random.
     """
-    most = max(_times(case) / DEVIATIONS, 1 / np.sqrt(3))
-    return np.stack([0 * before + most, np.sign(before) / np.sqrt(3), np.sign(after - before) / np.sqrt(3)])
+    one_side = 0 * before + _to_one_side(case)
+    return np.stack([one_side, np.sign(before) / np.sqrt(3), np.sign(after - before) / np.sqrt(3)])
+
+
+def _to_one_side(case: Claim) -> float:
+    return max(_times(case) / DEVIATIONS, float(1 / np.sqrt(3)))
+
+
+def _walk(case: Claim) -> float:
+    """The variance of what one step rounds at random, in squares of its allowance."""
+    return 2 * _times(case) / 3
 
 
 def _times(case: Claim) -> int:
@@ -209,13 +229,22 @@ def _times(case: Claim) -> int:
     return max(1, len(case.scheme.b), *moves)
 
 
-def _allowed(case: Claim, worst: Extended, last: Extended, spread: Extended, deviations: float) -> Extended:
-    """What roundings of all steps may be, in those of one: at worst, or where they are as good as random so
-    many standard deviations of them beside the worst of the last step."""
+def _allowed(
+    case: Claim, worst: Extended, last: Extended, spread: Extended, deviations: float, *, random: bool
+) -> Extended:
+    """What roundings of all steps may be, in those of one: at worst, or so many standard deviations of them
+    and beside them the worst of the last step, or one more where they are as good as `random`."""
     how = case.trajectory.arithmetic
-    if not WIDE or how.quantum or how.lengths or how.stale:
+    # what a solver takes from positions it takes at every step alike, and all of it is in rebuilt velocities
+    alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")
+    if not WIDE or how.quantum or how.lengths or how.stale or alike:
         return worst
-    return np.minimum(worst, last + deviations / case.roundings * spread)
+    spread, beside = spread / case.roundings, last
+    # rods are iterated, and a rotation rounds a momentum many times
+    free = not case.system.rods and case.law.turns is None
+    if how.state == how.force == Arithmetic().state and random and free:
+        beside = np.minimum(spread, last)
+    return np.asarray(np.minimum(worst, deviations * spread + beside))
 
 
 def _joined(separate: bool) -> Callable[..., Extended]:
