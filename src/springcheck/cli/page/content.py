@@ -27,7 +27,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
-from springcheck.studies.run.page import of_runs
+from springcheck.studies.run.page import of_runs, temperatures
 from springcheck.text.wording import STATES_SHOW
 
 NUMBERS = 12_000
@@ -172,7 +172,14 @@ def gather(path: Path) -> Content:
 def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | None:
     """The charts of the run in one bank: what `plot` draws, the first engine of each scheme on."""
     shown = drawable(path, most)
-    found = of_runs(shown.scene, shown.runs, shown.followed, failed=wrong, points=most)
+    found = of_runs(
+        shown.scene,
+        shown.runs,
+        shown.followed,
+        failed=wrong,
+        points=most,
+        heated=temperatures(shown.scene, path),
+    )
     if not found:
         return None
     curves = [curve for bank in found for chart in bank.charts for curve in chart.curves]
@@ -182,6 +189,8 @@ def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | N
         """What is no number of the file is written with seven digits."""
         return x if np.asarray(x).tobytes() in kept else [float(f"{value:.7g}") for value in x]
 
+    # of a bath the finding is a temperature, not its clouds
+    found.sort(key=lambda bank: bank.name != "temperature")
     charts = [
         replace(
             chart,

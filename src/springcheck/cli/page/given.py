@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import schemes
+from springcheck.cli.page.bath import bath
 from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
 from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
@@ -41,12 +42,13 @@ SLIDING = np.arange(201) / 200
 
 def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collection[str]) -> dict[str, Any]:
     """The data of a page, but for its charts; `wrong` are the methods that some verdict rejects."""
-    one = spring(scene) if scene else None
+    one = spring(scene) if scene and not scene.bath else None
     return {
         "runs": [drawn(piece, scene, failed=piece.label in wrong) for piece in pieces],
         "spring": one,
         "sliders": one and {name: [float(f"{x:.6g}") for x in y] for name, y in sliders(**one).items()},
         "live": one and charts.plain(_live()),
+        "bath": bath(scene, {piece.scheme for piece in pieces}),
         "linear": linear(scene) if scene else None,
         "laws": laws([*(piece.scheme for piece in pieces), *TRIED.values()]),
         "steps": scene.steps if scene else 0,

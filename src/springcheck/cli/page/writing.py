@@ -69,7 +69,8 @@ def html(content: Content) -> str:
         "ordinal": ordinal,
         "words": lambda text: str(text).strip(),
     }
-    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    names = (*SCRIPTS, "bath.js") if content.data.get("bath") else SCRIPTS
+    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in names)
     style = (HERE / "page.css").read_text(encoding="utf-8")
     return around.get_template("page.html").render(
         content=content,
@@ -139,9 +140,9 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
             for chart in bank["charts"]
         ]}  # fmt: skip
 
-    live = data.get("live")
+    live, bath = data.get("live"), data.get("bath")
     return {
-        **data, "live": live and seen(live),
+        **data, "live": live and seen(live), "bath": bath and {**bath, "live": seen(bath["live"])},
         "banks": {name: seen(bank) for name, bank in data["banks"].items()},
     }  # fmt: skip
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from springcheck.physics.scene import Scene
@@ -12,6 +14,15 @@ from springcheck.thermal import THERMOSTATS, Law
 SETTLED = 5.0
 """Times over which the slowest part of the motion decays before frames count: exp(-5) of a start is left in
 its mean, exp(-10) in its square."""
+
+
+def heated_of(scene: Scene, pieces: Iterable[Trajectory]) -> Heated:
+    """The temperatures of one run in a bath, of its pieces."""
+    heat, label = Heat(scene), ""
+    for piece in pieces:
+        heat.add(piece)
+        label = piece.label
+    return heat.line(label)
 
 
 class Heat:

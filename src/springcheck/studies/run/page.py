@@ -3,8 +3,9 @@ engines laid over each other; of a chain also its modes and its wave, of a bath 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ from springcheck.figures.overlay import Runs
 from springcheck.figures.views import paths, views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.run.heat import Heat
-from springcheck.studies.run.result import Report, Stored
+from springcheck.studies import keeper
+from springcheck.studies.run.heat import heated_of
+from springcheck.studies.run.result import Heated, Report, Stored
 
 POSITIONS_IN_BATH = 4
 """Schemes in a bath whose positions are drawn: more hide one another."""
@@ -29,7 +31,15 @@ def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
     """The charts of trajectories, or of the motion of one particle."""
     shown = found.drawable
     failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
-    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed)
+    heated = temperatures(shown.scene, found.path) if found.path else ()
+    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed, heated=heated)
+
+
+def temperatures(scene: Scene, path: Path) -> tuple[Heated, ...]:
+    """Of every stored run in a bath, by all its frames; none without a bath."""
+    if scene.bath is None:
+        return ()
+    return tuple(heated_of(scene, keeper.windows(path, run.label)) for run in keeper.summary(path).runs)
 
 
 def of_runs(
@@ -40,12 +50,14 @@ def of_runs(
     particle: int | None = None,
     failed: Collection[str] = (),
     points: int = SMOOTH,
+    heated: Sequence[Heated] = (),
 ) -> list[Bank]:
     """The charts, none where no run has more than its start.
 
     `followed`: the parts of the runs in which the motion itself is shown; `particle`: this one's motion
     alone; `failed`: labels of runs that some verdict rejects, drawn in red; `points`: of the exact
-    solution's line.  SpringcheckError where there is no such particle.
+    solution's line; `heated`: temperatures by all frames, left out by those of `runs`.  SpringcheckError
+    where there is no such particle.
     """
     if not any(len(run.t) > 1 for run in runs.values()):
         return []
@@ -59,7 +71,7 @@ def of_runs(
             portraits.clouds(usable, shown[0], scene.thermal),
             portraits.positions(few, shown, None),
             energies.means(usable, scene.thermal),
-            *_temperatures(usable),
+            *_temperatures(usable, heated or [heated_of(scene, [run]) for run in usable.every]),
         ]
         return [_of_particle(one, particle) for one in out[: 2 if particle is not None else None]]
     truth = true_motion(scene, parts.every, points)
@@ -81,14 +93,9 @@ def _of_particle(bank: Bank, particle: int | None) -> Bank:
     return bank if particle is None else replace(bank, name=f"{bank.name}-particle-{particle}")
 
 
-def _temperatures(runs: Runs) -> list[Bank]:
+def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
     """Configurational and kinetic temperature of each method beside the exact ones of its scheme."""
-    found = []
-    for run in runs.every:
-        heat = Heat(runs.scene)
-        heat.add(run)
-        found.append(heat.line(run.label))
-    found = [one for one in found[::-1] if np.isfinite(one.kinetic)]
+    found = [one for one in heated[::-1] if np.isfinite(one.kinetic)]
     if not found:
         return []
     charts = []
@@ -138,16 +145,17 @@ def _temperatures(runs: Runs) -> list[Bank]:
                 rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
             )
         )
-    hot = max(
-        found,
-        key=lambda one: (
-            abs(one.configurational - 1) if np.isfinite(one.configurational) else abs(one.kinetic - 1)
-        ),
-    )
-    which, value = (
-        ("configurational", hot.configurational)
-        if np.isfinite(hot.configurational)
-        else ("kinetic", hot.kinetic)
-    )
-    heading = f"{runs.scene.title}: {hot.method} is farthest from its bath: {value:.3g} of it ({which})"
+    heading = f"{runs.scene.title}: {_farthest(found)}"
     return [Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=2)]
+
+
+def _farthest(found: Sequence[Heated]) -> str:
+    """What scheme is farthest from its bath by its law; where none has one, what run is by its frames."""
+    kinds, measured = ("configurational", "kinetic"), ""
+    both = [(getattr(one, f"{kind}_law"), kind, one.method) for one in found for kind in kinds]
+    if not np.any(np.isfinite([x for x, *_ in both])):
+        both = [(getattr(one, kind), kind, one.method) for one in found for kind in kinds]
+        measured = " in its frames"
+    x, kind, method = max((one for one in both if np.isfinite(one[0])), key=lambda one: abs(one[0] - 1))
+    off = f"{100 * abs(x - 1):.2g} % too {'hot' if x > 1 else 'cold'}"
+    return f"the {kind} temperature of {method} is {off}{measured or ' by its law, however long it runs'}"
