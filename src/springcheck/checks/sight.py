@@ -116,9 +116,10 @@ def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> C
     more[chosen] = change
     if name in OF_A_DRIVE:
         term: Any = terms[number]
-        field = next(one for one in OF_A_DRIVE[name] if hasattr(term, one))
-        unit = {"phase": 1.0, "late": term.frequency * run.step}.get(name, getattr(term, field))
-        terms[number] = replace(term, **{field: getattr(term, field) + more * unit})
+        given = term.arrays
+        field = next(one for one in OF_A_DRIVE[name] if one in given)
+        unit = {"phase": 1.0, "late": given["frequency"] * run.step}.get(name, given[field])
+        terms[number] = replace(term, **{field: given[field] + more * unit})
     else:
         # friction by the rule of all terms: by its own it is no part of what is scaled
         terms[number] = Term.scaled(terms[number], 1 + more)

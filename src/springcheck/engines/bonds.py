@@ -13,7 +13,7 @@ from springcheck.errors import MethodError
 from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Spring, WallSpring
+from springcheck.physics.terms import Cosine, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
 
 ANCHOR_MASS = 2.0**100
@@ -39,11 +39,12 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     """
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
+    of_length = [t for t in scene.terms if isinstance(t, WallSpring | Spring | RadialSpring)]
     with np.errstate(over="ignore"):
         # Gershgorin's bound of the squared frequencies
-        w2 = np.max(scene.derived(terms=tuple(springs)).system.gershgorin(scene.q) / scene.m)
+        w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
-    bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in springs)
+    bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in of_length)
     group = graph.lowest_joined(scene.n, scene.terms)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = _energies(scene, group) * (2 + hw) / (2 - hw) if bounded else np.full(scene.n, np.inf)
@@ -55,6 +56,12 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         turning[own[~safe]] = True
     if scene.box is not None:
         _within_half(scene, springs, energy[group])
+        reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
+        # one bond may have all of the energy
+        bonds = [one for one in scene.terms if isinstance(one, RadialSpring)]
+        longest = [0.0, *(float(np.max(one.rest + np.sqrt(2 * reach / np.abs(one.k)))) for one in bonds)]
+        if not max(longest) < min(scene.box) / 2:
+            raise MethodError(f"{scene.name}: a bond may become as long as half of the box")
     if not np.any(turning):
         return np.zeros(scene.n)
     rest = scene.system.rest_positions
@@ -145,6 +152,13 @@ def joints(
             f"particle {which} does not"
         )
     return found
+
+
+def in_space(scene: Scene, term: RadialSpring) -> Iterator[tuple[tuple[int, int], float, float]]:
+    """Bonds that know their length, as programs have them: the particles, k [M/T2], rest length [L]."""
+    of = scene.all_places // 3
+    for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
+        yield (int(of[a]), int(of[b])), k, rest
 
 
 def rods(joined: list[Joint], anchors: int) -> Iterator[Bond]:

@@ -40,7 +40,7 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import RadialSpring, Spring, WallSpring
 from springcheck.thermal.decays import GJ
 
 INNER = 8
@@ -317,6 +317,9 @@ def _bonds(scene: Scene, tied: list[Term], origins: Floats) -> Iterator[bonds.Bo
         elif isinstance(term, Spring):
             for (a, b), k, length in bonds.joints(scene, term, origins):
                 yield a, b, k, length, None
+        elif isinstance(term, RadialSpring):
+            for (a, b), k, length in bonds.in_space(scene, term):
+                yield a, b, k, length, None
 
 
 def _layered(
@@ -342,7 +345,7 @@ ENGINE = Engine(
         by_name(
             "spring-self", "velocity-verlet", "fix spring/self, fix nve", frozenset({"wall-spring", "drive"})
         ),
-        by_name("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS | {"drive"}),
+        by_name("bond", "velocity-verlet", "bond_style harmonic, fix nve", SPRINGS | {"drive", "bond"}),
         # r-RESPA would leave the force of `fix external` out, without a word
         by_name("external", "velocity-verlet", "fix external, set by callback, fix nve",
                 EVERY_POTENTIAL | DRIVEN),

@@ -73,10 +73,15 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             if not line.startswith("ITEM: TIMESTEP"):
                 raise lines.wrong("ITEM: TIMESTEP is expected")
             steps.append(int(next(lines)))
-            item, announced = next(lines), 0
+            item, announced, edges = next(lines), 0, list[float]()
             while not item.startswith("ITEM: ATOMS"):
                 if item.startswith("ITEM: NUMBER OF ATOMS"):
                     announced = n = _atoms(next(lines), lines, n)
+                elif item.startswith("ITEM: BOX BOUNDS"):
+                    bounds = [[float(x) for x in next(lines).split()] for _ in range(3)]
+                    edges = [x[1] - x[0] for x in bounds]
+                    if any(len(x) > 2 for x in bounds):
+                        raise lines.wrong("its box is tilted; dump xu yu zu in place of counters of images")
                 item = next(lines)
             if not announced:
                 raise lines.wrong("ITEM: NUMBER OF ATOMS is missing before it")
@@ -87,9 +92,14 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             for _ in range(announced):
                 cells = next(lines).split()
                 row = [cells[i] for i in wanted.values()]
-                numbers.extend(float(cell) for cell in row)
+                values = [float(cell) for cell in row]
+                if "ix" in wanted:
+                    at = names.index("ix")
+                    turns = zip(values[:3], values[at : at + 3], edges, strict=True)
+                    values[:3] = [x + count * edge for x, count, edge in turns]
+                numbers.extend(values)
                 if len(first) < SHOWN:
-                    first.append(row)
+                    first.append(row[:6])
     table = np.frombuffer(numbers).reshape(len(steps), n or 1, len(names))
     if "id" in names:
         order = np.argsort(table[:, :, names.index("id")], axis=1, kind="stable")
@@ -107,7 +117,9 @@ def _wanted(path: Path, names: list[str]) -> dict[str, int]:
     lacking = [name for name in wanted if name not in names]
     if lacking:
         raise StoreError(f"{path}: its atoms have no {', '.join(lacking)}; dump x y z vx vy vz")
-    return {name: names.index(name) for name in (*wanted, "mass", "id") if name in names}
+    # counters of the borders that wrapped positions have crossed
+    images = ["ix", "iy", "iz"] if {"x", "ix", "iy", "iz"} <= set(names) and "xu" not in names else []
+    return {name: names.index(name) for name in (*wanted, "mass", "id", *images) if name in names}
 
 
 def read_log(path: Path, columns: list[str], step: float | None) -> States:

@@ -9,7 +9,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import RadialSpring, Spring, WallSpring
 
 
 def is_uniform_chain(m: Floats, terms: Sequence[Term]) -> bool:
@@ -112,13 +112,15 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
 def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integers, Integers], ...]:
     """Of each two axes that nothing tells apart the coordinates along the one and the other, by particle.
 
-    Linear terms and rods that act on both alike and rest in 0 keep the angular momentum about 0 in their
-    plane.  `places` (n,) are those of `Scene`.
+    Linear terms, rods and bonds that act on both alike and rest in 0 keep the angular momentum about 0 in
+    their plane.  `places` (n,) are those of `Scene`.
     """
     parts = tuple(terms)
-    if not all(term.is_linear or term.kind == "constraint" for term in parts):
+    if not all(
+        term.is_linear or term.kind == "constraint" or isinstance(term, RadialSpring) for term in parts
+    ):
         return ()
-    if places is None or any(np.any(getattr(term, term.origin, 0)) for term in parts):
+    if places is None or any(term.origin and np.any(getattr(term, term.origin)) for term in parts):
         return ()
     found = []
     for a, b in ((0, 1), (1, 2), (0, 2)):

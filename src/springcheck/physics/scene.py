@@ -187,7 +187,7 @@ def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
     return lengths * (3 // len(lengths))
 
 
-BOXED = ("wall-spring", "spring", "damping")
+BOXED = ("wall-spring", "spring", "bond", "damping")
 """Terms that a box may hold."""
 
 

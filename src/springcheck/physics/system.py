@@ -222,10 +222,7 @@ class System(Generic[Fields]):
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         """Rows, columns and values (..., s) of what each pair of ends adds to the `hessian` at q (..., n)."""
         for term in self.terms:
-            k = np.broadcast_to(term.curvature(q), (*q.shape[:-1], len(term)))
-            for one in term.particles:
-                for other in term.particles:
-                    yield one, other, k if one is other else -k
+            yield from term.elements(q)
 
     def hessian(self, q: Reals) -> Extended:
         """Second derivatives of the potential energy at q (..., n) -> (..., n, n) [M/T2], extended."""

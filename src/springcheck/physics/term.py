@@ -189,6 +189,13 @@ class Term:
         """Second derivative of each row's energy by u, at q (..., n) -> (..., s) or (s,) [M/T2]."""
         return np.asarray(self.second(self.elongation(q), *self.parameters))
 
+    def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
+        """Rows, columns and values (..., s) that each pair of ends adds to the Hessian at q (..., n)."""
+        k = np.broadcast_to(self.curvature(q), (*q.shape[:-1], len(self)))
+        for one in self.particles:
+            for other in self.particles:
+                yield one, other, k if one is other else -k
+
     @cached_property
     def rigidity(self) -> Floats:
         """Absolute curvature of each row at rest (s,) [M/T2]: what errors of position are weighed by."""

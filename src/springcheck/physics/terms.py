@@ -16,13 +16,15 @@ from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.magnetic import Magnetic
+from springcheck.physics.radial import RadialSpring
 from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term, WithoutPotential
 from springcheck.physics.vanderpol import VanDerPol
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "Magnetic", "ModulatedSpring", "Morse", "OnPairs", "OnParticles",
-    "Quartic", "Rod", "Spring", "Term", "VanDerPol", "WallRod", "WallSpring", "Weight", "known", "register",
+    "Quartic", "RadialSpring", "Rod", "Spring", "Term", "VanDerPol", "WallRod", "WallSpring", "Weight",
+    "known", "register",
 ]  # fmt: skip
 
 
@@ -261,6 +263,7 @@ _KNOWN: dict[str, type[Term]] = {
         Cosine,
         Weight,
         Morse,
+        RadialSpring,
         Damping,
         VanDerPol,
         Magnetic,

@@ -18,7 +18,7 @@ from springcheck.engines.contract import (
     thermostat,
 )
 
-_TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL}
+_TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {"bond"}
 _DRIVEN = _TERMS | DRIVEN
 
 _ON_A_LINE = _TERMS - {"morse"}

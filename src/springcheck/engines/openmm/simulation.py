@@ -39,7 +39,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Morse, Spring, WallSpring
+from springcheck.physics.terms import Morse, RadialSpring, Spring, WallSpring
 
 CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
     "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
@@ -114,6 +114,9 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
                 group.addBond(anchors[at], i, 0.0, k)
         elif isinstance(term, Spring):
             for (a, b), k, length in bonds.joints(scene, term, origins):
+                group.addBond(a, b, length, k)
+        elif isinstance(term, RadialSpring):
+            for (a, b), k, length in bonds.in_space(scene, term):
                 group.addBond(a, b, length, k)
     for group in (slow, fast):
         if group.getNumBonds():

@@ -110,6 +110,10 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
         if ready := LUMPED.prepare(system):
             return Solution(n=system.n, groups=(everything(found=ready, law=LUMPED),))
     laws = [QUARTIC, COSINE, MORSE, ROD, WALL_ROD, RIGID, linear.LINEAR]
+    if "bond" in system.acting:
+        from springcheck.physics.exact.swinging import SWINGING
+
+        laws.insert(0, SWINGING)
     if system.brakes_by_place:
         from springcheck.physics.exact.relaxation import VAN_DER_POL
 

@@ -15,7 +15,17 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.fields import Units
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import Column, Damping, Magnetic, Rod, Spring, Term, WallRod, WallSpring
+from springcheck.physics.terms import (
+    Column,
+    Damping,
+    Magnetic,
+    RadialSpring,
+    Rod,
+    Spring,
+    Term,
+    WallRod,
+    WallSpring,
+)
 
 
 class MistakeError(ValueError):
@@ -198,6 +208,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
         yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
     yield from _by_columns(Damping, table.damping, bodies)
     yield from _rods(table.rod, bodies)
+    yield from _bonds(table.bond, bodies)
     yield from _magnetic(table.magnetic, bodies)
     loops = [bodies.number(row.loop, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
     if loops:
@@ -254,6 +265,19 @@ def _rods(rods: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
         kind = rows.setdefault((WallRod if len(numbers) == 1 else Rod, False), [])
         kind += [(*at, length, *([x] if len(numbers) == 1 else [])) for at, x in zip(ends, wall, strict=True)]
     yield from _of_rows(rows)
+
+
+def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+    """A row for each axis of the two particles that a bond joins."""
+    rows: list[tuple[float, ...]] = []
+    for j, bond in enumerate(bonds):
+        if bodies.name not in ("particle", "chain"):
+            raise MistakeError(f"bond[{j}]: a bond joins particles")
+        one, other = bond.ends
+        _two_ends(one, other, f"bond[{j}].ends")
+        ends = bodies.along(f"bond[{j}].ends", None, one, other)
+        rows += [(*at, bond.stiffness, bond.rest, j) for at in ends]
+    yield from _of_rows({(RadialSpring, False): rows} if rows else {})
 
 
 def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:

@@ -87,6 +87,14 @@ class RodTable(SceneTable, frozen=True):
     wall: float | PerAxis = 0.0
 
 
+class BondTable(SceneTable, frozen=True):
+    """A bond of two particles along whatever direction: k/2 (length - rest)**2, k [M/T2], rest [L]."""
+
+    ends: tuple[int, int]
+    stiffness: float
+    rest: NonNegative = 0.0
+
+
 class DampingTable(SceneTable, frozen=True):
     """Friction of one particle, along `axis` or all of its axes: force -coefficient p/mass, in M/T."""
 
@@ -194,6 +202,7 @@ class SceneBase(SceneTable, frozen=True):
     spring: tuple[SpringTable, ...] = ()
     damping: tuple[DampingTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
+    bond: tuple[BondTable, ...] = ()
     magnetic: tuple[MagneticTable, ...] = ()
     box: BoxTable | None = None
     bath: BathTable | None = None
@@ -229,7 +238,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "damping", "magnetic", "wall-rod", "rod")
+OTHERWISE = ("wall-spring", "spring", "damping", "magnetic", "wall-rod", "rod", "bond")
 """Terms that have tables of their own."""
 
 
@@ -272,7 +281,8 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, RodTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable, RecordTable,
+        DampingTable, RodTable, BondTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable,
+        RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
     found |= {key: table for key, (_, table) in of_terms().items()}

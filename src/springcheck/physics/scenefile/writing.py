@@ -16,7 +16,7 @@ from springcheck.physics.rods import rods_of
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Magnetic, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
 
 MOST_WAVES = 64
 """Standing waves up to which the start of a chain is written as such."""
@@ -127,6 +127,9 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
             sign = 1.0 if (other - one) % 3 == 1 else -1.0
             row = {"particle": particle, "strength": sign * strength, "axis": "xyz"[3 - one - other]}
             yield _table("[[magnetic]]", row.items())
+    elif isinstance(term, RadialSpring):
+        for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
+            yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
     elif isinstance(term, Rod | WallRod):
         rods = rods_of(scene.m, scene.places, (term,))
         assert rods is not None

@@ -1,0 +1,128 @@
+"""A bond in space: a spring between two particles that knows its length, whatever its direction.
+
+It is a row for each axis, and the rows of one bond share its number.  With d the way between its ends, s its
+length and e = d/s, its force is k (s - rest) e, and the matrix of second derivatives
+k (1 - rest/s) + k rest/s e e'.  It bends unless it moves along itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+
+from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.term import Column, Term
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RadialSpring(Term):
+    """Bonds between particles: V = k/2 (|q[b] - q[a]| - rest)**2, a row for each axis.
+
+    k [M/T2], rest [L]; rows of one bond stand together and have one number.
+    """
+
+    key: ClassVar[str] = "bond"
+    formula: ClassVar[str] = "k/2 (|q[b] - q[a]| - rest)**2"
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("stiffness", "k"),
+        Column("rest", "rest", 0.0, sign="nonnegative"),
+        Column("number", "number", single=False),
+    )
+    ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    a: Integers
+    b: Integers
+    k: Floats
+    rest: Floats
+    number: Floats
+
+    # of a row by itself, without a rest length: the energy of a bond is no sum over its axes
+
+    @staticmethod
+    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(0.5 * (k * u * u))
+
+    @staticmethod
+    def slope(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(k * u)
+
+    @staticmethod
+    def second(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(k)
+
+    @staticmethod
+    def rounding(size: Reals, u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(k * size)
+
+    @cached_property
+    def _starts(self) -> Integers:
+        """The first row of each bond."""
+        return np.flatnonzero(np.append(True, np.diff(self.number) != 0)) if len(self) else self.a
+
+    @cached_property
+    def _bond(self) -> Integers:
+        """The bond of each row, from 0 on."""
+        return np.cumsum(np.append(0, np.diff(self.number) != 0)) if len(self) else self.a
+
+    def _sum(self, values: Reals) -> Reals:
+        """Over the axes of each bond, for each of them (..., s)."""
+        return np.take(np.add.reduceat(values, self._starts, axis=-1), self._bond, axis=-1)
+
+    def _ways(self, q: Reals) -> tuple[Reals, Reals]:
+        """The way between the ends, and its length, for each axis (..., s)."""
+        d = self.stretch(q)
+        s = np.sqrt(self._sum(d * d))
+        # a length of 0 has no direction, and d is 0 there
+        return d, np.where(s > 0, s, np.finfo(q.dtype).tiny)
+
+    def energy(self, q: Reals) -> Reals:
+        s = np.sqrt(np.add.reduceat(self.stretch(q) ** 2, self._starts, axis=-1))
+        k, rest = self.k[self._starts], self.rest[self._starts]
+        return np.asarray(np.sum(0.5 * (k * (s - rest) * (s - rest)), axis=-1))
+
+    def pull(self, q: Reals) -> Reals:
+        d, s = self._ways(q)
+        return np.asarray(self.k * (s - self.rest) * (d / s))
+
+    def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
+        d, s = self._ways(q)
+        e, moved = d / s, self.stretch(dq)
+        along = e * self._sum(e * moved)
+        self.add_pull(self.k * (moved - self.rest / s * (moved - along)), out)
+
+    def curvature(self, q: Reals) -> Reals:
+        """At most, summed over the axes of the other rows: what Gershgorin's bound asks for."""
+        _, s = self._ways(q)
+        bent = self.rest / s
+        return np.asarray(np.abs(self.k) * (np.abs(1 - bent) + np.sqrt(3.0) * bent))
+
+    def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
+        d, s = self._ways(q)
+        one, other = np.nonzero(self._bond[:, None] == self._bond)
+        bent, e = (self.rest / s)[..., one], d / s
+        k = self.k[one] * ((1 - bent) * (one == other) + bent * e[..., one] * e[..., other])
+        for here in self.particles:
+            for there in self.particles:
+                yield here[one], there[other], k if here is there else -k
+
+    def add_rounding(
+        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
+    ) -> None:
+        size = self.most_stretch(np.abs(q))
+        d, s = self._ways(q if near is None else near)
+        e, bent = np.abs(d) / s, self.rest / s
+        # of the way, of the length that is its root, of their quotient, and of the products
+        way = np.abs(1 - bent) * size + bent * (size + e * self._sum(e * size))
+        self.scatter(np.abs(self.k) * (way + np.abs(d) * (2 * np.abs(1 - bent) + 4 * (1 + bent))), out)
+
+    def joined(self, other: Self) -> Self:
+        more = other._changed(number=other.number + np.max(self.number) + 1 - np.min(other.number))
+        return Term.joined(self, more)
+
+    def tiled(self, copies: int, n: int) -> Self:
+        made = Term.tiled(self, copies, n)
+        apart = np.max(self.number) - np.min(self.number) + 1
+        return made._changed(number=made.number + apart * np.repeat(np.arange(copies), len(self)))
