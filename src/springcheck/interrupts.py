@@ -1,5 +1,5 @@
-"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.  The end of a
-program that code of others has ended: it is theirs, and never a result.
+"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.  A program
+that the code of others ends (`os._exit`, a crash) names it, and has no result.
 
 Only the program's entry point installs this: a library leaves signals to the program that imports it.
 What is imported here is what the interpreter has loaded by itself, so that no moment is left without it.

@@ -121,7 +121,7 @@ class Case(Claim):
         for term in self.judged.terms:
             if term.kind == "potential":
                 term.scatter(np.abs(term.pull(q + part * (end_q - q))), pulls)
-        # what an engine adds to p may be rounded as the forces that it sums up, another time than for P
+        # the increment of p may be rounded like the sum of forces, and separately from that of P
         moved = np.abs(p) + np.abs(end_p) + abs(run.step) * pulls
         sizes = np.abs(q) + np.abs(end_q) + np.abs(way) * moved + self.origins
         return way, np.asarray(run.arithmetic.state * sizes + rounding.SMALLEST)

@@ -28,7 +28,7 @@ FIT_ROUNDS = 20
 """Of a fit whose weights are its own variances."""
 
 SAME_DRAWS = 1e-6
-"""Part of their size that draws may differ by which are the same numbers."""
+"""Relative difference up to which two draws are taken for one number."""
 
 
 def found(case: Case) -> str:

@@ -382,8 +382,8 @@ def _constant_part(
 def _fed_back(
     z: Extended, sigma: Floats, process: Floats, start: _Solution, centred: int, freedom: int
 ) -> _Solution:
-    """States that were rounded in every step as well, and not only as they were written: by as much as what
-    is left over asks for."""
+    """States that were rounded in every step as well as when they were written; the size of the former is
+    fitted, so that chi-squared is its degrees of freedom."""
     level = float(np.median(np.max(sigma[1:], axis=1) / process))
     found = start
     for _ in range(4):

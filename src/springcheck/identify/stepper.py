@@ -80,7 +80,7 @@ def _run(
     states = [start]
     most = RUNAWAY * max(map(abs, start))
     for _ in range(frames - 1):
-        # what runs away leaves one direction alone, which shows no map
+        # of a motion that runs away the growing direction alone is left: no map can be fitted to it
         if len(states) > 6 and max(map(abs, states[-1])) > most:
             break
         states.append(_one(step, *states[-1], h, force, m))
