@@ -14,13 +14,15 @@ import pytest
 from springcheck import driver, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
-from springcheck.figures import chain, energies, looks, overlay, render
+from springcheck.figures import chain, energies, looks, overlay, portraits, render
 from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.attached import ATTACHED
+from springcheck.studies.faults import page as faults_page
+from springcheck.studies.faults.result import Clean, FaultReport, Result
 from springcheck.studies.run.page import of_runs
 
 mpl.use("agg")
@@ -450,3 +452,28 @@ def test_a_fault_is_named_by_the_check_that_sees_it_first() -> None:
     assert dict(zip(first.y, first.notes, strict=True)) == {0.0: "x", 1.0: "y"}
     assert [label.text for label in chart.labels] == ["x", "y"]
     assert page.banks(found)[0].heading == "2 engines broken on purpose: each is rejected; 2 checks"
+
+
+def test_a_map_of_many_faults_stands_in_columns_with_the_checks_of_each() -> None:
+    results = tuple(
+        Result(
+            name=f"fault-{i}", about="", size=None, rejected_by=(f"check-{i // 30}",), missed_by=(), limits={}
+        )
+        for i in range(100)
+    )
+    clean = Clean(runs=1, verdicts=1, alarms=())
+    (bank,) = faults_page.banks(FaultReport(clean=clean, results=results))
+    assert [chart.y.names[-1] for chart in bank.charts] == ["fault-0", "fault-34", "fault-68"]
+    assert [list(chart.x.names) for chart in bank.charts] == [
+        ["check-0", "check-1"], ["check-1", "check-2"], ["check-2", "check-3"],
+    ]  # fmt: skip
+
+
+def test_frames_that_jump_to_and_fro_are_dots_and_an_exact_line_has_no_chords() -> None:
+    ys = overlay.Frame(-2.0, 2.0)
+    t = np.arange(200)
+    assert portraits._swings(0.8 * (-1.0) ** t, ys)
+    assert not portraits._swings(0.8 * np.sin(t / 5), ys)
+    x = np.concatenate([np.linspace(-2, -1, 700), np.linspace(1, 2, 700)])
+    parted, _ = portraits._parted(x, 0 * x, ys, ys)
+    assert np.flatnonzero(np.isnan(parted)).tolist() == [700]

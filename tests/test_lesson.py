@@ -6,7 +6,9 @@ import importlib.util
 import json
 import re
 import runpy
+import subprocess
 import sys
+import zipfile
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
@@ -54,6 +56,27 @@ def test_what_the_lesson_points_to_is_there() -> None:
         assert targets
         for target in targets:
             assert target.startswith("https://") or (LESSON / target).exists(), target
+
+
+def test_what_learners_are_given_is_one_file_that_works_anywhere_and_has_no_solutions(
+    tmp_path: Path,
+) -> None:
+    assert _module("build").main(["--take-along", str(tmp_path / "lesson.zip")]) == 0
+    with zipfile.ZipFile(tmp_path / "lesson.zip") as file:
+        file.extractall(tmp_path)
+    there = {path.name for path in (tmp_path / "lesson").iterdir()}
+    assert {"lesson.ipynb", "exercises.py", "grade.py", "temperature.py", "figures"} <= there
+    assert not any("solutions" in name for name in there)
+    command = [sys.executable, "grade.py", "temperature.py"]
+    graded = subprocess.run(command, cwd=tmp_path / "lesson", capture_output=True, text=True, check=False)
+    assert graded.returncode == 1
+    assert graded.stdout.endswith("0 of 6; --hint says where to look\n")
+
+
+def test_every_picture_of_the_lesson_says_in_words_what_it_shows() -> None:
+    said = re.findall(r"!\[([^]]*)\]\(figures/", (LESSON / "lesson.md").read_text())
+    assert len(said) == len(list((LESSON / "figures").iterdir()))
+    assert all(len(words) > 80 and re.search(r"\d", words) for words in said)
 
 
 AIMS = _module("exercises").AIMS

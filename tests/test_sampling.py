@@ -68,6 +68,10 @@ def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -
     # a factor of all momenta has no such law, and no line
     assert names == ["BAOA", "own:baoa", "own:bussi"]
     assert len(costs.charts) == 2
+    # titles are findings
+    assert temperatures.heading.startswith("At h \u03c9 = 1.2 positions have their temperature to 1 % by ")
+    assert " is off by 1" in costs.heading
+    assert limits.heading == "Steps are stable up to h \u03c9 = 2 at every friction"
     assert [x.name for x in limits.charts[0].curves] == ["BAOA", "own:baoa"]
     assert main(["plot", "s.h5"]) == 0
     assert Path("figures/s/sampling-temperatures.png").stat().st_size > 10_000

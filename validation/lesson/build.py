@@ -2,6 +2,7 @@
 
     python validation/lesson/build.py            (about 10 s)
     python validation/lesson/build.py --check    # writes nothing: is what they show what the code says?
+    python validation/lesson/build.py --take-along lesson.zip    # what learners are given, in one file
 
 A cell is run as Jupyter runs it, in one namespace and in order; its output is what it prints and the figures
 that it leaves.  No part of Jupyter is needed.
@@ -13,11 +14,17 @@ import io
 import json
 import os
 import sys
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
+HANDOUTS = (
+    "lesson.ipynb", "lesson.md", "figures/*.png", "exercises.py", "grade.py", "temperature.py",
+    "temperature_questions.py",
+)  # fmt: skip
+"""What learners are given: no solutions."""
 NOTEBOOK, PAGE, FIGURES = HERE / "lesson.ipynb", HERE / "lesson.md", HERE / "figures"
 
 
@@ -57,14 +64,14 @@ def run(cells: list[dict[str, Any]], *, draw: bool = True) -> dict[str, Shown]:
     return found
 
 
-def outputs(shown: Shown) -> list[dict[str, Any]]:
-    """As a notebook keeps them."""
+def outputs(shown: Shown, alt: list[str]) -> list[dict[str, Any]]:
+    """As a notebook keeps them; `alt`: what each figure shows, in words."""
     out: list[dict[str, Any]] = []
     if shown.text:
         out.append({"name": "stdout", "output_type": "stream", "text": shown.text.splitlines(keepends=True)})
-    for png in shown.figures:
+    for png, said in zip(shown.figures, alt, strict=True):
         picture = base64.b64encode(png).decode()
-        data = {"image/png": picture, "text/plain": ["<Figure>"]}
+        data = {"image/png": picture, "text/plain": [said]}
         out.append({"data": data, "metadata": {}, "output_type": "display_data"})
     return out
 
@@ -87,7 +94,9 @@ def page(cells: list[dict[str, Any]]) -> str:
         if text := printed(cell).rstrip():
             parts.append(f"```text\n{text}\n```")
         pictures = [one for one in cell["outputs"] if one["output_type"] == "display_data"]
-        parts += [f"![figure of the cell above](figures/{cell['id']}-{i}.png)" for i in range(len(pictures))]
+        # what each shows, in words, stands with the cell
+        words = cell["metadata"]["alt"] if pictures else []
+        parts += [f"![{said}](figures/{cell['id']}-{i}.png)" for i, said in enumerate(words)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -95,6 +104,12 @@ def main(arguments: list[str]) -> int:
     """Write notebook, page and figures, or compare; the exit status says whether they agree."""
     notebook = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
     cells: list[dict[str, Any]] = notebook["cells"]
+    if arguments[:1] == ["--take-along"] and len(arguments) == 2:
+        with zipfile.ZipFile(arguments[1], "w", zipfile.ZIP_DEFLATED) as file:
+            for path in (path for name in HANDOUTS for path in sorted(HERE.glob(name))):
+                file.write(path, Path("lesson", path.relative_to(HERE)))
+        print(f"{arguments[1]}: hand-outs, without solutions")
+        return 0
     check = "--check" in arguments
     found = run(cells, draw=not check)
     if check:
@@ -110,7 +125,10 @@ def main(arguments: list[str]) -> int:
         return 1 if wrong or stale else 0
     FIGURES.mkdir(exist_ok=True)
     for i, cell in enumerate(cell for cell in cells if cell["cell_type"] == "code"):
-        cell["execution_count"], cell["outputs"] = i + 1, outputs(found[cell["id"]])
+        cell["execution_count"], cell["outputs"] = (
+            i + 1,
+            outputs(found[cell["id"]], cell["metadata"].get("alt", [])),
+        )
         for j, png in enumerate(found[cell["id"]].figures):
             (FIGURES / f"{cell['id']}-{j}.png").write_bytes(png)
     NOTEBOOK.write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -38,6 +38,9 @@ is even, which what wavers has not; schemes that a title names."""
 SEEN = 0.01
 """Part of an energy from which an axis that is not logarithmic shows what it does."""
 
+FLAT = 1e-3
+"""Of half a picture, less than the width of a line in it."""
+
 FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
 """Relative differences below this are none: they stand on the lower edge; differences that are roundings."""
 
@@ -99,8 +102,11 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     what = "exact" if changes else "initial"
     lower = decades(runs, differences, time, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
     said = _said(runs, found, differences) if scene.system.keeps_energy or changes else ""
+    # lines that lie on one another say nothing beside their differences
+    flat = lower and scene.system.keeps_energy and max(map(np.max, differences.values())) < FLAT * ys.half
     return Bank(
-        name="energy", title="Methods drawn", charts=[upper, *lower], columns=1, size=(7.2, 2.7),
+        name="energy", title="Methods drawn", charts=lower if flat else [upper, *lower], columns=1,
+        size=(7.2, 4.2 if flat and len(lower) == 1 else 2.7),
         heading=f"{scene.title}: {runs.wrong}{said or 'energy'}",
     )  # fmt: skip
 
@@ -317,6 +323,7 @@ def means(runs: Runs, thermal: float) -> Bank:
     some = {name: x for name, x in ends.items() if np.isfinite(x)}
     low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
     linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
+    equal = linear and ys.low < scene.n < ys.high
     curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *_far(ys))))
     xs = _times(runs)
     chart = Chart(
@@ -324,9 +331,8 @@ def means(runs: Runs, thermal: float) -> Bank:
         x=Scale(name=with_unit("time t", unit), factor=dt, shown=xs.ends),
         y=Scale(name="mean energy so far / kT", shown=ys.ends),
         curves=curves,
-        rules=[Rule(axis="y", at=float(scene.n), name=f"equipartition: {scene.n} kT", look="here")]
-        if linear and ys.low < scene.n < ys.high
-        else [],
+        rules=[Rule(axis="y", at=float(scene.n), look="here")] if equal else [],
+        note=f"dotted: equipartition, {scene.n} kT" if equal else "",
         labels=overlay.at_ends(runs.first(curves), xs, ys),
     )
     said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"

@@ -24,6 +24,10 @@ MANY_PERIODS, PERIODS_SHOWN = 14, 6
 CHORD = 0.015
 """Part of a picture by which lines between frames may miss the exact solution: beyond, frames are dots."""
 
+JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
+"""Of half a picture, the way from a point to the next that is a jump in a curve of many points; part of all
+frames that jump to and fro."""
+
 STEEP, START_SHOWN = 30.0, 8.0
 """How many times its median a motion that runs away reaches; of its start, what is shown of it."""
 
@@ -38,10 +42,12 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
     """Momentum over position, or what else a view shows: a chart for each; `said`: what was found."""
     charts = [_portrait(runs, view, truth, alone=len(shown) == 1) for view in shown]
     what = "path" if shown[0].what == "path" else "phase portrait"
+    planes = what == "path" and len(charts) == 3
     return Bank(
-        name=what.replace(" ", "-"), title="Methods drawn", charts=charts, columns=min(2, len(charts)),
+        name=what.replace(" ", "-"), title="Methods drawn", charts=charts,
+        columns=3 if planes else min(2, len(charts)),
         heading=_heading(runs, f"{what}{_of(runs, shown)}", said),
-        size=_size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4))),
+        size=(4.0, 3.6) if planes else _size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4))),
     )  # fmt: skip
 
 
@@ -86,7 +92,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
         Curve(name=SEPARATRIX, group=SEPARATRIX, x=x, y=sign * y) for x, y in parting for sign in (1.0, -1.0)
     ]
     if true is not None:
-        lines.append(exact_curve(*near(*true)))
+        lines.append(exact_curve(*_parted(*near(*true), xs, ys)))
     dots = _chords(runs.longest, truth, view, xs, ys)
     curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
@@ -162,6 +168,19 @@ def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Fr
         # round and round is not away
         return x, Frame(y.low, y.high, clipped)
     return Frame(x.low, x.high, clipped), Frame(y.low, y.high, clipped)
+
+
+def _parted(x: Floats, y: Floats, xs: Frame, ys: Frame) -> State:
+    """A finely drawn curve without the lines over its jumps, which no state is near."""
+    far = np.hypot(np.diff(x) / xs.half, np.diff(y) / ys.half) > JUMP
+    at = (1 + np.flatnonzero(far)).tolist() if len(x) > MANY_POINTS else []
+    return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
+
+
+def _swings(y: Floats, ys: Frame) -> bool:
+    """Whether frames jump to and fro, so that lines between them would fill the picture."""
+    d = np.diff(y)
+    return len(d) > 1 and bool(np.mean((d[1:] * d[:-1] < 0) & (np.abs(d[1:]) > JUMP * ys.half)) > TO_AND_FRO)
 
 
 def _meets(x: Floats, y: Floats, xs: Frame, ys: Frame) -> bool:
@@ -292,7 +311,10 @@ def _position(
         y = ys.within(view.pick(fine[1], fine[2])[0])
         lines.append(exact_curve(fine[0][: len(y)], of(y)))
     dots = _chords(runs.longest, fine, view, ys)
-    curves = runs.curves(cut, dots=dots, faint=True)
+    curves = [
+        replace(one, line=False, dots=True) if _swings(np.asarray(one.y), ys) else one
+        for one in runs.curves(cut, dots=dots, faint=True)
+    ]
     if steep:
         inside = [np.abs(x) for x in picked.values() if ys.leaves(x) is None]
         least = min((float(np.min(x[x > 0], initial=ys.high)) for x in inside), default=ys.high / 10)

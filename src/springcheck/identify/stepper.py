@@ -117,7 +117,8 @@ def identify_stepper(step: Stepper) -> Identification:
     schemes = {x.scheme for x in results}
     if found.fits and len(schemes) > 1:
         named = "; ".join(
-            f"{x.scheme} at m={m}, k={k}, h={h}" for x, (m, k, h) in zip(results, SPRINGS, strict=False)
+            f"{x.scheme or 'none that is known'} at m={m}, k={k}, h={h}"
+            for x, (m, k, h) in zip(results, SPRINGS, strict=False)
         )
         wrong.append(
             _wrong(

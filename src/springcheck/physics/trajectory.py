@@ -117,7 +117,7 @@ class Trajectory:
     def _known(self) -> Scene:
         if self.scene is None:
             raise SpringcheckError(
-                f"{self.label}: its scene is not known: dataclasses.replace(run, scene=...)"
+                f"{self.label}: its scene is not known: give it, as from_arrays(t, q, p, scene=...)"
             )
         return self.scene
 

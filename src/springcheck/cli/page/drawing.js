@@ -39,7 +39,7 @@ const raised = (n) => String(n).replace("-", "\u207b").replace(/\d/g, (c) => "â
 function ticks({ values, named, powers, log }, low, high) {
   const first = Math.max(0, Math.ceil(low)), last = Math.min(values.length - 1, Math.floor(high)), found = [];
   const within = ([v]) => v >= low && v <= high;
-  if (powers && last - first > 40) return powers.filter(within).map(([v, e]) => [v, `10${raised(e)}`]);
+  if (powers.length && last - first > 40) return powers.filter(within).map(([v, e]) => [v, `10${raised(e)}`]);
   if (values.length) {
     const every = named ? 1 : Math.max(1, Math.ceil((last - first + 1) / 8));
     for (let i = first; i <= last; i += every) found.push([i, named ? values[i] : number(values[i])]);

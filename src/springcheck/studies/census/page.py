@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
+from springcheck.figures.looks import engine, title
 from springcheck.figures.overlay import labelled
 from springcheck.studies.census.result import Census, Entry
-from springcheck.text.wording import few
+from springcheck.text.wording import count, few
 
 MOST_NAMES = 2
 
@@ -17,6 +18,8 @@ def banks(census: Census) -> list[Bank]:
     curves, on = [], []
     for scheme, members in census.grouped.items():
         same: dict[str, list[Entry]] = {}
+        makers = len({engine(x.method) for x in members})
+        of = f": {len(members)} methods of {count(makers, 'engine')}" if len(members) > 1 else ""
         for x in (one for one in members if len(one.q)):
             same.setdefault(x.digest, []).append(x)
         for i, equal in enumerate(same.values()):
@@ -24,7 +27,9 @@ def banks(census: Census) -> list[Bank]:
             name = few(names, MOST_NAMES, " = ")
             x = equal[0]
             notes = [f"step {step}; bit for bit {', '.join(names)}" for step in range(len(x.q))]
-            curves.append(Curve(name=name, group=scheme, x=x.q, y=x.p, notes=notes))
+            curves.append(
+                Curve(name=name, group=scheme, title=f"{title(scheme)}{of}", x=x.q, y=x.p, notes=notes)
+            )
             if i == 0:
                 on.append(name)
     if not curves:
@@ -38,9 +43,10 @@ def banks(census: Census) -> list[Bank]:
         curves=[exact, *curves],
         equal=True,
     )
+    engines = len({engine(x.method) for x in census.entries})
     heading = (
-        f"The blog's spring by {len(census.entries)} methods: how it is attached decides the scheme "
-        "(m = k = 1, h = 0.1, 200 steps)"
+        f"The blog's spring by {len(census.entries)} methods of {engines} engines: how it is attached "
+        "decides the scheme (m = k = 1, h = 0.1, 200 steps)"
     )
     return [
         Bank(

@@ -15,18 +15,41 @@ KINDS = (
 )
 
 
+ROWS_OF_A_MAP, MAPS_BESIDE = 60, 3
+"""Faults up to which one map holds all; maps of more, side by side."""
+
+
 def banks(found: FaultReport) -> list[Bank]:
-    """One map: a row a fault, a column a check that rejects any."""
-    results = found.results[::-1]
-    checks = list(
-        dict.fromkeys(
-            name for one in found.results for name in (*one.rejected_by, *one.missed_by, *one.limits)
-        )
-    )
+    """Maps: a row a fault, a column a check that rejects any; and how small a fault each check sees."""
+    checks = _checks(found.results)
     if not checks:
         return []
-    chart = Chart(
-        title="Which check sees which fault, at its size in the table.",
+    size = -(-len(found.results) // (MAPS_BESIDE if len(found.results) > ROWS_OF_A_MAP else 1))
+    parts = [found.results[i : i + size] for i in range(0, len(found.results), size)]
+    many = len(parts) > 1
+    return [
+        Bank(
+            name="faults-checks", title="Faults and checks", charts=[_map(part, many=many) for part in parts],
+            heading=_heading(found, len(checks)), columns=len(parts),
+            size=(4.9, 0.165 * size + 2.0) if many else None,
+        ),
+        *([_limits(found.results[::-1])] if any(one.limits for one in found.results) else []),
+    ]  # fmt: skip
+
+
+def _checks(results: Sequence[Result]) -> list[str]:
+    """The checks that see any of these faults, or should."""
+    return list(
+        dict.fromkeys(name for one in results for name in (*one.rejected_by, *one.missed_by, *one.limits))
+    )
+
+
+def _map(part: Sequence[Result], *, many: bool) -> Chart:
+    """Some of the faults, the first one above, and the checks that see any of them."""
+    checks, results = _checks(part), part[::-1]
+    of = f": {part[0].name} to {part[-1].name}" if many else ""
+    return Chart(
+        title=f"Which check sees which fault, at its size in the table{of}.",
         x=Scale(name="check", names=checks),
         y=Scale(name="fault", names=[one.name for one in results]),
         tiles=Tiles(
@@ -35,15 +58,6 @@ def banks(found: FaultReport) -> list[Bank]:
             notes=[[_said(one, name) for name in checks] for one in results],
         ),
     )
-    return [
-        Bank(
-            name="faults-checks",
-            title="Faults and checks",
-            charts=[chart],
-            heading=_heading(found, len(checks)),
-        ),
-        *([_limits(results)] if any(one.limits for one in results) else []),
-    ]
 
 
 def _heading(found: FaultReport, checks: int) -> str:

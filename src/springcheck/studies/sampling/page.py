@@ -9,8 +9,14 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import title
+from springcheck.figures.overlay import share
+from springcheck.figures.portraits import extremes
 from springcheck.studies.sampling.measure import RATE, curve
 from springcheck.studies.sampling.result import Sampled, Sampling
+
+W_SIGN = "\N{GREEK SMALL LETTER OMEGA}"
+IS_RIGHT = 0.01
+"""Part of a temperature within which it is called right."""
 
 FINE = np.linspace(0.02, 1.5, 75)
 """h omega of the lines."""
@@ -71,13 +77,43 @@ def banks(study: Sampling) -> list[Bank]:
     )
     found = [
         Bank(name="sampling-temperatures", title="Schemes (lines) and engines (marks)", charts=temperatures,
-             heading="Thermostats on a spring: which temperature is too cold, and from which step on"),
+             heading=_temperatures(study.methods)),
         Bank(name="sampling-costs", title="Methods drawn", charts=costs,
-             heading="What an error of <q\N{SUPERSCRIPT TWO}> costs: noise, then the scheme's own bias"),
+             heading=_costs(study.methods)),
     ]  # fmt: skip
     limit = Bank(name="sampling-limits", title="Methods drawn", charts=[limits],
-                 heading="Stability of thermostats against friction")  # fmt: skip
+                 heading=_limits(shown))  # fmt: skip
     return [*found, limit] if shown else found
+
+
+def _temperatures(methods: Sequence[Sampled]) -> str:
+    """How many sample the right configurations at the step nearest to h omega = 1, and who errs most."""
+    i = int(np.argmin(np.abs(methods[0].turn - 1)))
+    off = {title(x.scheme): float(x.configurational[i]) - 1 for x in methods}
+    law = {title(x.scheme): float(x.configurational_law[i]) - 1 for x in methods}
+    off = {name: x if np.isnan(law[name]) else law[name] for name, x in off.items()}
+    right = sum(abs(x) <= IS_RIGHT for x in off.values())
+    name, at = max(off, key=lambda name: abs(off[name])), f"h {W_SIGN} = {methods[0].turn[i]:g}"
+    said = f"At {at} positions have their temperature to {share(IS_RIGHT)} by {right} of {len(off)} schemes"
+    hot = "hot" if off[name] > 0 else "cold"
+    return said if right == len(off) else f"{said}; {name} is {share(abs(off[name]))} too {hot}"
+
+
+def _costs(methods: Sequence[Sampled]) -> str:
+    """What the longest runs are off, of the best and of the worst."""
+    ends = {title(x.scheme): (float(x.off_law[-1]), float(x.off[-1])) for x in methods}
+    off = {name: measured if np.isnan(law) else law for name, (law, measured) in ends.items()}
+    after = f"After {methods[0].frames[-1]:.0f} steps of h {W_SIGN} = {methods[0].turn[1]:g}"
+    return extremes(off, f"{after} <q\N{SUPERSCRIPT TWO}> is off by {{}}")
+
+
+def _limits(methods: Sequence[Sampled]) -> str:
+    """The largest step that is stable at every friction, of the best and of the worst."""
+    least = {title(x.scheme): float(np.nanmin(x.limit_law)) for x in methods}
+    low, high = min(least, key=lambda name: least[name]), max(least.values())
+    few = sum(x < 0.99 * high for x in least.values())
+    said = f"Steps are stable up to h {W_SIGN} = {high:.3g} at every friction"
+    return f"{said}; {few} of {len(least)} are not, {low} from {least[low]:.3g} on" if few else said
 
 
 def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
