@@ -118,3 +118,26 @@ def test_a_bath_that_acts_by_a_factor_is_not_taken_for_draws(name: str) -> None:
         run = driver.run(where, f"own:{name}", seed=seed + 1)
         found = of_bath(run.t, run.q[:, :1], run.p[:, :1], None, where.m[:1])
         assert found is None or not found.candidates, found.statement
+
+
+@pytest.mark.parametrize("name", ["lammps-langevin", "bbk"])
+def test_draws_in_a_well_that_is_no_spring_name_no_other_scheme(name: str) -> None:
+    where = scene(x=0.62, turn=0.45, steps=1000)
+    quartic = Quartic(i=np.arange(2), b=np.array([3.0, 1.0]), at=np.zeros(2))
+    run = driver.run(replace(where, terms=(*where.terms, quartic)), f"own:{name}", seed=4)
+    found = of_bath(run.t, run.q[:, :1], run.p[:, :1], None, where.m[:1])
+    assert found is None or found.scheme in (None, name), found.statement
+
+
+@pytest.mark.parametrize("name", ["bussi", "andersen"])
+def test_few_digits_do_not_say_whether_some_steps_had_no_collision(name: str) -> None:
+    run = driver.run(scene(x=0.1, turn=0.93, steps=1000), f"own:{name}", seed=4)
+    q, p = (x[:, :1].astype(np.float16).astype(float) for x in (run.q, run.p))
+    found = of_bath(run.t, q, p, None, scene().m[:1])
+    assert found is None or name in [one.scheme for one in found.candidates], found.statement
+
+
+def test_velocities_in_another_unit_name_no_scheme() -> None:
+    run = driver.run(scene(x=0.25, turn=0.2, steps=1000), "own:baoab", seed=4)
+    found = of_bath(run.t, 0.6 * run.q[:, :1], run.p[:, :1], None, scene().m[:1])
+    assert found is None or found.verdict != "named", found.statement

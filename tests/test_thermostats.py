@@ -265,6 +265,50 @@ def test_a_bath_of_temperature_zero_is_friction_without_noise() -> None:
         bathed(cold, Namespace(temperature="0", friction=1.0))
 
 
+def test_a_scene_file_may_say_temperature_zero_as_the_command_may(tmp_path: Path) -> None:
+    text = """
+        title = "Cold"
+        particle = [{mass = 3.7, position = 0.3}]
+        spring = [{ends = ["wall", 0], stiffness = 2.9}]
+        bath = {temperature = 0, friction = 0.5}
+        time = {step = 0.1, steps = 20}
+    """
+    scene = scenefile.parse(text, name="cold")
+    assert scene.bath is None
+    assert scene.system.friction_rates == pytest.approx(0.5, rel=1e-15)
+    assert scene.title.endswith("at temperature 0: friction 0.5 without noise")
+    (tmp_path / "cold.toml").write_text(scene.to_toml())
+    again = scenefile.load_scene(tmp_path / "cold.toml")
+    assert again.system.friction_rates == pytest.approx(0.5, rel=1e-15)
+    with pytest.raises(SceneError, match=r"bath.friction = 0\.0: a number > 0 is needed"):
+        scenefile.parse(text.replace("0.5", "0.0"), name="cold")
+    with pytest.raises(SceneError, match="friction of its own"):
+        scenefile.parse(text + "damping = [{particle = 0, coefficient = 0.1}]", name="cold")
+
+
+BOTH_KINDS = """
+from dataclasses import replace
+from springcheck import engines
+ENGINE = replace(engines.engine("own"), name="mine", title="mine", methods=engines.engine("own").methods,
+    thermostats={"baoab": engines.engine("own").thermostats["baoab"]})
+"""
+
+
+def test_an_engine_of_a_file_runs_its_thermostats_in_a_bath_and_its_methods_without(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(BOTH_KINDS)
+    for scene, runs, not_run in (
+        ("bath-spring", "mine:baoab", "mine:euler"),
+        ("spring", "mine:euler", "mine:baoab"),
+    ):
+        words = [scene, "--steps", "20", "--engine", str(tmp_path / "mine.py"), "-o", str(tmp_path / "a.h5")]
+        assert main(["run", *words, "--force", "--method", "own:*"]) == 0
+        out = capsys.readouterr().out
+        assert runs in out
+        assert not_run not in out
+
+
 def test_splittings_of_openmmtools_are_those_of_their_letters() -> None:
     found = engines.from_file(Path(__file__).parents[1] / "validation" / "engines" / "openmmtools_.py")
     assert found is not None

@@ -31,8 +31,15 @@ class Brought:
         found = [engines.from_file(Path(text)) for text in self.engines]
         # a file may only register a term
         labels = [
-            f"{x.name}:{m.name}" for x in found if x is not None for m in x.methods.values() if m.default
-        ]
+            label
+            for x in found
+            if x is not None
+            # whether thermostats are meant or methods depends on the scene
+            for label in (
+                [f"{x.name}:*"] if x.thermostats
+                else [f"{x.name}:{m.name}" for m in x.methods.values() if m.default]
+            )
+        ]  # fmt: skip
         if self.steppers:
             files = [function.file_of(spec) for spec in self.steppers]
             made = function.engine(self.steppers, self._stated)

@@ -233,7 +233,8 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
             if fnmatchcase(f"{name}:{m}", head) and (not at or place in engine(name).platforms)
         ]
         if not found:
-            raise MethodError(f"no method matches {pattern!r}; `springcheck list` shows them all")
+            where = "" if bath is None else f" for a scene with{'' if bath else 'out'} a bath"
+            raise MethodError(f"no method matches {pattern!r}{where}; `springcheck list` shows them all")
         chosen.update((text, parse(text)) for text in found)
     return tuple(chosen.values())
 

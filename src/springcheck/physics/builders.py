@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,20 @@ def chain(
         steps=steps,
         **words,
     )
+
+
+def cold(scene: Scene, friction: float) -> Scene:
+    """The scene in a bath of temperature 0: friction alone, which every particle feels at one rate [1/T].
+
+    SceneError where that is no number > 0, or the scene has a friction of its own.
+    """
+    if not 0 < friction < np.inf:
+        raise SceneError(f"bath.friction = {friction!r}: a number > 0 is needed")
+    if any(term.key == "damping" for term in scene.terms):
+        raise SceneError("bath.temperature = 0: the scene has a friction of its own; leave one out")
+    term = Damping(i=np.arange(scene.n), c=friction * scene.m)
+    title = f"{scene.title}, at temperature 0: friction {friction:g} without noise"
+    return replace(scene, bath=None, terms=(*scene.terms, term), title=title)
 
 
 def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:

@@ -27,6 +27,9 @@ gamma h of 5e-7."""
 WHITE = 1e-9
 """Chance below which draws are no draws: deterministic motion that does not close in one frame."""
 
+COARSE = 0.01
+"""Digits of a file over the noise, from which on they hide whether a step had a collision."""
+
 EVEN = 1e-4
 """Chance below which what acts on momenta may be a factor, and no draw is told of it."""
 
@@ -83,11 +86,19 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         return None
     z = np.stack([x, u])
     sizes_left, left = _left_of(z, np.empty((0, z.shape[1] - 1)))
+    # a force that is not linear is no scheme's draw
+    known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
+    bent = _follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
+
+    def clear(found: Thermal | None) -> Thermal | None:
+        return found and replace(found, known=found.known and not bent)
+
     even = _is_even(sizes_left[1] * left[1], u[1:])
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
-        if _follows(left[1], moved, z) or (weights[4] > 1e-9 * weights[3] and _follows(rest, moved, z)):
+        joined = weights[4] > 1e-9 * weights[3] and _follows(rest, moved, known)
+        if joined or _follows(left[1], moved, known):
             size, joint = _left_of(z, moved.T)
             # of joined particles, as of one, what takes no noise leaves none that is white
             noisy = np.max(size) > NOISE and all(map(_is_white, joint))
@@ -98,19 +109,20 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         # what digits leave of it is white but for neighbours, which share a frame
         digits = misfit < 1e-9 or _is_white(rest[::2])
         # of one draw the position and the momentum leave the same
-        return _of_one(q, v, h, free / free[0], misfit, left[1], even) if free[0] and digits else None
+        return clear(_of_one(q, v, h, free / free[0], misfit, left[1], even)) if free[0] and digits else None
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
-        return _of_two_halves(q, h, float(np.std(jump) / sizes[0]))
+        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0])))
     if not all(map(_is_white, left)) or not even:
         return None
     found = Thermal(candidates=tuple(likely(TWO, q, v, h)), free=(), misfit=nan, uniform=_is_uniform(left[1]))
+    found = replace(found, known=not bent)
     return replace(found, sparser=sparser(found.candidates[0], q, v, h)) if found.named else found
 
 
-def _follows(left: Floats, beside: Floats, z: Floats) -> bool:
-    """Whether what a map of its own leaves of a particle depends on where others are."""
-    known = np.concatenate([z[:, :-1], np.ones((1, len(left)))]).T
+def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
+    """Whether what a map of what is `known` (f, k) leaves of a particle depends on more, such as where others
+    are, (f, others)."""
     for x in beside.T:
         rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
         size = float(np.linalg.norm(rest))
@@ -164,11 +176,12 @@ def _of_one(
             # without a spring these all are one
             names = ("aboba", "aoboa", *(("baoab", "baoa") if slow < error else ()))
             found = likely(names, q, v, h)
-        if -b > h / 2 and not half and decay + error > 0:
-            found = likely(("baoab",), q, v, h, turn=4 * (1 + h / (2 * b)))
+        turn = 4 * (1 + h / (2 * b))
+        if -b > h / 2 and not half and decay + error > 0 and abs(turn - slow) <= 4 * error:
+            found = likely(("baoab",), q, v, h, turn=turn)
         if not half or close > 1e-6 or slow < error:
             # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-            found += [y for number in GJ if (y := _as_gj(number, decay, error, -b, h))]
+            found += [y for number in GJ if (y := _as_gj(number, decay, slow, error, -b, h))]
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
         found = likely(("baoa",), q, v, h, turn=2 * (1 + c))
     elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
@@ -181,7 +194,7 @@ def _of_one(
         known = {"omega": w, "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
         still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
-        often = float(np.quantile(still, 0.05)) > close * float(np.std(v))
+        often = close > COARSE or float(np.quantile(still, 0.05)) > close * float(np.std(v))
         names = ("andersen", "andersen-after-kick", *(("bussi", "bussi-unsigned") if often else ()))
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
@@ -242,15 +255,17 @@ def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
-def _as_gj(number: str, decay: float, error: float, t: float, h: float) -> Candidate | None:
-    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay known to an error."""
+def _as_gj(number: str, decay: float, slow: float, error: float, t: float, h: float) -> Candidate | None:
+    """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay and an (h w)**2 of its
+    stretched step that are known to an error, the latter to two such in its trace and its determinant."""
     x = np.geomspace(1e-9, 1e4, 4000)
     if near := _rate(GJ[number], decay):
         x = np.append(x, near)
     with np.errstate(all="ignore"):
         stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
         a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
-        off = np.where(a > 0, np.abs(GJ[number](x) - decay), np.inf)
+        fits = (a > 0) & (np.abs(a * stretch**2 - slow) <= 4 * error)
+        off = np.where(fits, np.abs(GJ[number](x) - decay), np.inf)
     best = int(np.argmin(off))
     if not off[best] <= error:
         return None
@@ -291,6 +306,8 @@ def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
     noise = float(np.std(left))
     if noise == 0 or not _is_white(left / noise):
         return None
+    # a force that is not linear leaves more than draws
+    bent = _follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
     of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
     uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise)
     found = []
@@ -315,5 +332,9 @@ def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
             )
         )
     return Thermal(
-        candidates=tuple(sorted(found, key=lambda y: y.nats)), free=(), misfit=misfit, uniform=uniform
+        candidates=tuple(sorted(found, key=lambda y: y.nats)),
+        free=(),
+        misfit=misfit,
+        uniform=uniform,
+        known=not bent,
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from springcheck.errors import SceneError
@@ -104,8 +105,8 @@ def scene(table: Any, *, name: str) -> Scene:
     units: Units = table.units or ("si" if kind == "circuit" else "reduced")
     terms = tuple(_terms(table, bodies))
     try:
-        bath = table.bath and Bath(temperature=table.bath.temperature, friction=table.bath.friction)
-        return Scene(
+        bath = table.bath and table.bath.temperature != 0 and Bath(**msgspec.structs.asdict(table.bath))
+        found = Scene(
             name=name,
             title=table.title,
             source=table.source,
@@ -117,7 +118,7 @@ def scene(table: Any, *, name: str) -> Scene:
             places=bodies.places,
             terms=terms,
             box=table.box and table.box.lengths,
-            bath=bath,
+            bath=bath or None,
             step=time.step,
             steps=time.steps,
             every=table.record.every or time.every or 1,
@@ -125,6 +126,8 @@ def scene(table: Any, *, name: str) -> Scene:
             include=table.methods.include,
             quantities=table.record.quantities,
         )
+        # without noise
+        return builders.cold(found, table.bath.friction) if table.bath and not bath else found
     except SceneError as error:
         field, separator, rest = str(error).partition(" ")
         head, colon = field.removesuffix(":"), ":" if field.endswith(":") else ""

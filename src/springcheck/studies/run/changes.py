@@ -6,13 +6,10 @@ import tomllib
 from argparse import Namespace
 from dataclasses import replace
 
-import numpy as np
-
 from springcheck.errors import SpringcheckError
-from springcheck.physics import scenefile
+from springcheck.physics import builders, scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping
 
 
 def changed(options: Namespace) -> Scene:
@@ -76,20 +73,9 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
     if friction is None:
         friction = bath.friction if bath else MEMORY / abs(scene.step)
     if temperature == 0:
-        return _cold(scene, friction)
+        return builders.cold(replace(scene, bath=None), friction)
     made = Bath(temperature=temperature, friction=friction)
     return replace(scene, bath=made, title=f"{scene.title}, at temperature {text}, friction {friction:g}")
-
-
-def _cold(scene: Scene, friction: float) -> Scene:
-    """The scene in a bath of temperature 0: friction alone, which every particle feels at one rate."""
-    if not 0 < friction < np.inf:
-        raise SpringcheckError(f"--friction {friction:g}: a number > 0 is needed")
-    if any(term.key == "damping" for term in scene.terms):
-        raise SpringcheckError("--temperature 0: the scene has a friction of its own; leave it out")
-    term = Damping(i=np.arange(scene.n), c=friction * scene.m)
-    title = f"{scene.title}, at temperature 0: friction {friction:g} without noise"
-    return replace(scene, bath=None, terms=(*scene.terms, term), title=title)
 
 
 def _put(given: dict[str, float], field: str, value: object, needed: str) -> None:
