@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -312,6 +313,27 @@ def test_what_holds_rods_says_by_its_states_how_it_turns_them() -> None:
         said = rigid.constraint(engines.parse(label))
         assert said == f"rod: turns by {turn} a step to rounding, length to rounding"
     assert rigid.constraint(engines.parse("own:euler")) == ""
+
+
+def test_the_axes_of_a_method_are_said_by_its_states(
+    need: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z alike; periodic box"
+    assert rigid.axes(engines.parse("scipy:radau")) == "x, y and z alike"
+    need("ase:rattle")
+    assert rigid.axes(engines.parse("ase:rattle")) == "x, y and z"
+    need("pymunk:force")
+    assert rigid.axes(engines.parse("pymunk:force")) == "x"
+    right = driver.run
+
+    def broken(scene: Any, label: Any) -> Any:
+        run = right(scene, label)
+        p = run.p.copy()
+        p[:, 2] *= 1.001 ** np.arange(len(p))
+        return replace(run, p=p)
+
+    monkeypatch.setattr(driver, "run", broken)
+    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z unlike; periodic box"
 
 
 def test_a_method_for_rods_is_named_with_its_mass_in_two_parts(need: Callable[[str], None]) -> None:

@@ -157,6 +157,7 @@ def entry(label: Label) -> Entry:
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
         bounded=bool(np.isinf(limit)),
+        along=rigid.axes(label),
         constraint=rigid.constraint(label),
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
         force_calls=run.force_calls / steps,

@@ -49,6 +49,8 @@ class Entry:
     """Whether no map up to h omega = 4 grows; `limit` is infinity then."""
     thermostat: str = ""
     """The heat bath that is on, as its scheme's title; "" where none is."""
+    along: str = "x"
+    """Along which it moves points, by its states, and whether it serves a periodic box."""
     constraint: str = ""
     """What is held rigid, how far a step turns it and how well its length is kept; "" where nothing is."""
     configurational: float = nan

@@ -22,6 +22,7 @@ COLUMNS = {
     "about": "what is called",
     "version": "version",
     "thermostat": "thermostat",
+    "axes": "axes",
     "constraint": "constraint",
     "scheme": "scheme, from the states",
     "claimed": "declared or documented as",
@@ -41,6 +42,7 @@ COLUMNS = {
 
 WATCHED = (
     "thermostat",
+    "axes",
     "constraint",
     "scheme",
     "velocity",
@@ -100,6 +102,7 @@ def _row(x: Row) -> dict[str, str]:
         "about": x.get("about", ""),
         "version": x["version"],
         "thermostat": x.get("thermostat") or "none",
+        "axes": x.get("along") or "x",
         "constraint": x.get("constraint") or "none",
         "scheme": _titles(x["found"]) if named else x["found"],
         "claimed": _titles(x["claimed"]),
