@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_banded
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from springcheck.errors import IdentificationError
@@ -43,13 +42,6 @@ class Noise:
         if not self.diagonal:
             y = dpbtrs(self.factor, y.reshape(-1, x.shape[2]), lower=1)[0].reshape(x.shape)
         return np.asarray(y / self.scale[:, :, None])
-
-    def whiten(self, x: Floats) -> Floats:
-        """L^-1 x of columns x (f - 1, 2, k), V = L L^T: errors of size 1, independent."""
-        y = x / self.scale[:, :, None]
-        if self.diagonal:
-            return np.asarray(y)
-        return np.asarray(solve_banded((3, 0), self.factor, y.reshape(-1, x.shape[2])).reshape(x.shape))
 
     def errors(self, weighted: Floats) -> Floats:
         """Most likely errors e (f, 2) of the recorded numbers, from V^-1 r (f - 1, 2)."""
