@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4453,
-    ("identify",): 7826,
+    ("identify",): 7818,
     ("formats", "store"): 5113,
     ("studies",): 1600,
     ("studies/*",): 10996,
