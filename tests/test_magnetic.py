@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import lammps_field
 import springcheck
 from springcheck import checks, schemes
 from springcheck.errors import SceneError
@@ -166,3 +167,8 @@ def test_a_joined_pair_in_a_field_is_judged_to_rounding() -> None:
 
 def test_no_longest_step_is_said_in_a_field_whose_part_in_it_is_not_known() -> None:
     assert longest.linear(scenes.load_scene("foucault"), schemes.SCHEMES["semi-implicit-euler"]) is None
+
+
+def test_lammps_with_a_field_as_a_force_of_the_velocity_is_explicit_euler_of_half_steps(need: Any) -> None:
+    need("lammps:external")
+    assert lammps_field.off() < lammps_field.LAST

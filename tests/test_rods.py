@@ -196,6 +196,35 @@ def test_a_splitting_whose_substeps_meet_in_drifts_loses_its_order_to_rods(label
     assert np.log2(off[0] / off[1]) == pytest.approx(order, abs=0.1)
 
 
+@pytest.mark.parametrize("name", ["dumbbell", "rigid-triangle"])
+def test_internal_coordinates_of_ase_leave_no_scene_with_rods_a_motion(name: str, need: Need) -> None:
+    """Why they are no method: `adjust_momenta` takes off all that a rigid body does."""
+    need("ase:rattle")
+    ase, constraints = pytest.importorskip("ase"), pytest.importorskip("ase.constraints")
+    verlet, calculator = pytest.importorskip("ase.md.verlet"), pytest.importorskip("ase.calculators.lj")
+    scene = scenefile.load_scene(name)
+    q, p = np.zeros((2, 3 * scene.particles))
+    q[scene.where], p[scene.where] = scene.q, scene.p
+    atoms = ase.Atoms(
+        numbers=np.ones(scene.particles),
+        positions=q.reshape(-1, 3),
+        momenta=p.reshape(-1, 3),
+        masses=scene.masses,
+    )
+    atoms.calc = calculator.LennardJones(epsilon=0.0)
+    pairs = [list(ends) for ends in rods(scene).ends]
+    atoms.set_constraint(
+        constraints.FixInternals(bonds=[[atoms.get_distance(*x), x] for x in pairs], epsilon=1e-13)
+    )
+    before = atoms.get_kinetic_energy()
+    if name == "dumbbell":
+        with pytest.raises(IndexError):
+            verlet.VelocityVerlet(atoms, 0.1).run(1)
+        return
+    verlet.VelocityVerlet(atoms, 0.1).run(1)
+    assert atoms.get_kinetic_energy() < 1e-20 * before
+
+
 def test_methods_without_rods_say_so() -> None:
     for label in ("own:euler", "ase:velocity-verlet", "openmm:verlet", "sundials:adams"):
         assert engines.refusal(dumbbell(), engines.parse(label)) == "it has no rod term"

@@ -289,13 +289,16 @@ def unjudged(verdicts: Sequence[Verdict]) -> Lines:
     for v in verdicts:
         said = [part for part in v.why.split("; ") if part.endswith(checks.BLIND)] if v.passed else []
         out += [plain(f"{v.method}: {part}", "bold yellow") for part in said]
+    alike: dict[str, list[str]] = {}
     for method in checks.not_judged(verdicts):
-        why = dict.fromkeys(
-            v.why for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING
-        )
-        line = f"not judged: {method}: nothing that applied could tell ({'; '.join(why)})"
-        if any("--scheme NAME states it" in x for x in why):
-            line += f"; springcheck identify FILE --trajectory {method} looks for it"
+        mine = (v for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING)
+        # of a scene without rods it goes without saying that none turns
+        why = dict.fromkeys(v.why for v in mine if v.check != "turn")
+        alike.setdefault("; ".join(why), []).append(method)
+    for reason, methods in alike.items():
+        line = f"not judged: {', '.join(methods)}: nothing that applied could tell ({reason})"
+        if "--scheme NAME states it" in reason:
+            line += f"; springcheck identify FILE --trajectory {methods[0]} looks for it"
         out.append(plain(line, "bold yellow"))
     return out
 
