@@ -68,6 +68,8 @@ def test_calls_that_a_solver_says_it_made_are_believed_up_to_64_a_frame() -> Non
     def bound(calls: int) -> float:
         judged = checks.judge(scene, replace(run, force_calls=calls), [checks.tolerance])
         assert "internal steps" in judged[0].why
+        said = "of the 1e+09 force calls that it declares 12800 are believed, the most of 64 a frame"
+        assert (said in judged[0].why) is (calls > 12800)
         return judged[0].bound
 
     assert bound(10**9) <= 64 * 200 / run.force_calls * bound(run.force_calls) * 1.001
@@ -99,6 +101,7 @@ DECLARED: dict[str, dict[str, Any]] = {
     "excess": {"arithmetic": Arithmetic(excess=1e-7)},
     "stale": {"arithmetic": Arithmetic(stale=1e-3)},
     "lengths": {"arithmetic": Arithmetic(lengths=1e-8)},
+    "cancels": {"arithmetic": Arithmetic(cancels=2)},
     "keeps_displacement": {"arithmetic": Arithmetic(keeps_displacement=True), "rebuilds_velocity": True},
     "rebuilds_velocity": {"rebuilds_velocity": True},
     "off_axis": {"off_axis": 1e-9},

@@ -150,3 +150,28 @@ def test_a_momentum_that_belongs_to_no_position_is_seen_below_what_the_solver_ma
     p = run.p.copy()
     p[1, 1] *= 1 + 1e-9
     assert "step-defect" in {v.check for v in checks.judge(scene, replace(run, p=p)) if v.passed is False}
+
+
+def test_positions_of_the_trapezoidal_rule_are_judged_by_the_momenta_at_both_ends() -> None:
+    """q' = q + h (p + p')/2m holds to what the forces that p' adds up are rounded by, whatever A^-1 does."""
+    rng, n = np.random.default_rng(3), 5
+    ends = np.arange(n - 1)
+    terms = (
+        WallSpring(i=np.zeros(1, dtype=int), k=np.array([1.7]), at=np.zeros(1)),
+        Spring(a=ends, b=ends + 1, k=1.7 * 10.0 ** np.array([0, 9, 1, 7]), rest=rng.uniform(0, 2, n - 1)),
+    )
+    m = 10 ** rng.uniform(-1, 1, n)
+    scene = clean.scene(m, terms, rng.normal(size=n), rng.normal(size=n), step=9.0, steps=20)
+    scene = replace(scene, quantities=("q", "p"))
+    for form in WRITTEN:
+        assert alarms(scene, written(scene, "trapezoidal", form)) == [], form
+    run = written(scene, "trapezoidal", "textbook")
+    case = checks.Case(trajectory=run, scene=scene)
+    assert case.ahead is not None
+    assert case.residual is not None
+    alone, both = case.ahead.allowance[0], case.residual[1]
+    frame, j = np.unravel_index(np.argmax(alone / both), both.shape)
+    q = run.q.copy()
+    q[frame + 1, j] += case.roundings * np.sqrt(float(alone[frame, j] * both[frame, j]))
+    assert alone[frame, j] > 100 * both[frame, j]
+    assert "step-defect" in {v.check for v in checks.judge(scene, replace(run, q=q)) if v.passed is False}

@@ -104,23 +104,28 @@ class Case(Claim):
 
     @cached_property
     def residual(self) -> tuple[Extended, Extended] | None:
-        """x/m of Q = q + x P/m, the equation of an implicit step that has no force in it (n,), and one
-        rounding of what it adds up after each frame but the last (f-1, n); None where there is none.
+        """x/m of Q = q + x P/m, the equation of an implicit step that has no force in it (n,), or of two
+        stages q' = q + x (p + p')/m, and one rounding of what it adds up after each frame but the last
+        (f-1, n); None where there is none.
 
         Whichever way an engine solves for a step, and however far A^-1 carries what its solver leaves, it
         takes the position from the momentum by this or the momentum from the position.
         """
         run, stages = self.trajectory, self.scheme.a
-        # of two stages p + x F is not the momentum that moves q, where rounding of large forces tells them
-        if not (self.ahead and run.every == 1 and self.law.has("implicit") and len(stages) == 1):
+        if not (self.ahead and run.every == 1 and self.law.has("implicit") and len(stages) <= 2):
             return None
-        part = np.longdouble(float(stages[0][0]))
+        part = np.longdouble(float(stages[-1][-1]))
         way = part * run.step / self.judged.m
         (q, p), (end_q, end_p) = self._starts, self.ahead.end
-        pulls = self.system.friction_rates * np.abs(p + part * (end_p - p))
-        for term in self.judged.terms:
-            if term.kind == "potential":
-                term.scatter(np.abs(term.pull(q + part * (end_q - q))), pulls)
+        if len(stages) == 1:
+            pulls = self.system.friction_rates * np.abs(p + part * (end_p - p))
+            for term in self.judged.terms:
+                if term.kind == "potential":
+                    term.scatter(np.abs(term.pull(q + part * (end_q - q))), pulls)
+        else:
+            # the momentum that moves q is solved for; the stored one adds up the forces of both ends again
+            both = (self.system.magnitude(x)(abs(x), abs(y)) for x, y in ((q, p), (end_q, end_p)))
+            pulls = np.maximum(*both) * max(1.0, run.arithmetic.force / run.arithmetic.state)
         # the increment of p may be rounded like the sum of forces, and separately from that of P
         moved = np.abs(p) + np.abs(end_p) + abs(run.step) * pulls
         sizes = np.abs(q) + np.abs(end_q) + np.abs(way) * moved + self.origins

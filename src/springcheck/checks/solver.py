@@ -34,7 +34,7 @@ def tolerance(case: Case) -> Finding | str:
         bound,
         "initial energy norms",
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
-        f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times",
+        f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times" + _not_believed(case),
         sight.of_exact(case, lambda change: case.system.norm(*change) / bound),
     )
 
@@ -62,11 +62,28 @@ def most_steps(case: Case) -> float:
     tolerance)/rate; and no more than `A_FRAME` for each frame, or `A_RADIAN` for each radian of the fastest
     motion if those are more.  A method that says that it has made more of them is not believed.
     """
-    duration = abs(float(case.trajectory.t[-1]))
-    radians = duration * fastest(case)
-    slowest = radians / np.sqrt(2 * (case.trajectory.tolerance or 1.0))
-    most = max(A_FRAME * float(case.steps[-1]) / case.trajectory.every, A_RADIAN * radians, STARTING)
-    return float(min(case.trajectory.force_calls, max(slowest, STARTING), most))
+    slowest = _radians(case) / np.sqrt(2 * (case.trajectory.tolerance or 1.0))
+    return float(min(case.trajectory.force_calls, max(slowest, STARTING), _believed(case)))
+
+
+def _radians(case: Case) -> float:
+    return abs(float(case.trajectory.t[-1])) * fastest(case)
+
+
+def _believed(case: Case) -> float:
+    frames = float(case.steps[-1]) / case.trajectory.every
+    return max(A_FRAME * frames, A_RADIAN * _radians(case), STARTING)
+
+
+def _not_believed(case: Case) -> str:
+    """That a method says it has called the force more often than is believed, or nothing."""
+    calls = case.trajectory.force_calls
+    if calls <= _believed(case):
+        return ""
+    return (
+        f"; of the {calls:.3g} force calls that it declares {_believed(case):.0f} are believed, the most of "
+        f"{A_FRAME:g} a frame, {A_RADIAN:g} a radian of the fastest motion, and {STARTING:g}"
+    )
 
 
 STARTING = 100.0
