@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1218,
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4455,
+    ("checks",): 4477,
     ("identify",): 7818,
     ("formats", "store"): 5113,
     ("studies",): 1600,
