@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4477,
     ("identify",): 7818,
-    ("formats", "store"): 5113,
+    ("formats", "store"): 5128,
     ("studies",): 1600,
     ("studies/*",): 10985,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6780,
@@ -64,5 +64,5 @@ def test_no_module_is_longer_than_400_lines() -> None:
 
 def test_the_scripts_of_the_page_are_few_lines_that_can_be_read() -> None:
     lines = [line for path in (HOME / "cli/page").glob("*.js") for line in path.read_text().splitlines()]
-    assert len(lines) <= 814
+    assert len(lines) <= 810
     assert max(map(len, lines)) <= 110

@@ -134,9 +134,20 @@ def test_positions_and_velocities_cost_no_bytes_and_have_the_right_units(tmp_pat
 
 def test_a_reduced_scene_says_that_its_units_are_placeholders(tmp_path: Path) -> None:
     written(tmp_path / "s.h5", scene(units="reduced"))
-    with h5py.File(tmp_path / "s.h5") as file:
+    with h5py.File(tmp_path / "s.h5", "r+") as file:
         assert file["observables/own:euler"].attrs["units_are"].startswith("reduced")
-        assert file["observables/own:euler/p/value"].attrs["unit"] == "u nm ps-1"
+        assert file["observables/own:euler/p/value"].attrs["unit"] == "1"
+        # readers of H5MD ask for a unit
+        assert file["particles/own:euler/position/value"].attrs["unit"] == "nm"
+        file["observables/own:euler/p/value"].attrs.update(unit="u nm ps-1", units="u nm ps-1")
+    assert not [one for one in store.check(tmp_path / "s.h5") if "unit" in one.what]
+
+
+def test_the_root_says_what_every_group_is(tmp_path: Path) -> None:
+    written(tmp_path / "s.h5", scene(), ["own:euler"])
+    with h5py.File(tmp_path / "s.h5") as file:
+        about = file.attrs["about"]
+        assert all(f"{name}:" in about for name in file if name != "h5md")
 
 
 def test_a_file_alone_tells_what_was_run_by_what_on_which_machine(tmp_path: Path) -> None:

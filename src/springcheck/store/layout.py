@@ -69,6 +69,14 @@ UNITS: Mapping[tuple[str, str], UnitsOf] = {
     ("circuit", "si"): _SI_CIRCUIT,
 }
 REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"
+ABOUT_GROUPS = (
+    "Motion by simulation engines, judged to rounding. observables: q, p and energy of each method, bit for "
+    "bit; particles: the same for readers of H5MD; parameters: how each was made; verdicts: value, bound and "
+    "reason of each check; comparison: largest differences of pairs; plots: what viewers draw; documents, "
+    "and groups by their names: studies. Read and checked by springcheck"
+)
+"""The root's attribute `about`."""
+HOME_PAGE = ""  # OWNER: the project's address, once there is one; it follows in `about`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +141,7 @@ def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
 
 def begin(file: Any) -> None:
     """The head of every file of ours: /h5md and what it is."""
-    write_attributes(file, {"NX_class": "NXroot"})
+    write_attributes(file, {"NX_class": "NXroot", "about": f"{ABOUT_GROUPS} {HOME_PAGE}".strip()})
     head = file.create_group("h5md")
     head.attrs["version"] = np.array([1, 1], dtype=np.int32)
     # a user's name need not be UTF-8
@@ -177,9 +185,15 @@ def reopened(path: Path, size: int) -> Iterator[Any]:
         yield file
 
 
+def recorded(kind: str, of: str) -> UnitsOf:
+    """Units of /observables: of reduced numbers none, "1", but of the times, which /particles shares."""
+    found = UNITS[kind, of]
+    return {name: "1" if of == "reduced" and name != "time" else unit for name, unit in found.items()}
+
+
 def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]:
     """Create a trajectory's groups and arrays without their numbers -> offset of each array [B]."""
-    unit = units(scene)
+    unit = recorded(scene.kind, scene.units)
     found = columns(label, scene, frames)
     base = file.create_group(f"observables/{label}")
     if scene.units == "reduced":

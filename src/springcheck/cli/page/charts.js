@@ -1,4 +1,3 @@
-"use strict";
 // Charts as SVG: curves or tiles in a box, read by pointer or arrow keys, zoomed by dragging or + and -.
 // A bank is charts with one legend.  What is drawn is described in springcheck/figures/charts.py.
 

@@ -1,4 +1,3 @@
-"use strict";
 // What charts are made of: elements, lines and marks, ticks.  Looks come with the data.
 
 const DARK = matchMedia("(prefers-color-scheme: dark)");

@@ -1,4 +1,3 @@
-"use strict";
 // Which scheme made a file of states, where it is plain: one particle, each step, all digits of doubles, a
 // linear force, no friction.  Of anything else the command is to be asked: what is named here, it names.
 

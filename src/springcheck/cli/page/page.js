@@ -1,4 +1,3 @@
-"use strict";
 // The stored motion, the loops of loops.js on opening and by the sliders, and the charts of the studies.
 
 // rows of numbers stand once: [rows, data], and {"#": i} for the i-th of them, {"$": i} where it is text;
