@@ -377,6 +377,13 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     assert "Temperatures over that of the bath" in capsys.readouterr().out
 
 
+def test_a_thermostat_whose_springs_diverge_says_so_in_place_of_temperatures() -> None:
+    # its chain counts three degrees of freedom for each of a thousand springs that have one
+    row = baths.entry(engines.parse("ase:nose-hoover"))
+    assert "1000 springs: diverged after 1 steps" in row.note
+    assert np.isnan([row.configurational, row.kinetic]).all()
+
+
 def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     assert baths.entry(engines.parse("own:aboba")).agrees
     monkeypatch.setattr(thermal, "THERMOSTATS", {**THERMOSTATS, "aboba": THERMOSTATS["baoa"]})

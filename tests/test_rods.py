@@ -153,6 +153,19 @@ def test_the_error_falls_with_the_tolerance_in_steps_of_whole_iterations() -> No
         assert ordered[0] > 1e-7
 
 
+def test_shake_in_single_precision_keeps_lengths_to_that_and_lets_momentum_sway(need: Need) -> None:
+    label = "openmm:verlet-rods@OpenCL-double"
+    need(label)
+    run = springcheck.simulate(dumbbell(), label)
+    assert run.arithmetic.lengths == 2.0**-24
+    failed = {v.check for v in springcheck.judge(dumbbell(), run) if v.passed is False}
+    assert failed == {"momentum", "angular-momentum"}
+    triangle = springcheck.load_scene("rigid-triangle")
+    verdicts = springcheck.judge(triangle, springcheck.simulate(triangle, label))
+    assert [v.check for v in verdicts if v.passed is False] == []
+    assert sum(v.passed is True for v in verdicts) >= 8
+
+
 def test_the_tolerance_of_lengths_is_stored_and_read(tmp_path: Path, need: Need) -> None:
     need("openmm:verlet-rods-as-it-is")
     scene = replace(dumbbell(), steps=5, include=("openmm:verlet-rods-as-it-is",))

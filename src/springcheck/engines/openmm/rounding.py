@@ -44,10 +44,17 @@ its forces are too large by 2.3e-10."""
 LENGTHS = {"verlet-rods": 1e-13, "verlet-rods-8": 1e-8, "verlet-rods-as-it-is": 1e-5}
 """Relative tolerance of constraints by method; the last is the library's own."""
 
+SHAKE = 2.0**-24
+"""GPU-type platforms keep SHAKE's squared lengths and inverse masses in single precision in every mode
+(`params` in `IntegrationUtilities.cpp`).  By the masses a free molecule's momentum sways: that is no
+tolerance, and fails."""
+
 
 def arithmetic(label: Label) -> Arithmetic:
     """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
     if label.platform in ("", "Reference", "CPU"):
         return Arithmetic(lengths=LENGTHS.get(label.method, 0.0))
     found = _PRECISIONS[label.precision or "single"]
+    if label.method in LENGTHS:
+        found = replace(found, lengths=max(LENGTHS[label.method], SHAKE))
     return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found

@@ -73,9 +73,12 @@ def entry(label: Label) -> Entry:
     # what a single spring does not tell is judged as it is declared: by what no draw can explain
     kept = all(v.passed is not False for v in checks.shared(checks.judge(one, run)))
     hot = driver.run(many, label, seed=SEED_OF_ROWS)
-    configurational, kinetic = temperatures(hot.q[UNCOUNTED:], hot.p[UNCOUNTED:])
+    whole = hot.outcome.status == "complete"
+    both = temperatures(hot.q[UNCOUNTED:], hot.p[UNCOUNTED:]) if whole else ((nan, nan), (nan, nan))
+    configurational, kinetic = both
+    ends = "" if whole else f"{SIDE_BY_SIDE} springs: {hot.outcome.status} after {hot.outcome.step} steps"
     return Entry(
-        method=str(label), about=method.about, note=method.note,
+        method=str(label), about=method.about, note="; ".join(filter(None, (method.note, ends))),
         version=", ".join(f"{key} {value}" for key, value in engines.load(label.engine).version().items()),
         claimed=method.scheme, found=" or ".join(names[:1] if named else names) or "none that is known",
         agrees=kept and (not names or method.scheme in names),

@@ -98,6 +98,8 @@ def name(scene: Scene, found: Trajectory) -> str:
     z = z / np.max(np.abs(z), axis=1, keepdims=True)
     scale = np.max(np.abs(found.q)) / np.max(np.abs(found.p))
     best = z[:, 1:] @ np.linalg.pinv(z[:, :-1])
+    if found.arithmetic.parameters == "single":
+        scene = scene.system.in_single
     m, k = scene.m, scene.system.hessian_diagonal(scene.q)
     unlike: list[tuple[str, Floats]] = []
     for one in schemes.SCHEMES.values():

@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from springcheck import interrupts, schemes
+from springcheck import engines, interrupts, schemes
 from springcheck.errors import SpringcheckError, StoreError, plain
 from springcheck.text.wording import number
 
@@ -86,6 +86,7 @@ up=-up;body.append(...rows)}});
 
 def rows(*documents: Mapping[str, Any]) -> list[dict[str, str]]:
     """One row for each entry of these documents, as text; of a method that is in several the first one's."""
+    engines.names()  # whose schemes have their titles from then on
     found: dict[str, dict[str, str]] = {}
     for document in documents:
         for x in document["entries"]:
@@ -157,7 +158,7 @@ def as_csv(found: Sequence[Mapping[str, str]]) -> str:
 
 def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, Any]]) -> str:
     """The page: a table to filter and sort; CSV and JSON are in it."""
-    engines = set(map(engine, found))
+    known = set(map(engine, found))
     shown = {
         "CSV": ("text/csv", as_csv(found)),
         "JSON": ("application/json", json.dumps(list(documents), separators=(",", ":"))),
@@ -175,7 +176,7 @@ def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, An
 <meta name="viewport" content="width=device-width"><title>Which integrator does it really run?</title>
 <style>{STYLE}</style></head><body>
 <h1>Which integrator does it really run?</h1>
-<p>{len(found)} ways to move a mass on a spring by {len(engines)} engines.  No cell is an engine's word: each
+<p>{len(found)} ways to move a mass on a spring by {len(known)} engines.  No cell is an engine's word: each
 but claim and note is read from the states of two springs, 200 steps of 0.1 (m = k = 1, and m = 3.7, k = 2.9);
 of thermostats from those of springs at h omega = 0.5 and friction times step 0.4.
 {links}</p>
