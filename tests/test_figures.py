@@ -14,7 +14,8 @@ import pytest
 from springcheck import driver, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
-from springcheck.figures import chain, energies, looks, overlay, portraits, render
+from springcheck.figures import chain, energies, looks, overlay, portraits, render, style
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
 from springcheck.physics import scenefile
@@ -477,3 +478,17 @@ def test_frames_that_jump_to_and_fro_are_dots_and_an_exact_line_has_no_chords() 
     x = np.concatenate([np.linspace(-2, -1, 700), np.linspace(1, 2, 700)])
     parted, _ = portraits._parted(x, 0 * x, ys, ys)
     assert np.flatnonzero(np.isnan(parted)).tolist() == [700]
+
+
+@pytest.mark.parametrize("wide", [1.0, 3.0])
+def test_names_of_axes_of_equal_scales_stay_inside_the_picture(tmp_path: Path, wide: float) -> None:
+    x = np.linspace(-wide, wide, 9)
+    curves = [
+        Curve(name=f"own:{name}", group=name, title="a title of a few words", x=x, y=x / wide, marks=True)
+        for name in list(looks.LOOKS)[:14]
+    ]
+    chart = Chart(title="", x=Scale(name="q"), y=Scale(name="p"), curves=curves, equal=True)
+    with style.style():
+        figure = render.picture(Bank(title="", charts=[chart]))
+        style.save(figure, tmp_path, "a")
+    assert figure.axes[0].yaxis.label.get_window_extent().x0 >= 0

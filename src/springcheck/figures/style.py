@@ -96,6 +96,11 @@ def _drawn(figure: Figure) -> dict[str, bytes]:
         # a title may be in any script: what the font has not is drawn as boxes
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.set_dpi(DPI)
+        engine = figure.get_layout_engine()
+        if engine and any(axes.get_aspect() != "auto" for axes in figure.axes):
+            # a pass finds the room of names before axes of equal scales have theirs
+            for _ in range(2):
+                engine.execute(figure)
         FigureCanvasAgg(figure).print_png(png)  # type: ignore[no-untyped-call]
         figure.set_layout_engine("none")
         FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None})  # type: ignore[no-untyped-call]
