@@ -26,8 +26,11 @@ else it is missed, and by which factor of the noise is counted in decades.
 With `thorough` a set is all experiments of `run --thorough` with one own method on one such scene; FILE,
 which holds blocks of one kind, may be - for none.
 
-With FILE every block of 250 scenes is kept in it, a line of JSON each: blocks that are there are not run
-again, and what is printed is the sum of all blocks of the file.
+With FILE every block of 50 scenes is kept in it, a line of JSON each: blocks that are there are not run
+again, and what is printed is the sum of all blocks of the file.  It may be stopped at any time; files of
+several processes, each with scenes of its own, are added up by
+
+    cat a.jsonl b.jsonl > all.jsonl; python validation/judge_campaign.py 0 0 all.jsonl
 """
 
 from __future__ import annotations
@@ -59,8 +62,9 @@ COUNTED = 20.0
 
 FRAMES = 12
 """Fewer of them tell little of what the noise is: then there are more runs."""
-STARTS = 6
-"""So many, from starts beside the scene's."""
+STARTS, STEPS = 24, 2000
+"""So many, from starts beside the scene's: most forms round alike, and few draws tell no largest one.  Of
+runs of many steps no more than so many steps together, and six runs."""
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]
@@ -735,7 +739,7 @@ def one(seed: int, counts: Counts) -> None:
                 what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
                 _legal(counts, checks.judge(scene, right), what)
         near = np.random.default_rng([14, seed])
-        for _ in range(STARTS if len(right.t) < FRAMES else 0):
+        for _ in range(min(STARTS, max(6, STEPS // scene.steps)) if len(right.t) < FRAMES else 0):
             start = tuple(x * (1 + 1e-6 * near.normal(size=scene.n)) for x in (scene.q, scene.p))
             found = _defect(scene, run(scene, scheme, written(scene, scheme, rng), (start[0], start[1])))
             if found is not None:
@@ -826,7 +830,7 @@ def experiments(seed: int, counts: Counts) -> None:
 steps.MOST_NAMED = 10**6
 """Every name is told, not the first few."""
 
-BLOCK = 250
+BLOCK = 50
 """Scenes of one line of the file."""
 
 
@@ -839,8 +843,9 @@ def campaign(first: int, count: int, of: Callable[[int, Counts], None] = one) ->
 
 
 def kept(file: Path) -> dict[int, Counts]:
-    """The blocks of a file by their first scene."""
+    """The blocks of a file by their first scene; a line that was cut off is none."""
     lines = file.read_text().splitlines() if file.is_file() else []
+    lines = [line for line in lines if line.endswith("}")]
     return {found.pop("first"): Counts(**found) for found in map(json.loads, lines)}
 
 
@@ -859,8 +864,10 @@ if __name__ == "__main__":
         total.add(found)
         if keeps:
             with Path(asked.file).open("a") as out:
-                out.write(json.dumps({"first": start, **asdict(found)}) + "\n")
+                out.write("\n" + json.dumps({"first": start, **asdict(found)}))
         print(total, flush=True)
+    if not asked.count:
+        print(total)
     for line in (*total.alarms, *total.missed, *total.numbers):
         print(" ", line)
     sys.exit(bool(total.alarms or total.missed or total.numbers))

@@ -216,7 +216,9 @@ class Morse(OnPairs):
         # roundings of 1 - x, of x = exp(-steepness u), which may come of 1 - x, and of u, which both feel
         x = 1 + np.expm1(-steepness * u)
         s = np.abs(steepness)
-        return np.asarray(2 * depth * s * (x * (1 + x + np.abs(1 - 2 * x) * s * size) + (1 - x) ** 2))
+        return np.asarray(
+            2 * depth * s * (x * (1 + x + np.abs(1 - 2 * x) * s * size) + np.maximum(1 - x, 0) ** 2)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
