@@ -274,3 +274,49 @@ def test_methods_without_bonds_say_so() -> None:
     for label in ("own:implicit-midpoint", "openmm:langevin-middle", "lammps:spring-self"):
         assert "has no bond term" in (engines.refusal(diatomic(), engines.parse(label)) or "") or label
     assert engines.refusal(diatomic(), engines.parse("lammps:spring-self")) == "it has no bond term"
+
+
+def test_a_pair_along_no_axis_and_far_from_0_is_judged_by_a_scene_along_x(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same molecule as a spring of a rest length along one axis: what counts is its line."""
+    text = FILE.partition("particle")[0] + (
+        "particle = [{mass = 3.7, position = 0, momentum = 1.665}, "
+        "{mass = 1.3, position = 1.2, momentum = -0.195}]\n"
+        "spring = [{ends = [0, 1], stiffness = 2.9, rest = 1.05}]\ntime = {step = 0.1, steps = 200}\n"
+    )
+    (tmp_path / "line.toml").write_text(text)
+    scene = diatomic()
+    run = driver.run(scene, "own:velocity-verlet")
+    path = dump(tmp_path / "a.dump", run.q, run.p / scene.m, scene.masses, np.asarray(scene.box))
+    given = ["judge", str(path), "--step", "0.1", "--scene", str(tmp_path / "line.toml"), "--scheme"]
+    assert main([*given, "velocity-verlet"]) == 0
+    said = capsys.readouterr().out
+    assert "positions counted from" in said
+    assert main([*given, "semi-implicit-euler"]) == 1
+    q = run.q.copy()
+    q[7:, 5] += 1e-9
+    dump(path, q, run.p / scene.m, scene.masses, np.asarray(scene.box))
+    assert main([*given, "velocity-verlet"]) == 1
+
+
+def test_a_file_of_points_in_space_is_judged_by_a_scene_in_a_plane(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = replace(scenefile.load_scene("periodic-box"), steps=100)
+    run = driver.run(scene, "own:velocity-verlet")
+    q, v = np.full((2, len(run.t), 9), 1.7)
+    v[:] = 0
+    q[:, scene.where], v[:, scene.where] = run.q, run.p / scene.m
+    path = dump(tmp_path / "a.dump", q, v, scene.masses, np.asarray(scene.box))
+    given = ["judge", str(path), "--step", "0.1", "--scene", "periodic-box", "--scheme", "velocity-verlet"]
+    assert main(given) == 0
+    assert "angular-momentum" in capsys.readouterr().out
+    v[50:, 1] += 1e-9
+    dump(path, q, v, scene.masses, np.asarray(scene.box))
+    assert main(given) == 1
+    # a plane that drifts is no plane of the scene
+    q[:, 2] += np.arange(len(q)) * 0.01
+    dump(path, q, v, scene.masses, np.asarray(scene.box))
+    assert main(given) == 2
+    assert "is along axes that scene periodic-box leaves out" in capsys.readouterr().err

@@ -123,7 +123,11 @@ def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict
         off = float(np.max(np.abs(states.t - states.t[0] - run.t)))
         out["times"] = f"{TIMES}; they are up to {off:.2g} beside them" if off else TIMES
     if np.any(judged.q != asked.q) or np.any(judged.p != asked.p):
-        size = float(asked.system.norm(judged.q - asked.q, judged.p - asked.p))
+        q = judged.q
+        if _beside_start(q[None], asked, 1e-6):
+            # further along its line
+            q = q - np.mean(q - asked.q)
+        size = float(asked.system.norm(q - asked.q, judged.p - asked.p))
         out["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
     if (judged.every, judged.steps) != (asked.every, asked.steps):
         out["grid"] = (
@@ -226,8 +230,17 @@ def as_trajectory(
                 "frames from there on, and those before it are judged"
             )
     beside = 0.0
-    if q.shape[1] == 3 * scene.n:
-        q, other, beside = _along(path, q, other, scene, notes, max(1e-6, 4 * states.roundoff))
+    off = max(1e-6, 4 * states.roundoff)
+    if scene.places is not None and q.shape[1] == 3 * scene.particles > scene.n:
+        q, other, beside = _in_plane(path, q, other, scene, off)
+    elif q.shape[1] == 3 * scene.n:
+        far = float(np.max(np.abs(q), initial=0.0))
+        q, other, beside = _along(path, q, other, scene, notes, off)
+        if moved := _beside_start(q, scene, off):
+            # as far from 0 as the points are, for they are rounded there
+            notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
+            q, scene = q - moved + far, _moved(scene, far)
+            beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
     if q.shape[1] != scene.n:
         raise StoreError(f"{path}: {q.shape[1]} positions a frame, {scene.n} in scene {scene.name}")
     p = other if states.p is not None else other * scene.m
@@ -292,6 +305,33 @@ def as_trajectory(
     return judged, run, tuple(notes)
 
 
+def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) -> tuple[Floats, Floats, float]:
+    """Of motions in space (f, 3 particles) the coordinates that the scene has (f, n), and by which part of
+    its size something moves along the axes that it leaves out."""
+    left = scene.elsewhere
+    beside = max(float(np.max(np.abs(x[:, left])) / (np.max(np.abs(x)) or 1.0)) for x in (q - q[0], other))
+    if not beside <= off:
+        raise StoreError(
+            f"{path}: {beside:.2g} of the motion is along axes that scene {scene.name} leaves out"
+        )
+    return q[:, scene.where], other[:, scene.where], beside
+
+
+def _beside_start(q: Floats, scene: Scene, off: float) -> float:
+    """How far along their line several particles (f, n) stand from where the scene has them at the start; 0
+    where they are as far apart otherwise, or stand there."""
+    apart = q[0] - scene.q
+    moved, size = float(np.mean(apart)), float(np.ptp(scene.q))
+    alike = scene.n > 1 and np.ptp(apart) <= off * size < abs(moved)
+    return moved if alike else 0.0
+
+
+def _moved(scene: Scene, length: float) -> Scene:
+    """The same scene further along its line."""
+    terms = tuple(term.shifted(length) if term.bodies == 1 else term for term in scene.terms)
+    return replace(scene, q=scene.q + length, terms=terms)
+
+
 def _along(
     path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
 ) -> tuple[Floats, Floats, float]:
@@ -310,8 +350,12 @@ def _along(
     )
     if not beside <= off:
         raise StoreError(f"{path}: the motion is not along one line, but {beside:.2g} of its size off it")
-    if np.max(np.abs(positions[0] + scene.q)) < np.max(np.abs(positions[0] - scene.q)):
+    # which way round: by places between the particles, which do not depend on where 0 is
+    several = np.ptp(scene.q) > 0
+    here, there = (x - np.mean(x) * several for x in (positions[0], scene.q))
+    if np.max(np.abs(here + there)) < np.max(np.abs(here - there)):
         line, positions, rest = -line, -positions, -rest
     where = ", ".join(f"{x:.4g}" for x in line)
     notes.append(f"motion along ({where}), at most {beside:.1g} of its size beside it")
-    return positions, rest, beside
+    # across a line that is no axis the roundings of all frames add up
+    return positions, rest, beside / (len(r) if np.max(np.abs(line)) < 1 - off else 1)
