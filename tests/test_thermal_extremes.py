@@ -112,12 +112,14 @@ def test_a_file_is_given_every_scheme_that_may_have_made_it(name: str, given: di
 
 
 @pytest.mark.parametrize("name", ["nose-hoover", "nose-hoover-fourth", "nose-hoover-middle"])
-def test_a_bath_that_acts_by_a_factor_is_not_taken_for_draws(name: str) -> None:
-    for seed, (x, turn) in enumerate(((0.6, 0.45), (0.72, 0.75), (0.78, 0.35), (0.2, 0.9))):
-        where = scene(x=x, turn=turn, steps=220)
-        run = driver.run(where, f"own:{name}", seed=seed + 1)
-        found = of_bath(run.t, run.q[:, :1], run.p[:, :1], None, where.m[:1])
-        assert found is None or not found.candidates, found.statement
+@pytest.mark.parametrize("frames", [220, 400])
+def test_a_chain_is_not_taken_for_draws(name: str, frames: int) -> None:
+    for seed, (x, turn) in enumerate(((0.6, 0.45), (0.72, 0.75), (0.78, 0.35), (0.2, 0.9), (0.68, 0.84))):
+        where = scene(x=x, turn=turn, steps=frames)
+        run = driver.run(replace(where, q=where.q * (1 + seed)), f"own:{name}", seed=1)
+        for j in (0, 1):
+            found = of_bath(run.t, run.q[:, j : j + 1], run.p[:, j : j + 1], None, where.m[j : j + 1])
+            assert found is None or not found.candidates, found.statement
 
 
 @pytest.mark.parametrize("name", ["lammps-langevin", "bbk"])

@@ -33,6 +33,9 @@ COARSE = 0.01
 EVEN = 1e-4
 """Chance below which what acts on momenta may be a factor, and no draw is told of it."""
 
+LAGS = 20
+"""Steps over which a factor that is carried on would show."""
+
 SPARSE = 0.1
 """Median of the draws, of variance 1, below which most steps have none: 0.67 for normal ones."""
 
@@ -93,7 +96,7 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
     def clear(found: Thermal | None) -> Thermal | None:
         return found and replace(found, known=found.known and not bent)
 
-    even = _is_even(sizes_left[1] * left[1], u[1:])
+    even = _is_even(sizes_left[1] * left[1], u[1:]) and min(map(_together, left)) > EVEN
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
@@ -149,6 +152,15 @@ def _is_even(left: Floats, u: Floats) -> bool:
         chance.neighbours(x[:, None]) for x in (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
     ]
     return min(chance.mean(large[0] * large[1]), *after) > EVEN
+
+
+def _together(x: Floats) -> float:
+    """Chance of the correlations of x (f,) over `LAGS` together (Ljung & Box, Biometrika 65 (1978) 297)."""
+    from scipy.special import gammaincc
+
+    n, size = len(x), float(x @ x)
+    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, LAGS + 1)]
+    return float(gammaincc(LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0
 
 
 def _is_white(x: Floats) -> bool:
