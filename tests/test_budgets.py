@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1225,
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4477,
+    ("checks",): 4478,
     ("identify",): 7818,
     ("formats", "store"): 5128,
     ("studies",): 1600,

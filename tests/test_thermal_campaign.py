@@ -57,3 +57,22 @@ def test_what_is_stored_has_no_alarm_and_no_wrong_name(part: str) -> None:
     found = known["found"]
     assert found.get("alarms", 0) == 0
     assert [word for word in found if word.endswith(("WRONG NAME", "IN THE LIST"))] == []
+
+
+def test_ranges_of_cases_are_kept_apart_go_on_and_are_merged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign, "HERE", tmp_path)
+    monkeypatch.setattr(campaign, "PARTS", {"alarms": lambda case: {"runs": 1, "alarms": 0, "sum": case}})
+    campaign.add("alarms", 10)
+    campaign.add("alarms", 3, 100)
+    campaign.add("alarms", 5, 100)
+    campaign.add("alarms", 5, 200)
+    assert campaign.merge() == 0
+    known = json.loads((tmp_path / "alarms.json").read_text())
+    assert known["more"] == [[100, 105], [200, 205]]
+    assert known["found"]["runs"] == 20
+    assert known["found"]["sum"] == sum([*range(10), *range(100, 105), *range(200, 205)])
+    campaign.add("alarms", 2, 104)
+    assert campaign.merge() == 1
+    assert json.loads((tmp_path / "alarms.json").read_text()) == known

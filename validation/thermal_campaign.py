@@ -4,11 +4,15 @@ Claim: right thermostats raise no alarm beyond the stated 1e-6 a command, on ran
 stiffnesses and temperatures are spread over twelve decades; and no random file of a thermostat gets a wrong
 name, whether whole, of every few steps, in single precision, in text, or of two coupled particles.
 
-Command: python validation/thermal_campaign.py alarms|engines|files [COUNT]
+Command: python validation/thermal_campaign.py alarms|engines|files [COUNT [FIRST]]
+         python validation/thermal_campaign.py merge
 
 Each call adds COUNT cases (1,000) to those that data/reference/thermostats has, in the order of their
-numbers, none left out, and prints what they come to; Ctrl-C keeps what is done.  A case is its number: the
-same cases are made again by a seeded part of the tests.
+numbers, none left out, and prints what they come to; what is done is kept every 50 cases and by Ctrl-C.  A
+case is its number: the same cases are made again by a seeded part of the tests.
+
+With FIRST the cases are FIRST to FIRST + COUNT - 1, kept in a file of their own: processes side by side take
+ranges that do not meet, each goes on where it stopped when it is called again, and `merge` adds their files.
 """
 
 from __future__ import annotations
@@ -144,16 +148,16 @@ PARTS: dict[str, Callable[[int], dict[str, int]]] = {
 }  # fmt: skip
 
 
-def add(part: str, count: int) -> dict[str, Any]:
-    """Add so many cases to those that are stored."""
-    path = HERE / f"{part}.json"
-    known: dict[str, Any] = {"cases": 0, "found": {}}
+def add(part: str, count: int, first: int | None = None) -> dict[str, Any]:
+    """Add so many cases to those that are stored, or those from a first one on to a file of their own."""
+    path = HERE / (f"{part}.json" if first is None else f"{part}-{first}.json")
+    known: dict[str, Any] = {"cases": first or 0, "found": {}}
     if path.exists():
         known = json.loads(path.read_text())
     found: Counter[str] = Counter(known["found"])
-    first = known["cases"]
+    begin = known["cases"]
     try:
-        for case in range(first, first + count):
+        for case in range(begin, (begin if first is None else first) + count):
             one = PARTS[part](case)
             found.update(one)
             if part == "alarms" and one["alarms"]:
@@ -167,18 +171,42 @@ def add(part: str, count: int) -> dict[str, Any]:
     return known
 
 
+def merge() -> int:
+    """Add the files of ranges to those of their parts; refuses one that meets cases that are counted."""
+    for part in PARTS:
+        for path in sorted(HERE.glob(f"{part}-[0-9]*.json")):
+            whole, one = HERE / f"{part}.json", json.loads(path.read_text())
+            known: dict[str, Any] = {"cases": 0, "found": {}}
+            if whole.exists():
+                known = json.loads(whole.read_text())
+            first, end = int(path.stem.partition("-")[2]), one["cases"]
+            if any(first < b and a < end for a, b in [(0, known["cases"]), *known.get("more", [])]):
+                print(f"{path}: some of its cases are counted already", file=sys.stderr)
+                return 1
+            known["more"] = [*known.get("more", []), [first, end]]
+            _write(whole, known, Counter(known["found"]) + Counter(one["found"]))
+            path.unlink()
+            print(f"{part}: cases {first} to {end - 1} added")
+    return 0
+
+
 def _write(path: Path, known: dict[str, Any], found: Counter[str]) -> None:
     known["found"] = dict(sorted(found.items()))
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(known, indent=1) + "\n")
+    new = path.with_suffix(".new")
+    new.write_text(json.dumps(known, indent=1) + "\n")
+    new.replace(path)
 
 
 def main() -> int:
     """Add cases and print what all of them come to."""
-    part, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 1000
+    part, *numbers = sys.argv[1:]
+    if part == "merge":
+        return merge()
     warnings.simplefilter("ignore")
-    known = add(part, count)
-    print(f"{part}: {known['cases']} cases")
+    known = add(part, *map(int, numbers or ["1000"]))
+    done = known["cases"] - int(numbers[1]) if len(numbers) > 1 else known["cases"]
+    print(f"{part}: {done} cases")
     wrong = 0
     for word, number in known["found"].items():
         print(f"  {number:8} {word}")

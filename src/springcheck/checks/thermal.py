@@ -146,6 +146,8 @@ def collisions(case: Case) -> Chance | str:
         return "it has no collisions"
     if case.scene.places is not None:
         return "the axes of one particle may collide together"
+    if limit := small_move(case.trajectory):
+        return limit
     p = law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
     hits, n = int(np.count_nonzero(found.hits)), found.hits.size
     return Chance(chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")

@@ -35,6 +35,8 @@ class Chain:
     weights: tuple[float, ...] = (1.0,)
     times: int = 1
     """How often the weights come, each for its share."""
+    least: float = 0.0
+    """A kinetic energy [M L2/T2] below which a swing is left out."""
     three_each: bool = False
     """Whether it counts three degrees of freedom for each particle, whatever moves it."""
 
@@ -69,7 +71,11 @@ class Chain:
             for j in range(M):
                 y[j] = y[j] + d * s[j] / Q[j]
                 push(j, d)
-        return np.stack([*s, *y]), factor
+        after = np.stack([*s, *y])
+        if self.least:
+            rests = twice < 2 * self.least
+            after, factor = np.where(rests, np.stack([*state]), after), np.where(rests, 1, factor)
+        return after, factor
 
     def energy(self, state: Any, *, freedoms: int, thermal: Any, Q: Any) -> Any:
         """That of the chain [M L2/T2]: with that of the motion it is conserved."""

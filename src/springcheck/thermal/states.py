@@ -33,7 +33,7 @@ COARSE = 0.01
 EVEN = 1e-4
 """Chance below which what acts on momenta may be a factor, and no draw is told of it."""
 
-LAGS = 20
+FACTOR_LAGS = 20
 """Steps over which a factor that is carried on would show."""
 
 SPARSE = 0.1
@@ -155,12 +155,12 @@ def _is_even(left: Floats, u: Floats) -> bool:
 
 
 def _together(x: Floats) -> float:
-    """Chance of the correlations of x (f,) over `LAGS` together (Ljung & Box, Biometrika 65 (1978) 297)."""
+    """Chance of the correlations of x (f,) over 20 steps together (Ljung & Box, Biometrika 65 (1978) 297)."""
     from scipy.special import gammaincc
 
     n, size = len(x), float(x @ x)
-    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, LAGS + 1)]
-    return float(gammaincc(LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0
+    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
+    return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0
 
 
 def _is_white(x: Floats) -> bool:

@@ -12,7 +12,7 @@ BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
 """kT of a kelvin [kJ/mol] as OpenMM has it."""
 
 
-LOOSE = 1e12
+LOOSE = 1e300
 """A tolerance of which every step is allowed."""
 
 
