@@ -14,6 +14,7 @@ from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Verdict
+from springcheck.studies.faults import clean
 
 SCENE = scenefile.load_scene("spring-uneven")
 RUN = driver.run(SCENE, "own:velocity-verlet")
@@ -100,3 +101,15 @@ def test_a_store_is_judged_by_the_arithmetic_that_its_run_declared(
     assert any("rebuilt from positions" in note for note in found.notes)
     other = file.judge(store, scene="spring", scheme="semi-implicit-euler", trajectory=label)
     assert other.status == 1, "what an engine declares excuses no other scheme"
+
+
+@pytest.mark.parametrize("digits", ["%.17g", "%.5f"])
+def test_numbers_that_no_step_rounds_are_no_sign_of_a_better_arithmetic(tmp_path: Path, digits: str) -> None:
+    """Steps of 1/8 at a speed of 3/4: few digits are all there are."""
+    t, one = 0.125 * np.arange(41), np.ones(1)
+    scene = clean.scene(one, (clean.walls(0 * one, 0 * one),), 0.5 * one, 0.75 * one, step=0.125, steps=40)
+    states = np.c_[t, 0.5 + 0.75 * t, np.full(41, 0.75)]
+    np.savetxt(tmp_path / "a.csv", states, fmt=digits, delimiter=",", header="t,q,p", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").verdicts
+    assert [v for v in found if v.passed is False] == []
+    assert next(v for v in found if v.check == "step-defect").passed is True

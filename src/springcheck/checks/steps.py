@@ -251,8 +251,8 @@ def arithmetic(case: Case) -> Finding | str:
         alone = float(np.max(_off(last, case.trajectory.q[1:], case.trajectory.p[1:])[told]))
     finer = Case(trajectory=replace(case.trajectory, arithmetic=plain), scene=case.judged)
     coarser, fine = (float(np.max(x.system.norm.most(*x.allowance))) for x in (case, finer))
-    # at rest the only rounding is underflow, which is the same in both
-    if coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
+    # at rest the only rounding is underflow, which is the same in both; binary numbers may need none
+    if alone == 0 or coarser < fine / FLOOR or len(case.trajectory.t) < ENOUGH:
         return "its coarser parts do not show in these states"
     if not seen.value <= seen.bound:
         return seen
