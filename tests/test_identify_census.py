@@ -26,6 +26,18 @@ def test_what_was_wrong_once_is_right(case: corpus.Case) -> None:
     assert corpus.judged(case, found) == "right"
 
 
+def test_a_motion_that_dies_within_a_few_frames_of_single_precision_excludes_no_scheme() -> None:
+    q, v, frames = 3.1, 0.7, []
+    for i in range(12 * 50):
+        if i % 12 == 0:
+            frames.append((q, v))
+        v = (v - 1.9 * (q - 0.721)) / 2.9
+        q = q + v
+    q_, v_ = np.array(frames).astype(np.float32).astype(float).T
+    with pytest.raises(IdentificationError, match="3 frames that show the motion exclude none: give 4"):
+        identify(12.0 * np.arange(50), q_, v=v_)
+
+
 def test_a_block_has_no_wrong_name_no_false_fit_and_no_wrong_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(census, "BLOCK", 8)
     found = census.block(24)

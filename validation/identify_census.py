@@ -85,7 +85,7 @@ CAUSES = {
     "cubic force": "anharmonic|not linear in the position|cubic|quadratic|powers of the position",
     "drift of the position": "constant added to the position",
     "noise": "^Noise",
-    "alternating steps": "alternate",
+    "alternating steps": "alternate|the step or a force changes in time",
     "one kick": "one kick|but (not from )?frame|motion is one",
 }
 """What the sentence of each cause says.  Where one error is seen and the sentence is another's, it is wrong;

@@ -173,6 +173,10 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     out = np.zeros((len(matches), len(lengths), 2))
     for i, match in enumerate(matches):
+        step = float(record.interval) / match.stride
+        if np.all(np.diff(step * np.arange(len(lengths) * match.stride + 1)) == step):
+            # every time is a multiple of the step, to the last bit
+            continue
         ways = powers(one[i], match.stride).astype(np.float64)
         each = ways[::-1] @ (change[i] / (2 * d)).astype(np.float64) @ ways
         apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=(0, 2))
@@ -211,7 +215,9 @@ def defects(
     only then is more than plain rounding explained, and never to an exact flow.
     """
     chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
-    return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible)]
+    # numbers of a match that hardly any state shows may be none
+    with np.errstate(invalid="ignore"):
+        return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible)]
 
 
 def _defects(
@@ -253,7 +259,7 @@ def _defects(
         signed = _misses(matches, found, slips).astype(np.float64)
         return _refitted(record, found, matches, signed, 2.0**-52 * size)
 
-    signed = missed(found.slips)
+    signed = other = missed(found.slips)
     missing = np.abs(signed)
     ulp = _largest(missing, 2.0**-52 * size)
     follows = np.full(len(matches), found.slips is not None)
@@ -274,14 +280,15 @@ def _defects(
         uneven = _stepped_to(record, found, matches, signed, size)
         rounded = np.where(stride == 1, _largest(np.abs(uneven), 2.0**-52 * size), ulp)
     slack = np.zeros_like(missing)
-    if record.slips is not None and np.any((stride > 1) & (ulp > usual)):
+    if np.any((stride > 1) & (ulp > usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
         unlike = _largest(np.maximum(missing - slack, 0), 2.0**-52 * size)
         rounded = np.where(stride > 1, unlike, rounded)
     plain = rounded <= most_ulp
     if record.fine and not np.all(plain):
-        again = np.abs(_refitted(record, found, matches, signed, 2.0**-52 * size, numbers=True))
-        plain |= _largest(np.maximum(again - slack, 0), 2.0**-52 * size) <= most_ulp
+        for way in (signed, other)[: 1 + (other is not signed)]:
+            again = np.abs(_refitted(record, found, matches, way, 2.0**-52 * size, numbers=True))
+            plain |= _largest(np.maximum(again - slack, 0), 2.0**-52 * size) <= most_ulp
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

@@ -209,7 +209,8 @@ def candidates_of(
         if stated is not None and record.mass is not None:
             rates = [stated / float(record.mass[j]) for j in moving]
             room = [
-                8 * part.g_error * joint.stride / abs(float(record.interval)) + 1e-9 * rate
+                8 * part.g_error * joint.stride / abs(float(record.interval))
+                + (1e-9 + 8 * record.jitter) * rate
                 for part, rate in zip(joint.parts, rates, strict=True)
             ]
             if any(abs(x - y) > z for x, y, z in zip(friction, rates, room, strict=True)):

@@ -306,18 +306,24 @@ SUBTRACTED = tuple(
 
 HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
 
-KNOWN_ELSEWHERE = tuple(
-    Family(
-        name=one.name, scheme=one.name, stages=one.stages,
-        path=8 * max(len(one.over) + len(one.under), len(one.stages)),
-        stability=(one.over, one.under) if one.over else ((), ()),
+KNOWN_ELSEWHERE, DAMPED_ELSEWHERE = (
+    tuple(
+        Family(
+            name=one.name + damped, scheme=one.name,
+            stages=tuple(("explicit" if damped and kind == "kick" else kind, c) for kind, c in one.stages),
+            path=8 * max(len(one.over) + len(one.under), len(one.stages)),
+            stability=(one.over, one.under) if one.over else ((), ()),
+            damped=bool(damped), laws=(EXPLICIT if len(one.under) == 1 else IMPLICIT,) if damped else (),
+        )
+        for one in ELSEWHERE.values()
     )
-    for one in ELSEWHERE.values()
+    for damped in ("", ", damped")
 )  # fmt: skip
-"""Schemes that are named where none of the catalogue fits."""
+"""Schemes that are named where none of the catalogue fits, and with friction in their force."""
 
 FAMILIES = {
-    family.name: family for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS, *SUBTRACTED, *KNOWN_ELSEWHERE)
+    family.name: family
+    for family in (*UNDAMPED, *DAMPED, HELD, *FAULTS, *SUBTRACTED, *KNOWN_ELSEWHERE, *DAMPED_ELSEWHERE)
 }
 
 

@@ -52,6 +52,10 @@ DAMPING = 2.0
 """The same in units of g, where there is friction.  Measured on 2,900 maps of up to 0.9 of the critical
 damping: 1.7."""
 
+SWAY = 8.0
+"""Phase beyond the largest one, in units of g: friction acts in substeps forward and back, of 4.4 steps in
+all in Forest & Ruth's scheme, and twice as much in the phase where that is far from a half turn."""
+
 END = 0.02
 """Phase beside the largest one in which a table says little."""
 
@@ -211,7 +215,7 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
             parts.append((np.full(len(at), i), at, roots.phase[at] ** 2 + g**2 / 4, g))
         elif family.damped and len((curve := _curve(_base(family))).low) > 1:
             # the phase turns back at its largest, which friction exceeds
-            highest = curve.high[0] + 2 * DAMPING * np.abs(roots.log_det)
+            highest = curve.high[0] + SWAY * np.abs(roots.log_det)
             left = np.flatnonzero(~(roots.phase < FOLDED * curve.high[0]) & ~(roots.phase > highest))
             left = left[roots.s[left] <= STRIDES[0]]
             tries = np.array([(h_w * curve.rows[0, 0, -1], share) for h_w in FOLDS for share in (0.5, 1.0)])

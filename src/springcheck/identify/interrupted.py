@@ -135,7 +135,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if (len(bad) > 1 and largest) or (several and float(np.min(ranks)) >= e.pairs - AT_AN_END * len(bad)):
         cause = (
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
-            "too few to tell whether the force is anharmonic or changes in time"
+            "too few to tell whether the force is anharmonic, or the step or a force changes in time"
         )
     return [Explanation(cause=cause, remedy=remedy, misfit=after / before, local=True)]
 

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.errors import IdentificationError
+from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import compare
 from springcheck.identify.families import EULER, FAMILIES, IMPLICIT, title
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import Joint, Terms
 from springcheck.identify.maps import unit
-from springcheck.identify.record import Record
+from springcheck.identify.record import DEEP, Record
 from springcheck.identify.result import Explanation, Identification
 from springcheck.identify.search import SAME_MAP, coincident, numbers
 from springcheck.text.wording import count, either
@@ -57,42 +58,48 @@ def separation(maps: list[Map], one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """What was found, where text of few frames does not exclude other schemes.
+    """What was found, where few frames of text, or hardly any of single precision, exclude no other scheme.
 
     Raises IdentificationError where no scheme fits so few.
     """
-    if not record.text:
+    if record.fine:
         return found
+    fewest, of_text = (FEWEST_OF_TEXT, " of text") if record.text else (FEWEST_STATES - 1, "")
     # a motion that has died down to its equilibrium shows nothing any more
     rounded = ((record.q, record.q_quantum), (record.v, record.v_quantum))
     shown = [np.abs(x - np.median(x, axis=0)) / np.where(unit > 0, unit, 1) for x, unit in rounded]
     seen = [np.max(np.maximum(x, 1.0), axis=1).astype(np.float64) for x in shown]
     frames = min(int(np.count_nonzero(x > 1)) for x in seen)
     digits = min(float(np.sum(np.log10(x))) for x in seen)
-    if frames >= FEWEST_OF_TEXT and digits >= DIGITS_OF_TEXT:
+    if frames >= fewest and (digits >= DIGITS_OF_TEXT or not record.text):
         return found
-    fewest = max(FEWEST_OF_TEXT, math.ceil(DIGITS_OF_TEXT * frames / max(digits, 1.0)))
+    fewest = max(fewest, math.ceil(DIGITS_OF_TEXT * frames / max(digits, 1.0)) if record.text else 0)
     more = f"give {fewest} frames or more that show it, or more digits"
     if not found.candidates:
         raise IdentificationError(
-            f"no known scheme fits, but {frames} frames of text that show the motion exclude none: {more}"
+            f"no known scheme fits, but {frames} frames{of_text} that show the motion exclude none: {more}"
         )
-    said = f"{frames} frames of text that show the motion exclude no scheme; what fits: {found.statement}"
+    said = f"{frames} frames{of_text} that show the motion exclude no scheme; what fits: {found.statement}"
     return replace(
         found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, explanations=(),
         statement=said, notes=(*found.notes, f"what would tell: {more}"),
     )  # fmt: skip
 
 
-def beside_unknown(found: Identification, *, deep: bool = False) -> Identification:
-    """What was found in coarse numbers at a number of steps that nobody stated: what lies between two schemes
-    fits as well, and above `CERTAIN_STEPS` names none.  In `deep` ones a list of many steps says so."""
+def beside_unknown(record: Record, found: Identification, *, stated: bool) -> Identification:
+    """What was found in coarse numbers, or at coarse times, at a number of steps that nobody stated: what
+    lies between two schemes fits as well, and above `CERTAIN_STEPS` names none; of deep ones a list of many
+    steps says so.  What the exact flow fits anything fits whose own error does not show."""
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
-    if not found.fits or found.stride == 1 or found.scheme == "exact" or (deep and few):
+    clear = record.jitter < DEEP
+    near = any(x.scheme == "exact" for x in found.candidates) and not (record.fine and clear)
+    certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
+    if not found.fits or (certain and not near):
         return found
+    tells = "more digits" if near else "the step, stated"
     statement = f"{found.statement}; or a scheme that is not known here"
-    out = replace(found, statement=statement, notes=(*found.notes, "what would tell: the step, stated"))
-    if found.scheme is None or (found.stride or 0) <= CERTAIN_STEPS:
+    out = replace(found, statement=statement, notes=(*found.notes, f"what would tell: {tells}"))
+    if found.scheme in (None, "exact") or (found.stride or 0) <= CERTAIN_STEPS:
         return out
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 

@@ -23,7 +23,7 @@ from springcheck.identify.candidates import (
 )
 from springcheck.identify.compare import compare, nearest
 from springcheck.identify.explain import explain
-from springcheck.identify.families import FAMILIES, KNOWN_ELSEWHERE, title
+from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
 from springcheck.identify.interrupted import remembered
@@ -165,9 +165,22 @@ def _of_coordinates(
         if explained := _explained(later, moving, maps_later, joints, base):
             record, maps = later, maps_later
             notes.append("the first step has the friction of the first velocity: none is half a step old")
+
+    def agrees(x: Joint) -> bool:
+        """Whether a scheme has the stated step and stiffness."""
+        of_step = stride is None or x.stride == stride
+        return of_step and (stated is None or not disagreements(record, moving, x, stated))
+
     if not explained:
-        joints = compare(maps, base, KNOWN_ELSEWHERE, FEW)
-        explained = _explained(record, moving, maps, sorted(joints, key=lambda x: x.stride)[:1], base)
+        explained = _elsewhere(record, moving, maps, base, FEW)
+    elif stride is not None or stated is not None:
+        right = {x.scheme for x in explained if agrees(x)}
+        if len(right - {"exact"}) != 1 and not (record.fine and right):
+            # what is stated tells more than that the step is a simple one
+            strides = FEW if stride is None else range(stride, stride + 1)
+            others = _elsewhere(record, moving, maps, base, strides)
+            others = {x: ds for x, ds in others.items() if agrees(x)}
+            explained = {**(explained if right or not others else {}), **others}
     if not explained:
         joints, remark = single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)
@@ -194,7 +207,7 @@ def _of_coordinates(
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    found = beside_unknown(found, deep=record.deep) if stride is None else found
+    found = beside_unknown(record, found, stated=stride is not None)
     if asked is not None and friction is None and record.mass is not None:
         found = of_stated_friction(found, asked, float(record.mass[moving[0]]))
     if stated is None:
@@ -244,6 +257,16 @@ def _explained(
         defects = [[*defects[k], new[k]] for k in explained]
         left = [left[k] for k in explained]
     return dict(zip(left, defects, strict=True))
+
+
+def _elsewhere(
+    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], strides: range
+) -> dict[Joint, list[arithmetic.Defect]]:
+    """The schemes that springcheck does not run of which a known arithmetic explains every step, of the
+    fewest steps to a frame."""
+    joints = compare(maps, terms, KNOWN_ELSEWHERE, strides) or compare(maps, terms, DAMPED_ELSEWHERE, strides)
+    least = min((x.stride for x in joints), default=1)
+    return _explained(record, moving, maps, [x for x in joints if x.stride == least], terms)
 
 
 def _known(

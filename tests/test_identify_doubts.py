@@ -1,0 +1,145 @@
+"""What coarse numbers and clocks leave open is said, and what was stated accuses no scheme that has it.
+
+The trajectories are of schemes that springcheck does not run, which many of the catalogue come near to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from springcheck.identify import Identification, identify
+from springcheck.identify.families import EXPLICIT
+
+M, K = 3.7, 2.9
+DOUBT = "or a scheme that is not known here"
+
+State = tuple[float, float]
+Step = Callable[[float, float, float, float], State]
+
+
+def runge_kutta(rows: tuple[tuple[float, ...], ...], weights: tuple[float, ...]) -> Step:
+    def step(q: float, v: float, h: float, c: float) -> State:
+        slopes: list[State] = []
+        for row in rows:
+            x = q + h * sum(a * s[0] for a, s in zip(row, slopes, strict=False))
+            u = v + h * sum(a * s[1] for a, s in zip(row, slopes, strict=False))
+            slopes.append((u, -(K * x + c * u) / M))
+        dq, dv = (sum(b * s[i] for b, s in zip(weights, slopes, strict=True)) for i in (0, 1))
+        return q + h * dq, v + h * dv
+
+    return step
+
+
+def alternating(*shares: float) -> Step:
+    """Drifts and kicks in turn, and back again: drift first."""
+    every = (*shares, *shares[-2::-1])
+
+    def step(q: float, v: float, h: float, c: float) -> State:
+        for i, share in enumerate(every):
+            q, v = (q + share * h * v, v) if i % 2 == 0 else (q, v - share * h * (K * q + c * v) / M)
+        return q, v
+
+    return step
+
+
+PEFRL = alternating(0.1786178958448091, 0.7123418310626054, -0.06626458266981849, -0.2123418310626054,
+                    0.77529337365001878)  # fmt: skip
+MCLACHLAN = alternating(0.1931833275037836, 0.5, 0.6136333449924328)
+KUTTA3 = runge_kutta(((), (0.5,), (-1, 2)), (1 / 6, 2 / 3, 1 / 6))
+HEUN = runge_kutta(((), (1,)), (0.5, 0.5))
+FEHLBERG4 = runge_kutta(
+    ((), (1 / 4,), (3 / 32, 9 / 32), (1932 / 2197, -7200 / 2197, 7296 / 2197),
+     (439 / 216, -8, 3680 / 513, -845 / 4104)),
+    (25 / 216, 0, 1408 / 2565, 2197 / 4104, -1 / 5),
+)  # fmt: skip
+
+
+def frames(step: Step, h: float, *, every: int = 1, count: int = 400, c: float = 0.0) -> np.ndarray:
+    q, v, out = 0.83, -0.61, [(0.83, -0.61)]
+    for i in range(count * every):
+        q, v = step(q, v, h, c)
+        if (i + 1) % every == 0:
+            out.append((q, v))
+    return np.array(out).T
+
+
+def digits(x: np.ndarray, number: int) -> np.ndarray:
+    return np.array([float(f"{y:.{number}g}") for y in x])
+
+
+def names(found: Identification) -> set[str]:
+    return {x.scheme for x in found.candidates}
+
+
+@pytest.mark.parametrize(
+    ("step", "name", "h", "every"),
+    [(PEFRL, "pefrl", 0.3, 1), (PEFRL, "pefrl", 0.47, 1), (MCLACHLAN, "mclachlan2", 0.039, 10)],
+    ids=["pefrl", "pefrl, coarse", "mclachlan, 10 steps"],
+)
+def test_a_scheme_of_the_stated_stiffness_comes_before_another_of_another(
+    step: Step, name: str, h: float, every: int
+) -> None:
+    """Velocity Verlet of many steps comes as near, on a spring that is not the stated one."""
+    q, v = (digits(x, 9) for x in frames(step, h, every=every))
+    found = identify(h * every * np.arange(401), q, v=v, mass=M, stiffness=K)
+    assert found.fits, found.statement
+    assert name in names(found)
+    assert {x.stride for x in found.candidates if x.scheme == name} == {every}
+
+
+@pytest.mark.parametrize(("step", "name", "h"), [(FEHLBERG4, "fehlberg4", 0.3), (PEFRL, "pefrl", 0.55)])
+def test_a_scheme_of_the_stated_step_comes_before_others_of_other_steps(
+    step: Step, name: str, h: float
+) -> None:
+    q, v = (digits(x, 9) for x in frames(step, h))
+    found = identify(h * np.arange(401), q, v=v, mass=M, step=h)
+    assert found.fits, found.statement
+    assert name in names(found)
+    assert {x.stride for x in found.candidates if x.scheme != "exact"} == {1}
+
+
+@pytest.mark.parametrize("number", [7, 8])
+def test_the_exact_flow_in_coarse_text_may_be_any_scheme_whose_error_does_not_show(number: int) -> None:
+    h = 0.042
+    q, v = (digits(x, number) for x in frames(FEHLBERG4, h, count=80))
+    found = identify(h * np.arange(81), q, v=v, mass=M, step=h, stiffness=K)
+    assert found.fits
+    assert "exact" in names(found)
+    assert DOUBT in found.statement
+
+
+@pytest.mark.parametrize("clock", ["three decimals", "float32"])
+def test_a_coarse_clock_leaves_other_steps_open_whatever_the_digits_of_the_states(clock: str) -> None:
+    h = 0.0117
+    q, v = frames(MCLACHLAN, h, count=120)
+    i = np.arange(121)
+    t = np.round(h * i, 3) if clock == "three decimals" else (i * np.float32(h)).astype(np.float32)
+    found = identify(t, q, v=v, mass=M)
+    assert found.scheme == "mclachlan2" or DOUBT in found.statement, found.statement
+
+
+@pytest.mark.parametrize(
+    ("step", "name", "every"), [(KUTTA3, "rk3-kutta", 1), (FEHLBERG4, "fehlberg4", 2), (PEFRL, "pefrl", 5)]
+)
+def test_schemes_that_are_not_run_are_named_with_friction_too(step: Step, name: str, every: int) -> None:
+    h, c = 0.23, 0.31
+    q, v = frames(step, h, every=every, count=60, c=c)
+    found = identify(h * every * np.arange(61), q, v=v, mass=M, stiffness=K)
+    assert (found.scheme, found.stride, found.fits) == (name, every, True)
+    assert found.friction[0] * M == pytest.approx(c, rel=1e-9)
+    assert found.candidates[0].law == EXPLICIT
+    assert identify(h * every * np.arange(61), q, v=v, mass=M, stiffness=K, friction=c).fits
+
+
+def test_a_stated_friction_is_known_no_finer_than_the_clock() -> None:
+    """It was "a friction 1 times the stated": that of times which single precision adds up."""
+    h, c = 0.083, 0.061
+    q, v = frames(HEUN, h, c=c)
+    t = np.cumsum(np.concatenate([[0], np.full(400, h, np.float32)]), dtype=np.float32)
+    found = identify(t, q, v=v, mass=M, stiffness=K, friction=c)
+    assert found.fits, found.statement
+    off = identify(t, q, v=v, mass=M, stiffness=K, friction=1.01 * c)
+    assert "friction 0.990" in off.statement
