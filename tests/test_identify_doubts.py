@@ -143,3 +143,38 @@ def test_a_stated_friction_is_known_no_finer_than_the_clock() -> None:
     assert found.fits, found.statement
     off = identify(t, q, v=v, mass=M, stiffness=K, friction=1.01 * c)
     assert "friction 0.990" in off.statement
+
+
+def euler(h: float, k: float = K, q: float = 0.83, v: float = -0.61, count: int = 300) -> np.ndarray:
+    out = [(q, v)]
+    for _ in range(count):
+        v -= h * k * q / M
+        q += h * v
+        out.append((q, v))
+    return np.array(out).T
+
+
+def test_a_single_position_of_the_other_sign_is_in_no_box() -> None:
+    """Positions that are wrapped into a box of L lie within L of each other."""
+    q, v = euler(0.1)
+    q[77] = -q[77]
+    found = identify(0.1 * np.arange(301), q, v=v, mass=M)
+    assert "frame 77 is wrong" in found.statement
+    q, v = euler(0.1)
+    found = identify(0.1 * np.arange(301), (q + 0.5) % 1 - 0.5, v=v, mass=M)
+    assert "wrapped into a box of 1," in found.statement
+
+
+def test_velocities_of_another_particle_are_no_magnetic_field() -> None:
+    one, other = euler(0.1), euler(0.1, q=0.3, v=0.7)
+    states = np.stack([one, other], axis=-1)
+    found = identify(0.1 * np.arange(301), states[0], v=states[1, :, ::-1], mass=[M, M])
+    assert not found.fits
+    assert "turns" not in found.statement
+
+
+def test_a_force_constant_of_half_the_size_is_said_beside_the_fault_that_does_the_same() -> None:
+    q, v = euler(0.1, K / 2)
+    found = identify(0.1 * np.arange(301), q, v=v, mass=M, stiffness=K)
+    assert "without its second half kick; or Semi-implicit Euler" in found.statement
+    assert "k/2 q**2 taken for k q**2" in found.statement

@@ -44,6 +44,9 @@ def of_plane(record: Record) -> list[Explanation]:
     interval = abs(float(record.interval))
     det = complex(np.linalg.det(entries))
     angle = cmath.phase(det)
+    if abs(angle) < LEFT:
+        # the velocities are other numbers than these positions', and nothing turns them
+        return []
     turned = f"{angle:.9g}" if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
         f"The velocity turns by {turned} in each frame beside what springs alike along both axes do: a "

@@ -67,7 +67,7 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
         return
     box = float(np.median(np.abs(way[leaps])))
     times = np.rint(way / box)
-    if box < LEAPS * usual or np.any(np.abs(way - times * box) > LEAPS * usual):
+    if not LEAPS * usual < box > np.ptp(q) - usual or np.any(np.abs(way - times * box) > LEAPS * usual):
         return
     # a box is a short number; what the states show of it is as long as their roundings allow
     short = next((x for n in range(1, 17) if abs((x := float(f"{box:.{n}g}")) - box) < usual), box)

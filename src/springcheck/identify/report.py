@@ -217,8 +217,10 @@ def _of_coordinates(
     faults = faults_of(*of) if found.explanations and found.candidates else []
     if faults:
         # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
+        other = [x.cause for x in found.explanations if ": " in x.cause]
         return replace(
-            found, verdict="none", scheme=None, candidates=(), aliases=(), statement=faults[0].cause,
+            found, verdict="none", scheme=None, candidates=(), aliases=(),
+            statement="; or ".join([faults[0].cause, *other]),
             explanations=(*faults, *found.explanations), fits=False,
         )  # fmt: skip
     return found
