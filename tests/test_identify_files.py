@@ -176,7 +176,8 @@ def test_the_report_keeps_to_80_columns_and_its_notes_hang(capsys: pytest.Captur
     first = next(i for i, line in enumerate(lines) if line.startswith("  note: "))
     assert lines[first + 1].startswith("        ")
     text = " ".join(" ".join(lines).split())
-    assert text.startswith("bead: several schemes, which the data cannot tell apart one of: exact; rk4, 1 to")
+    doubt = "or a scheme that is not known here"
+    assert text.startswith(f"bead: several schemes, which the data cannot tell apart; {doubt} one of: exact;")
     assert "; rk4, 1 to 100 steps a frame;" in text
     assert "no error of a step is visible" in text
 

@@ -17,7 +17,7 @@ from springcheck.identify.maps import MapTable, power, powers, table, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
 
-__all__ = ["QUANTUM", "Defect", "defects", "misses"]
+__all__ = ["QUANTUM", "Defect", "defects"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
@@ -43,18 +43,14 @@ class Defect:
     """Whether the arithmetic itself shows, and not only an error of its size."""
 
 
-def misses(match: Match, found: Map) -> Extended:
-    """What each frame differs by from the step of the one before, (f - 1, 2), in the frame of `found`."""
-    return np.asarray(_misses([match], found, found.slips)[0])
-
-
 def _predicted(matches: list[Match]) -> Extended:
     """The maps (c, 2, 2) between frames that matches predict."""
     return np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
 
 
 def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
-    """The same for each match, (c, f - 1, 2), where steps follow the clock's `slips`."""
+    """What each frame differs by from the step of the one before, (c, f - 1, 2), in the frame of `found`,
+    where steps follow the clock's `slips`."""
     b = _predicted(matches)
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
     if slips is not None:
@@ -259,36 +255,34 @@ def _defects(
         signed = _misses(matches, found, slips).astype(np.float64)
         return _refitted(record, found, matches, signed, 2.0**-52 * size)
 
+    def ulps(x: Floats, slack: Floats | float = 0.0) -> Floats:
+        return _largest(np.maximum(np.abs(x) - slack, 0), 2.0**-52 * size)
+
     signed = other = missed(found.slips)
-    missing = np.abs(signed)
-    ulp = _largest(missing, 2.0**-52 * size)
+    ulp = ulps(signed)
     follows = np.full(len(matches), found.slips is not None)
     if record.slips is not None and found.slips is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
         other = missed(record.slips)
-        late = _largest(np.abs(other), 2.0**-52 * size)
-        follows = late < 0.7 * ulp
+        follows = ulps(other) < 0.7 * ulp
         signed = np.where(follows[:, None, None], other, signed)
-        missing = np.abs(signed)
-        ulp = _largest(missing, 2.0**-52 * size)
+        ulp = ulps(signed)
+    missing = np.abs(signed)
     # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
     usual = 4 + 2 * np.sqrt(stride) * parts
     # those of an uneven clock follow its times
     most_ulp = np.where(follows, path, np.minimum(path, usual))
-    rounded = ulp
+    rounded, slack = ulp, np.zeros_like(missing)
     if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
-        uneven = _stepped_to(record, found, matches, signed, size)
-        rounded = np.where(stride == 1, _largest(np.abs(uneven), 2.0**-52 * size), ulp)
-    slack = np.zeros_like(missing)
+        rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, size)), ulp)
     if np.any((stride > 1) & (ulp > usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
-        unlike = _largest(np.maximum(missing - slack, 0), 2.0**-52 * size)
-        rounded = np.where(stride > 1, unlike, rounded)
+        rounded = np.where(stride > 1, ulps(signed, slack), rounded)
     plain = rounded <= most_ulp
     if record.fine and not np.all(plain):
         for way in (signed, other)[: 1 + (other is not signed)]:
-            again = np.abs(_refitted(record, found, matches, way, 2.0**-52 * size, numbers=True))
-            plain |= _largest(np.maximum(again - slack, 0), 2.0**-52 * size) <= most_ulp
+            again = _refitted(record, found, matches, way, 2.0**-52 * size, numbers=True)
+            plain |= ulps(again, slack) <= most_ulp
     stored = coarse_file = np.zeros(len(matches), dtype=bool)
     if not record.fine:
         quanta = record.quanta(j) / found.size.astype(np.float64)

@@ -256,12 +256,13 @@ def compare(
         steps = sorted({s for _, s in fitting})
         if not families:
             return []
-    joints = [
-        Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts))
-        for key in parts[0]
-        if all(key in x for x in parts)
-    ]
-    return sorted(joints, key=lambda x: x.plainness)
+    return sorted(_joints(parts), key=lambda x: x.plainness)
+
+
+def _joints(parts: list[dict[tuple[str, int], Match]]) -> list[Joint]:
+    """What all oscillators have a match of."""
+    shared = (key for key in parts[0] if all(key in x for x in parts))
+    return [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
 
 
 def nearest(
@@ -269,12 +270,6 @@ def nearest(
 ) -> list[Joint]:
     """Families and strides at their best, whether or not they may be accepted."""
     steps = list(strides)
-    parts = [
-        {(x.family, x.stride): x for x in matches(found, what, families, steps, far=True)}
-        for found, what in zip(maps, terms, strict=True)
-    ]
-    return [
-        Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts))
-        for key in parts[0]
-        if all(key in x for x in parts)
-    ]
+    both = zip(maps, terms, strict=True)
+    every = (matches(found, what, families, steps, far=True) for found, what in both)
+    return _joints([{(x.family, x.stride): x for x in found} for found in every])

@@ -323,9 +323,8 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         )
     strength = f"{size:.1e} of the state's size in each frame"
     if name == "cubic":
-        row = np.linalg.lstsq(np.stack([q, v, q**3], axis=1), found.z.astype(np.float64)[1:, 1], rcond=None)[
-            0
-        ]
+        columns = np.stack([q, v, q**3], axis=1)
+        row = np.linalg.lstsq(columns, found.z.astype(np.float64)[1:, 1], rcond=None)[0]
         share = row[2] / row[0] * float(np.max(q**2)) if row[0] else math.nan
         return (
             f"The force is anharmonic: a cubic part reaches {share:.2g} of the linear one where largest",

@@ -307,12 +307,15 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
     rounds = 6 if every.damped else 3
     bound = NEAR[0] + NEAR[1] * roots.error
     length = np.full(len(x.a), np.inf)
+
+    def left(a: Floats, g: Floats, wanted: Floats, size: Floats) -> Floats:
+        found = _compared(every.unit(x.which, a, g).astype(np.float64), free_scale=free_scale)
+        return np.asarray((found - wanted) / size)
+
     for turn in range(rounds + 1):
         wanted = _compared(roots.step[x.root], free_scale=free_scale)
         size = _entry_sizes(wanted, roots, x)
-        r = (
-            _compared(every.unit(x.which, x.a, x.g).astype(np.float64), free_scale=free_scale) - wanted
-        ) / size
+        r = left(x.a, x.g, wanted, size)
         off = np.max(np.abs(r), axis=0)
         # what is left over after a short step is its square and no more, or does not go away
         short = np.where(length < FARTHEST, CURVED * length**2 + QUOTIENT * length, LOST)
@@ -322,18 +325,7 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
             return x
         r, wanted, size = r[:, keep], wanted[:, keep], size[:, keep]
         moves = [(1e-6 * np.abs(x.a), 0.0)] + ([(0.0, 1e-7)] if every.damped else [])
-        slopes = [
-            (
-                (
-                    _compared(every.unit(x.which, x.a + d, x.g + e).astype(np.float64), free_scale=free_scale)
-                    - wanted
-                )
-                / size
-                - r
-            )
-            / (d + e)
-            for d, e in moves
-        ]
+        slopes = [(left(x.a + d, x.g + e, wanted, size) - r) / (d + e) for d, e in moves]
         step = least_squares(np.array(slopes), -r)[0]
         x.a = x.a + np.clip(step[0], -0.5 * np.abs(x.a), 0.5 * np.abs(x.a))
         length = np.abs(step[0] / x.a)

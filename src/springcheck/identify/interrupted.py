@@ -161,65 +161,48 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
         return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit[run])), 1e-3 * missing)
 
+    but = f"The motion is one{whose}, but"
     if len(run) == 1:
-        from_, to = z[first], z[first + 1]
+        from_, to, at = z[first], z[first + 1], first + 1
         if near(to, from_):
-            return (
-                f"The motion{whose} stands still for a step: it is repeated at frame {first + 1}",
-                "write each frame once, or look for a step that is left out",
-            )
+            cause = f"The motion{whose} stands still for a step: it is repeated at frame {at}"
+            return cause, "write each frame once, or look for a step that is left out"
         power = b @ b
         for n in range(2, 9):
             if near(to, power @ from_):
-                more = (
-                    f"frame {first + 1} is missing"
-                    if n == 2
-                    else f"{n - 1} frames are missing from frame {first + 1} on"
-                )
-                return (
-                    f"The motion is one{whose}, but {more}",
-                    "write every frame, or give a part without a gap",
-                )
+                more = f"{n - 1} frames are missing from frame {at} on" if n > 2 else f"frame {at} is missing"
+                return f"{but} {more}", "write every frame, or give a part without a gap"
             power = b @ power
         if first == 0:
             return (
-                f"The motion is one{whose}, but frame 0 does not belong to it: a wrong start, a scheme with "
-                "memory, whose force or velocity is that of the step before, or a solver that begins with "
-                "steps of its own",
+                f"{but} frame 0 does not belong to it: a wrong start, a scheme with memory, whose force or "
+                "velocity is that of the step before, or a solver that begins with steps of its own",
                 "look at how the start is set and recorded, or leave frame 0 out",
             )
         off = (to - b @ from_).astype(np.float64)
-        if first + 1 == len(z) - 1:
-            return (
-                f"The motion is one{whose}, but frame {first + 1}, the last, is wrong: {_amount(off, to)}",
-                ("look at how the last frame is written"),
-            )
+        if at == len(z) - 1:
+            cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
+            return cause, "look at how the last frame is written"
         back = np.linalg.solve(b.astype(np.float64), off)
-        for kick, state, when in ((back, from_, first), (off, to, first + 1)):
+        for kick, state, when in ((back, from_, first), (off, to, at)):
             if abs(kick[0]) < 1e-2 * abs(kick[1]):
                 return _kicked(e, found, float(kick[1]), float(state[0]), when, whose)
         digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
         return (
-            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and "
-            f"{first + 1}, as after a restart from numbers of {max(1, round(digits))} digits",
+            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and {at}, as "
+            f"after a restart from numbers of {max(1, round(digits))} digits",
             "write restarts in full precision",
         )
     if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
         off = (z[last] - b @ z[first]).astype(np.float64)
-        return (
-            f"The motion is one{whose}, but frame {last} is wrong: {_amount(off, z[last])}",
-            "look at how that frame is written",
-        )
+        return f"{but} frame {last} is wrong: {_amount(off, z[last])}", "look at how that frame is written"
     if len(run) == 3 and near(z[first + 2], b @ z[first]):
-        return f"The motion is one{whose}, but frames {first + 1} and {first + 2} have changed places", (
-            "sort the frames by time"
-        )
+        cause = f"{but} frames {first + 1} and {first + 2} have changed places"
+        return cause, "sort the frames by time"
     begins = ": a solver of several orders or steps begins so" if first == 0 else ""
     part = "after" if first == 0 else "before"
-    return (
-        f"The motion is one{whose}, but not from frame {first} to frame {last + 1}{begins}",
-        f"look at what happens there, or give the part {part} it",
-    )
+    cause = f"{but} not from frame {first} to frame {last + 1}{begins}"
+    return cause, f"look at what happens there, or give the part {part} it"
 
 
 def _kicked(e: Evidence, found: Map, kick: float, q: float, at: int, whose: str) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import Joint, Terms
 from springcheck.identify.maps import unit
 from springcheck.identify.record import DEEP, Record
-from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.result import OR_UNKNOWN, Explanation, Identification
 from springcheck.identify.search import SAME_MAP, coincident, numbers
 from springcheck.text.wording import count, either
 
@@ -96,9 +96,12 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool) -> Id
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
     if not found.fits or (certain and not near):
         return found
-    tells = "more digits" if near else "the step, stated"
-    statement = f"{found.statement}; or a scheme that is not known here"
-    out = replace(found, statement=statement, notes=(*found.notes, f"what would tell: {tells}"))
+    tells = (
+        []
+        if near and not found.scheme
+        else [f"what would tell: {'more digits' if near else 'the step, stated'}"]
+    )
+    out = replace(found, statement=found.statement + OR_UNKNOWN, notes=(*found.notes, *tells))
     if found.scheme in (None, "exact") or (found.stride or 0) <= CERTAIN_STEPS:
         return out
     return replace(out, verdict="not told apart", scheme=None, aliases=())

@@ -136,19 +136,17 @@ def nothing(
     symplectic_defect: float,
     defect_ulp: float,
     notes: list[str],
-    omega: tuple[float, ...] = (),
-    stiffness: tuple[float, ...] | None = None,
-    nearest: str | None = None,
-    difference: tuple[float, ...] = (math.nan,) * 4,
+    **near: Any,
 ) -> Identification:
-    """No scheme, and why; of `determinant` there is one for each oscillator that moves."""
+    """No scheme, and why; of `determinant` there is one for each oscillator that moves, and `near` says of
+    the nearest scheme what is known."""
     unknown = (math.nan,) * len(determinant)
+    near = {"omega": unknown, "stiffness": None, "nearest": None, "difference": (math.nan,) * 4} | near
     return Identification(
         verdict="none", statement=explanations[0].cause, scheme=None, aliases=(), candidates=(),
-        step=math.nan, stride=None, omega=omega or unknown, stiffness=stiffness, friction=unknown,
-        velocity_offset=math.nan, determinant=determinant, symplectic_defect=symplectic_defect,
-        defect_ulp=defect_ulp, precision="unknown", fits=False, undecided=False, nearest=nearest,
-        difference=difference, notes=tuple(dict.fromkeys(notes)), explanations=explanations,
+        step=math.nan, stride=None, friction=unknown, velocity_offset=math.nan, determinant=determinant,
+        symplectic_defect=symplectic_defect, defect_ulp=defect_ulp, precision="unknown", fits=False,
+        undecided=False, notes=tuple(dict.fromkeys(notes)), explanations=explanations, **near,
     )  # fmt: skip
 
 
@@ -171,6 +169,8 @@ def _plain(x: Any, name: str = "") -> Any:
         return _plain(x[0]) if name in SCALARS and len(x) == 1 else [_plain(y) for y in x]
     return x
 
+
+OR_UNKNOWN = "; or a scheme that is not known here"
 
 IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",
@@ -205,6 +205,8 @@ def identification(label: str, found: Identification) -> Lines:
     if found.undecided and found.scheme:
         misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
+    if found.statement.endswith(OR_UNKNOWN):
+        misfit += OR_UNKNOWN
     if found.explanations:
         # the diagnosis is the headline, and what to do stands below it
         said, misfit = found.explanations[0].cause, ""

@@ -182,11 +182,9 @@ def numbers(
     family = FAMILIES[chosen.family]
     law = law or (family.laws[0] if family.laws else "")
     omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
-    friction = tuple(
-        family.rate(law, m.friction) / h if family.stages else m.friction / h for m in chosen.parts
-    )
-    if any(kind in ("explicit", "implicit", "centred", "remembered") for kind, _ in family.stages):
-        friction = tuple(m.friction / h for m in chosen.parts)
+    decays = {"explicit", "implicit", "centred", "remembered"}.isdisjoint(kind for kind, _ in family.stages)
+    scaled = bool(family.stages) and decays
+    friction = tuple((family.rate(law, m.friction) if scaled else m.friction) / h for m in chosen.parts)
     stiffness: tuple[float, ...] | None = None
     if record.mass is not None:
         stiffness = tuple(

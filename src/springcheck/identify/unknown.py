@@ -26,6 +26,8 @@ dies."""
 LASTING = 0.1
 """Share of the largest state that each must have for what dies down to be a memory."""
 
+UNKNOWN_METHOD = "a one-step method that is not known here, which"
+
 FEWEST_WITH_MEMORY = 12
 """Frames from which a map of two states is told from chance."""
 
@@ -43,10 +45,9 @@ def misfit(e: Evidence) -> Explanation:
     if closest is not None:
         off = distance(e.found, closest.parts[0])
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
-    kind = _class(e) or growth
     return Explanation(
         cause="One linear map explains the states, but it is none of the known schemes' in up to "
-        f"{STRIDES[1]} steps to a frame: {kind}{near}",
+        f"{STRIDES[1]} steps to a frame: {_class(e) or growth}{near}",
         remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
@@ -70,13 +71,12 @@ def _class(e: Evidence) -> str:
     size = float(e.found.size[1] / e.found.size[0])
     symmetric = abs(x - u) <= SURE * math.hypot(error[0], error[3]) + 1e-14
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
+    growing = f"multiplies areas by 1 {det - 1:+.2e}"
     if symmetric and keeps:
-        return (
-            "a one-step method that is not known here, which keeps areas and is symmetric in time, or a "
-            "known one whose velocities have another scale"
-        )
+        other = "or a known one whose velocities have another scale"
+        return f"{UNKNOWN_METHOD} keeps areas and is symmetric in time, {other}"
     if not symmetric:
-        return f"a one-step method that is not known here, which {'keeps areas' if keeps else _growing(det)}"
+        return f"{UNKNOWN_METHOD} {'keeps areas' if keeps else growing}"
     step = math.sqrt(turn)
     if e.stiffness is not None and e.record.mass is not None:
         stated = e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
@@ -86,17 +86,13 @@ def _class(e: Evidence) -> str:
     found = {n: wrong / (1j * step) ** n for n in ORDERS}
     real = [n for n, c in found.items() if abs(c.imag) < REAL * abs(c.real)]
     if not real:
-        return f"a one-step method that is not known here, which {_growing(det)}"
+        return f"{UNKNOWN_METHOD} {growing}"
     n = min(real, key=lambda n: abs(math.log(abs(found[n].real) * math.factorial(n))))
     should = 1 / math.factorial(n)
     return (
         f"if every step was recorded, a one-step method of order {n - 1}, whose stability function has "
         f"{should + found[n].real:.3g} z**{n} in place of {should:.3g} z**{n}"
     )
-
-
-def _growing(det: float) -> str:
-    return f"multiplies areas by 1 {det - 1:+.2e}"
 
 
 def memory(e: Evidence) -> list[Explanation]:

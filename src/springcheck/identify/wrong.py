@@ -91,14 +91,8 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
         return []
     best = min(joints, key=lambda x: x.plainness)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
-    return [
-        _found(
-            f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}: friction of the wrong sign, "
-            "which feeds energy in",
-            "change the sign of the damping force",
-            best,
-        )
-    ]
+    cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
+    return [_found(cause, "change the sign of the damping force", best)]
 
 
 UNSCALED = 1e-6
