@@ -58,9 +58,6 @@ def explain(
     return (*out, *([] if out else [misfit(evidence)]))
 
 
-# no fixed step ------------------------------------------------------------------------------------------
-
-
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
     if _left(_alternating(e), e.misses) < 1 / FALLS:
@@ -108,9 +105,6 @@ def _drift(e: Evidence) -> list[Explanation]:
     if what == "velocity":
         remedy = "look for a constant force, or a Jacobian by differences, which rounds to one side"
     return [Explanation(cause=cause, remedy=remedy, misfit=float(np.max(e.found.residual)))]
-
-
-# forces that are not linear, or not constant ------------------------------------------------------------
 
 
 def _left(columns: Floats, missing: Floats) -> float:
