@@ -12,8 +12,9 @@ import numpy as np
 
 from springcheck.identify import arithmetic
 from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
-from springcheck.identify.notes import LEAPFROG
+from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.record import Record
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import SINGLE_ROOM, coincident, disagreements, numbers
@@ -229,3 +230,43 @@ def candidates_of(
             )
         )
     return out
+
+
+def remarks(
+    record: Record,
+    moving: list[int],
+    maps: list[Map],
+    joints: list[Joint],
+    candidates: tuple[Candidate, ...],
+    stiffness_stated: bool,
+) -> list[str]:
+    """What is to be said beside a name: the same maps, the law of friction, turns that frames do not show."""
+    out = []
+    scheme = common([x.scheme for x in candidates])
+    if scheme in LEAPFROG:
+        out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
+    damped = [x for x in candidates if x.law]
+    if damped:
+        each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in damped[:6])
+        out.append(f"the motion is damped, and the law is an assumption: the friction c/m is {each}")
+    elif not record.fine:
+        most = max(hidden_friction(record, found) for found in maps)
+        with_it = {
+            name: frictionless(name)
+            for name in dict.fromkeys(x.scheme for x in candidates)
+            if name in SCHEMES
+        }
+        same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
+        if same:
+            out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
+    if scheme and not damped and not stiffness_stated and scheme in SCHEMES:
+        out += same_maps(record, moving, maps, joints[0])
+    if any(x.turns for x in candidates):
+        might = "makes" if all(x.turns for x in candidates) else "may make"
+        out.append(
+            f"the motion {might} whole turns between two frames: the frequency is not the one that they show"
+        )
+    if any(part.a < 0 for part in joints[0].parts):
+        out.append("the spring is inverted: its stiffness is negative")
+    several = len({(x.scheme, x.stride) for x in joints}) > 1
+    return out + untold(record, maps, joints, stiffness_stated=stiffness_stated) if several else out

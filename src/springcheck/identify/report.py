@@ -25,22 +25,19 @@ from springcheck.identify.compare import compare, nearest
 from springcheck.identify.explain import explain
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, frictionless
+from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import (
     LEAPFROG,
     beside_unknown,
-    hidden_friction,
     of_few,
     of_stated_friction,
     of_unasked_friction,
-    same_maps,
-    untold,
 )
 from springcheck.identify.positions import identify_positions
 from springcheck.identify.record import Record, of_size, read, stated_stride
-from springcheck.identify.result import Candidate, Explanation, Identification, nothing
+from springcheck.identify.result import Explanation, Identification, nothing
 from springcheck.identify.search import (
     determinants,
     difference,
@@ -55,7 +52,7 @@ from springcheck.identify.thermal import of_bath
 from springcheck.identify.together import OF_A_PAIR, distance, of_a_bond, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import ELSEWHERE, SCHEMES
+from springcheck.schemes import ELSEWHERE
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
@@ -299,7 +296,7 @@ def _known(
     damped = any(joint.damped for joint in joints)
     first = candidates[0]
     precision = common([d.precision for d in worst]) or UNTOLD
-    notes += _remarks(record, moving, maps, joints, candidates, stated is not None)
+    notes += remarks(record, moving, maps, joints, candidates, stated is not None)
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
     )
@@ -345,45 +342,6 @@ def _known(
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),
     )
-
-
-def _remarks(
-    record: Record,
-    moving: list[int],
-    maps: list[Map],
-    joints: list[Joint],
-    candidates: tuple[Candidate, ...],
-    stiffness_stated: bool,
-) -> list[str]:
-    out = []
-    scheme = common([x.scheme for x in candidates])
-    if scheme in LEAPFROG:
-        out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
-    damped = [x for x in candidates if x.law]
-    if damped:
-        each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in damped[:6])
-        out.append(f"the motion is damped, and the law is an assumption: the friction c/m is {each}")
-    elif not record.fine:
-        most = max(hidden_friction(record, found) for found in maps)
-        with_it = {
-            name: frictionless(name)
-            for name in dict.fromkeys(x.scheme for x in candidates)
-            if name in SCHEMES
-        }
-        same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
-        if same:
-            out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
-    if scheme and not damped and not stiffness_stated and scheme in SCHEMES:
-        out += same_maps(record, moving, maps, joints[0])
-    if any(x.turns for x in candidates):
-        might = "makes" if all(x.turns for x in candidates) else "may make"
-        out.append(
-            f"the motion {might} whole turns between two frames: the frequency is not the one that they show"
-        )
-    if any(part.a < 0 for part in joints[0].parts):
-        out.append("the spring is inverted: its stiffness is negative")
-    several = len({(x.scheme, x.stride) for x in joints}) > 1
-    return out + untold(record, maps, joints, stiffness_stated=stiffness_stated) if several else out
 
 
 def _unknown(
