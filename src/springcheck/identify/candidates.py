@@ -232,7 +232,7 @@ def candidates_of(
     return out
 
 
-def remarks(
+def all_remarks(
     record: Record,
     moving: list[int],
     maps: list[Map],

@@ -296,7 +296,7 @@ def _known(
     damped = any(joint.damped for joint in joints)
     first = candidates[0]
     precision = common([d.precision for d in worst]) or UNTOLD
-    notes += remarks(record, moving, maps, joints, candidates, stated is not None)
+    notes += all_remarks(record, moving, maps, joints, candidates, stated is not None)
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
     )
