@@ -68,7 +68,7 @@ def of_few(record: Record, found: Identification) -> Identification:
     # a motion that has died down to its equilibrium shows nothing any more
     rounded = ((record.q, record.q_quantum), (record.v, record.v_quantum))
     shown = [np.abs(x - np.median(x, axis=0)) / np.where(unit > 0, unit, 1) for x, unit in rounded]
-    seen = [np.max(np.maximum(x, 1.0), axis=1).astype(np.float64) for x in shown]
+    seen = [np.max(np.clip(x, 1.0, 1e99), axis=1).astype(np.float64) for x in shown]
     frames = min(int(np.count_nonzero(x > 1)) for x in seen)
     digits = min(float(np.sum(np.log10(x))) for x in seen)
     if frames >= fewest and (digits >= DIGITS_OF_TEXT or not record.text):

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from springcheck.errors import IdentificationError
 from springcheck.identify import arithmetic
 from springcheck.identify.candidates import (
+    all_remarks,
     candidates_of,
     common,
     either_way,
