@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4478,
-    ("identify",): 7818,
+    ("identify",): 7821,
     ("formats", "store"): 5128,
     ("studies",): 1600,
     ("studies/*",): 10991,
