@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4478,
     ("identify",): 7821,
-    ("formats", "store"): 5128,
+    ("formats", "store"): 5135,
     ("studies",): 1600,
     ("studies/*",): 10991,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6829,

@@ -113,3 +113,16 @@ def test_numbers_that_no_step_rounds_are_no_sign_of_a_better_arithmetic(tmp_path
     found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").verdicts
     assert [v for v in found if v.passed is False] == []
     assert next(v for v in found if v.check == "step-defect").passed is True
+
+
+def test_nine_digits_of_single_precision_are_judged_and_a_clock_beside_them_is_not(tmp_path: Path) -> None:
+    def written(rows: Floats) -> Path:
+        np.savetxt(tmp_path / "a.csv", rows, fmt="%.9g", delimiter=",", header="t,q,p", comments="")
+        return tmp_path / "a.csv"
+
+    found = file.judge(written(np.float32(table())), scene=SCENE, scheme="velocity-verlet")
+    assert not [v.check for v in found.verdicts if v.passed is False]
+    late = table()
+    late[7:, 0] += 1e-5
+    with pytest.raises(StoreError, match="row 8 is at t = "):
+        file.judge(written(np.float32(late)), scene=SCENE, scheme="velocity-verlet")

@@ -15,6 +15,8 @@ from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
 """Rows whose digits are looked at."""
+FEWEST_CELLS = 8
+"""Different numbers of nine digits, all of which chance does not round to single precision."""
 LONGEST_HEAD = 1 << 20
 """Lines before the first row of numbers."""
 
@@ -110,14 +112,19 @@ def _are_counted(column: Floats) -> bool:
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
     """Half a unit of the last digit, relative to the largest number, of the column that is written coarsest.
 
-    That of a double from 16 digits on.  A column that does not change, or is 0, says nothing.
+    That of a double from 16 digits on, and of single precision at least where all numbers are its own to
+    their digits.  A column that does not change, or is 0, says nothing.
     """
     found = 2.0**-53
     for i in columns:
         cells = {row[i] for row in rows[:SHOWN]}
         digits = max(map(_digits, cells))
         if len(cells) > 1 and 0 < digits < 16:
-            found = max(found, 0.5 * 10.0 ** (1 - digits))
+            half = 0.5 * 10.0 ** (1 - digits)
+            x = np.array([*map(number, cells)])
+            with np.errstate(over="ignore"):
+                single = len(cells) >= FEWEST_CELLS and np.all(np.abs(np.float32(x) - x) <= half * np.abs(x))
+            found = max(found, half, 2.0**-24 if single else 0.0)
     return found
 
 
