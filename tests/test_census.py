@@ -24,7 +24,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import baths, rigid, table
 from springcheck.studies.census import measure as census
 from springcheck.studies.census.limit import _of_states, first_limit
-from springcheck.studies.census.result import Entry
+from springcheck.studies.census.result import ENTRIES, Entry
 from springcheck.studies.team import Processes
 from springcheck.thermal import THERMOSTATS
 
@@ -397,3 +397,16 @@ def test_a_hinge_is_named_on_springs_of_rotors(label: str, need: Callable[[str],
     one = census.entry(engines.parse(label))
     assert (one.found, one.constraint) == ("semi-implicit-euler", "hinge: turns by h w a step to rounding")
     assert one.agrees
+
+
+def test_a_row_of_before_a_column_was_measured_has_its_default() -> None:
+    one = census.entry(engines.parse(OWN[0]))
+    kept = ENTRIES.table(one.method, one)
+    before = replace(
+        kept, attributes={k: v for k, v in kept.attributes.items() if k not in ("along", "constraint")}
+    )
+    read = ENTRIES.found(before)
+    assert (one.along, read.along, read.constraint) == ("x, y and z alike; periodic box", "x", "")
+    assert (read.digest, read.limit) == (one.digest, one.limit)
+    with pytest.raises(KeyError):
+        ENTRIES.found(replace(kept, attributes={k: v for k, v in kept.attributes.items() if k != "digest"}))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -90,7 +90,8 @@ class RecordForm(Form[T]):
                 array = np.asarray(table.columns[one.name])
                 pairs = get_origin(one.hint) is tuple
                 values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
-            elif one.name != self.named:
+            elif one.name != self.named and (one.name in table.attributes or not one.has_default):
+                # what an earlier version did not measure has its default
                 values[one.name] = table.attributes[one.name]
         return self.kind(**values)  # type: ignore[no-any-return]
 
@@ -124,6 +125,7 @@ class _Field:
     hint: Any
     optional: bool
     keys: tuple[str, ...]
+    has_default: bool
 
     @property
     def is_array(self) -> bool:
@@ -141,7 +143,8 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
             optional = True
         if get_origin(hint) is Literal:
             hint = str
-        found.append(_Field(name=one.name, hint=hint, optional=optional, keys=one.metadata.get("keys", ())))
+        keys, late = one.metadata.get("keys", ()), one.default is not MISSING
+        found.append(_Field(name=one.name, hint=hint, optional=optional, keys=keys, has_default=late))
     return tuple(found)
 
 
