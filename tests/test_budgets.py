@@ -20,7 +20,7 @@ BUDGETS = {
     ("checks",): 4478,
     ("identify",): 7821,
     ("formats", "store"): 5135,
-    ("studies",): 1600,
+    ("studies",): 1603,
     ("studies/*",): 10991,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6829,
 }
