@@ -135,9 +135,9 @@ def test_draws_in_a_well_that_is_no_spring_name_no_other_scheme(name: str) -> No
     assert found is None or found.scheme in (None, name), found.statement
 
 
-@pytest.mark.parametrize("name", ["bussi", "andersen"])
-def test_few_digits_do_not_say_whether_some_steps_had_no_collision(name: str) -> None:
-    run = driver.run(scene(x=0.1, turn=0.93, steps=1000), f"own:{name}", seed=4)
+@pytest.mark.parametrize(("name", "turn"), [("bussi", 0.93), ("andersen", 0.93), ("baoab", 0.2)])
+def test_few_digits_leave_every_scheme_in_the_list_that_they_cannot_exclude(name: str, turn: float) -> None:
+    run = driver.run(scene(x=0.1, turn=turn, steps=1000), f"own:{name}", seed=4)
     q, p = (x[:, :1].astype(np.float16).astype(float) for x in (run.q, run.p))
     found = of_bath(run.t, q, p, None, scene().m[:1])
     assert found is None or name in [one.scheme for one in found.candidates], found.statement

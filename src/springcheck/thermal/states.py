@@ -184,11 +184,14 @@ def _of_one(
     found: list[Candidate] = []
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
+        turn = 4 * (1 + h / (2 * b))
+        # few digits leave BAOAB's null vector near that of the others
+        blurred = close > 1e-6 and abs(turn - slow) <= 4 * (error + close)
         if half:
             # without a spring these all are one
-            names = ("aboba", "aoboa", *(("baoab", "baoa") if slow < error else ()))
+            more = ("baoab", "baoa") if slow < error else ("baoab",) if blurred else ()
+            names = ("aboba", "aoboa", *more)
             found = likely(names, q, v, h)
-        turn = 4 * (1 + h / (2 * b))
         if -b > h / 2 and not half and decay + error > 0 and abs(turn - slow) <= 4 * error:
             found = likely(("baoab",), q, v, h, turn=turn)
         if not half or close > 1e-6 or slow < error:
