@@ -96,7 +96,9 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
     def clear(found: Thermal | None) -> Thermal | None:
         return found and replace(found, known=found.known and not bent)
 
-    even = _is_even(sizes_left[1] * left[1], u[1:]) and min(map(_together, left)) > EVEN
+    # what is left of a number that takes no noise is rounding
+    apart = min(map(_together, left[sizes_left > NOISE]), default=1.0)
+    even = apart > EVEN and _is_even(sizes_left[1] * left[1], u[1:])
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
@@ -238,7 +240,8 @@ def _of_one(
         return None
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
-        uniform=bool(len(left)) and _is_uniform(left), known=[x.scheme for x in found] != ["bussi-after"],
+        uniform=bool(len(left)) and _is_uniform(left),
+        known=[x.scheme for x in found] != ["bussi-after"] and bool(close <= COARSE),
     )  # fmt: skip
 
 
