@@ -265,8 +265,8 @@ def _elsewhere(
     """The schemes that springcheck does not run of which a known arithmetic explains every step, of the
     fewest steps to a frame."""
     joints = compare(maps, terms, KNOWN_ELSEWHERE, strides) or compare(maps, terms, DAMPED_ELSEWHERE, strides)
-    least = min((x.stride for x in joints), default=1)
-    return _explained(record, moving, maps, [x for x in joints if x.stride == least], terms)
+    each = ([x for x in joints if x.stride == n] for n in sorted({x.stride for x in joints}))
+    return next(filter(None, (_explained(record, moving, maps, some, terms) for some in each)), {})
 
 
 def _known(
