@@ -173,7 +173,7 @@ def _of_coordinates(
         explained = _elsewhere(record, moving, maps, base, FEW)
     elif stride is not None or stated is not None:
         right = {x.scheme for x in explained if agrees(x)}
-        if len(right - {"exact"}) != 1 and not (record.fine and right):
+        if (stride is not None or len(right - {"exact"}) != 1) and not (record.fine and right):
             # what is stated tells more than that the step is a simple one
             strides = FEW if stride is None else range(stride, stride + 1)
             others = _elsewhere(record, moving, maps, base, strides)
