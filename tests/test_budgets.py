@@ -14,7 +14,7 @@ BUDGETS = {
     ("schemes",): 1665,
     ("thermal",): 1826,
     ("engines/own",): 1682,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1225,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1229,
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4478,

@@ -1,4 +1,8 @@
-"""OpenMM's integrators with a heat bath."""
+"""OpenMM's integrators with a heat bath.
+
+All but `DPDIntegrator`, which is no method: its noise is one number a pair, and its friction, 2 gamma
+(1 - r/cutoff)**2, follows the distance r, so that no matrices A and G are its law on a spring.
+"""
 
 from __future__ import annotations
 
