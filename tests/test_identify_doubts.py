@@ -101,6 +101,36 @@ def test_a_scheme_of_the_stated_step_comes_before_others_of_other_steps(
     assert {x.stride for x in found.candidates if x.scheme != "exact"} == {1}
 
 
+def linear_acceleration(q: float, v: float, h: float, c: float) -> State:
+    """Newmark's method with beta = 1/6."""
+    new = (q + h * v - h * h / 3 * K / M * q) / (1 + h * h / 6 * K / M)
+    return new, v - h / 2 * K / M * (q + new)
+
+
+@pytest.mark.parametrize("h", [0.08, 0.1])
+def test_coarse_numbers_of_a_stated_step_leave_open_a_scheme_as_near_to_the_exact_one(h: float) -> None:
+    """On a spring of another stiffness it is of fourth order, as PEFRL is, whose error hardly shows."""
+    q, v = (digits(x, 7) for x in frames(linear_acceleration, h, every=4))
+    found = identify(4 * h * np.arange(401), q, v=v, mass=M, step=h)
+    assert "pefrl" in names(found)
+    assert DOUBT in found.statement
+
+
+def test_of_steps_that_coarse_numbers_do_not_tell_apart_the_fewest_are_not_the_answer() -> None:
+    h = 0.11
+    q, v = (x.astype(np.float32) for x in frames(PEFRL, h, every=10, count=100))
+    found = identify(10 * h * np.arange(101), q, v=v, mass=M)
+    assert (found.scheme, found.stride) == ("pefrl", None)
+    assert {9, 10} <= {x.stride for x in found.candidates}
+
+
+def test_many_steps_of_a_plain_scheme_are_no_plainer_than_few_of_one_that_is_not_run() -> None:
+    """68 steps of velocity Verlet come as near to these frames."""
+    q, v = (digits(x, 8) for x in frames(PEFRL, 0.17, count=100))
+    found = identify(0.17 * np.arange(101), q, v=v, mass=M, stiffness=K)
+    assert (found.candidates[0].scheme, found.candidates[0].stride) == ("pefrl", 1)
+
+
 @pytest.mark.parametrize("number", [7, 8])
 def test_the_exact_flow_in_coarse_text_may_be_any_scheme_whose_error_does_not_show(number: int) -> None:
     h = 0.042

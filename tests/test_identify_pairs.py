@@ -58,6 +58,20 @@ def test_a_pair_that_drifts_through_space_is_named_by_its_distance() -> None:
     assert any("their distance is judged" in note for note in found.notes)
 
 
+def test_a_pair_whose_middle_walks_by_forces_that_are_cut_off_is_named_by_its_distance() -> None:
+    """What fixed point cuts off adds up: it was said to be driven or anharmonic from some frame on."""
+    t, q, v = swing(drift=(0.031, -0.017, 0.023))
+    n = np.arange(N + 1)[:, None]
+    assert named(t, q + 3e-16 * H * n * n / 2, v + 3e-16 * n).scheme == "velocity-verlet"
+
+
+def test_of_a_pair_that_no_scheme_explains_the_distance_is_spoken_of() -> None:
+    """A coordinate of it swings about a place that moves, and is no oscillator."""
+    found = named(*swing(drift=(0.031, -0.017, 0.023), late=True))
+    assert "memory" in found.statement
+    assert any("their distance is judged" in note for note in found.notes)
+
+
 def test_a_pair_in_single_precision_away_from_the_origin_is_named_with_its_arithmetic() -> None:
     """As GROMACS writes it: each coordinate swings about a place that walks."""
     t, q, v = swing(np.float32, centre=9.0)

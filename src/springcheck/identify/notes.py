@@ -86,13 +86,16 @@ def of_few(record: Record, found: Identification) -> Identification:
     )  # fmt: skip
 
 
-def beside_unknown(record: Record, found: Identification, *, stated: bool) -> Identification:
+def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:
     """What was found in coarse numbers, or at coarse times, at a number of steps that nobody stated: what
     lies between two schemes fits as well, and above `CERTAIN_STEPS` names none; of deep ones a list of many
-    steps says so.  What the exact flow fits anything fits whose own error does not show."""
+    steps says so.  What the exact flow fits anything fits whose own error does not show, and where the error
+    of the scheme's step is not plainly `seen` one of about that size fits as well."""
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
-    near = any(x.scheme == "exact" for x in found.candidates) and not (record.fine and clear)
+    # what lies between two schemes that coarse numbers do not tell apart they do not exclude either
+    near = not (found.scheme and seen) or any(x.scheme == "exact" for x in found.candidates)
+    near = near and not (record.fine and clear)
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
     if not found.fits or (certain and not near):
         return found
@@ -102,7 +105,7 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool) -> Id
         else [f"what would tell: {'more digits' if near else 'the step, stated'}"]
     )
     out = replace(found, statement=found.statement + OR_UNKNOWN, notes=(*found.notes, *tells))
-    if found.scheme in (None, "exact") or (found.stride or 0) <= CERTAIN_STEPS:
+    if found.scheme in (None, "exact") or min(x.stride for x in found.candidates) <= CERTAIN_STEPS:
         return out
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 

@@ -26,7 +26,7 @@ from springcheck.identify.compare import compare, nearest
 from springcheck.identify.explain import explain
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, KNOWN_ELSEWHERE, title
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct
+from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import (
@@ -127,7 +127,9 @@ def _of_record(
     if found.fits or stiffness is not None or (pair := distance(record)) is None:
         return found
     other = _of_coordinates(pair, None, friction, step)
-    return replace(other, notes=(*other.notes, OF_A_PAIR)) if other.fits else found
+    # a coordinate of a pair is no oscillator, and what is said of it alone is wrong
+    plainer = other.fits or other.defect_ulp < found.defect_ulp
+    return replace(other, notes=(*other.notes, OF_A_PAIR)) if plainer else found
 
 
 def _of_coordinates(
@@ -169,8 +171,9 @@ def _of_coordinates(
         of_step = stride is None or x.stride == stride
         return of_step and (stated is None or not disagreements(record, moving, x, stated))
 
-    if not explained:
-        explained = _elsewhere(record, moving, maps, base, FEW)
+    if all(x.stride not in FEW for x in explained):
+        # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
+        explained = {**_elsewhere(record, moving, maps, base, FEW), **explained}
     elif stride is not None or stated is not None:
         right = {x.scheme for x in explained if agrees(x)}
         if (stride is not None or len(right - {"exact"}) != 1) and not (record.fine and right):
@@ -205,7 +208,9 @@ def _of_coordinates(
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    found = beside_unknown(record, found, stated=stride is not None)
+    both = zip(maps, base, strict=True)
+    seen = stated is not None or any(visible(x, what, damped=joints[0].damped) for x, what in both)
+    found = beside_unknown(record, found, stated=stride is not None, seen=seen)
     if asked is not None and friction is None and record.mass is not None:
         found = of_stated_friction(found, asked, float(record.mass[moving[0]]))
     if stated is None:
@@ -262,11 +267,9 @@ def _explained(
 def _elsewhere(
     record: Record, moving: list[int], maps: list[Map], terms: list[Terms], strides: range
 ) -> dict[Joint, list[arithmetic.Defect]]:
-    """The schemes that springcheck does not run of which a known arithmetic explains every step, of the
-    fewest steps to a frame."""
+    """The schemes that springcheck does not run of which a known arithmetic explains every step."""
     joints = compare(maps, terms, KNOWN_ELSEWHERE, strides) or compare(maps, terms, DAMPED_ELSEWHERE, strides)
-    each = ([x for x in joints if x.stride == n] for n in sorted({x.stride for x in joints}))
-    return next(filter(None, (_explained(record, moving, maps, some, terms) for some in each)), {})
+    return _explained(record, moving, maps, likely(joints), terms)
 
 
 def _known(

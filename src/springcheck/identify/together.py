@@ -77,7 +77,8 @@ def distance(record: Record) -> Record | None:
     off = np.max(np.abs(np.stack([whole - np.mean(whole, axis=0), pace - along * way])))
     walk = WANDERS
     if record.fine:
-        walk = ALIKE * ROUNDING * np.sqrt(len(v)) * float(np.max(np.abs([q, q2])) / np.min(length))
+        # forces that are cut off, in fixed point, add up from frame to frame
+        walk = ALIKE * ROUNDING * len(v) * float(np.max(np.abs([q, q2])) / np.min(length))
     if not (ratio > 0 and off <= walk * np.max(np.abs([v, v2]))):
         return None
     size = np.abs(way)
