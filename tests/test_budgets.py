@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4478,
-    ("identify",): 7828,
+    ("identify",): 7877,
     ("formats", "store"): 5135,
     ("studies",): 1603,
     ("studies/*",): 10991,

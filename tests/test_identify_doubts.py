@@ -116,6 +116,50 @@ def test_coarse_numbers_of_a_stated_step_leave_open_a_scheme_as_near_to_the_exac
     assert DOUBT in found.statement
 
 
+def theta(share: float) -> Step:
+    def step(q: float, v: float, h: float, c: float) -> State:
+        old, new = (1 - share) * h, share * h
+        x, u = q + old * v, v - old * K / M * q
+        u = (u - new * K / M * x) / (1 + new * new * K / M)
+        return x + new * u, u
+
+    return step
+
+
+def newmark(beta: float, gamma: float) -> Step:
+    def step(q: float, v: float, h: float, c: float) -> State:
+        a = h * h * K / M
+        new = (q + h * v - (0.5 - beta) * a * q) / (1 + beta * a)
+        return new, v - a / h * ((1 - gamma) * q + gamma * new)
+
+    return step
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        (theta(0.6), "theta = 0.6"), (theta(2 / 3), "theta = 0.666667"),
+        (newmark(1 / 6, 0.5), "beta = 0.166667, gamma = 0.5"),
+        (newmark(0.3025, 0.6), "beta = 0.3025, gamma = 0.6"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("stated", [{}, {"stiffness": K}])
+def test_methods_with_a_parameter_are_told_with_it(step: Step, said: str, stated: dict[str, float]) -> None:
+    q, v = frames(step, 0.13, count=100)
+    found = identify(0.13 * np.arange(101), q, v=v, mass=M, **stated)
+    assert not found.fits
+    assert said in found.statement
+
+
+def test_every_other_step_of_a_method_with_a_parameter_shows_none() -> None:
+    """A parameter of a step is not that of two; nor has any map that keeps areas one of Newmark's."""
+    for step in (theta(0.6), newmark(1 / 6, 0.5), newmark(0.3025, 0.6)):
+        q, v = frames(step, 0.13, every=2, count=100)
+        found = identify(0.26 * np.arange(101), q, v=v, mass=M)
+        assert "theta" not in found.statement
+        assert "beta" not in found.statement
+
+
 def test_of_steps_that_coarse_numbers_do_not_tell_apart_the_fewest_are_not_the_answer() -> None:
     h = 0.11
     q, v = (x.astype(np.float32) for x in frames(PEFRL, h, every=10, count=100))

@@ -208,8 +208,8 @@ def _of_coordinates(
         friction = friction if of_rate else None
     kept = {x: explained[x] for x in joints}
     found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    both = zip(maps, base, strict=True)
-    seen = stated is not None or any(visible(x, what, damped=joints[0].damped) for x, what in both)
+    of_maps = zip(maps, base, strict=True)
+    seen = stated is not None or any(visible(x, what, damped=joints[0].damped) for x, what in of_maps)
     found = beside_unknown(record, found, stated=stride is not None, seen=seen)
     if asked is not None and friction is None and record.mass is not None:
         found = of_stated_friction(found, asked, float(record.mass[moving[0]]))

@@ -26,6 +26,10 @@ dies."""
 LASTING = 0.1
 """Share of the largest state that each must have for what dies down to be a memory."""
 
+READ, SHORT = 1e-6, 1200
+"""Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
+
+OF = "if every step was recorded, it is that of "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
 
 FEWEST_WITH_MEMORY = 12
@@ -45,9 +49,10 @@ def misfit(e: Evidence) -> Explanation:
     if closest is not None:
         off = distance(e.found, closest.parts[0])
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
+    kind = _class(e) or growth
+    none = f", but it is none of the known schemes' in up to {STRIDES[1]} steps to a frame"
     return Explanation(
-        cause="One linear map explains the states, but it is none of the known schemes' in up to "
-        f"{STRIDES[1]} steps to a frame: {_class(e) or growth}{near}",
+        cause=f"One linear map explains the states{'' if kind.startswith(OF) else none}: {kind}{near}",
         remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
@@ -59,6 +64,8 @@ def _class(e: Evidence) -> str:
 
     A Runge-Kutta method takes (q, v) by R(h L), which is x + y L with L**2 = -w**2, so that M11 = M22 and
     M12, M21 show (h w)**2; R(i h w) less exp(i h w) is c (i h w)**n with a real c, and order n - 1.
+    The theta method's (1 + (1 - theta) z)/(1 - theta z) gives a real theta.  Newmark's method has
+    M12 = 1/(1 + beta a), M11 = 1 - a M12/2, M22 = 1 - gamma a M12 on (q, h v), and M21 to hold it against.
     """
     if e.terms.mass_unknown:
         return ""
@@ -70,6 +77,20 @@ def _class(e: Evidence) -> str:
         return ""
     size = float(e.found.size[1] / e.found.size[0])
     symmetric = abs(x - u) <= SURE * math.hypot(error[0], error[3]) + 1e-14
+    stated = None
+    if e.stiffness is not None and e.record.mass is not None:
+        stated = e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
+    room = 4 * (SURE * float(np.max(error)) * max(size, 1 / size) + 1e-14)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a = 2 * (1 - x) / y
+        beta, gamma = (1 / y - 1) / a, (1 - u) / (a * y)
+        off = abs(beta - np.rint(SHORT * beta) / SHORT) * a
+    # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring
+    own = (
+        abs(math.remainder(beta * SHORT, 1)) * a < SHORT * room if stated is None else abs(stated - a) < room
+    )
+    if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ * a and e.record.fine:
+        return f"{OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
     growing = f"multiplies areas by 1 {det - 1:+.2e}"
     if symmetric and keeps:
@@ -78,11 +99,13 @@ def _class(e: Evidence) -> str:
     if not symmetric:
         return f"{UNKNOWN_METHOD} {'keeps areas' if keeps else growing}"
     step = math.sqrt(turn)
-    if e.stiffness is not None and e.record.mass is not None:
-        stated = e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
-        if abs(stated / turn - 1) > 1e-6:
-            return ""
-    wrong = complex(x, step * y) - cmath.exp(1j * step)
+    if stated is not None and abs(stated / turn - 1) > 1e-6:
+        return ""
+    w, r = 1j * step, complex(x, step * y)
+    theta = (r - 1 - w) / (w * (r - 1))
+    if abs(theta.imag) * turn < room < READ * turn and e.record.fine:
+        return f"{OF}the theta method with theta = {theta.real:.6g} (implicit Euler 1, trapezoidal rule 1/2)"
+    wrong = r - cmath.exp(1j * step)
     found = {n: wrong / (1j * step) ** n for n in ORDERS}
     real = [n for n, c in found.items() if abs(c.imag) < REAL * abs(c.real)]
     if not real:
