@@ -29,7 +29,7 @@ LASTING = 0.1
 READ, SHORT = 1e-6, 1200
 """Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
 
-OF = "if every step was recorded, it is that of "
+OF = "if every step was recorded, it is that of a one-step method, "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
 
 FEWEST_WITH_MEMORY = 12
@@ -86,9 +86,7 @@ def _class(e: Evidence) -> str:
         beta, gamma = (1 / y - 1) / a, (1 - u) / (a * y)
         off = abs(beta - np.rint(SHORT * beta) / SHORT) * a
     # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring
-    own = (
-        abs(math.remainder(beta * SHORT, 1)) * a < SHORT * room if stated is None else abs(stated - a) < room
-    )
+    own = off < room if stated is None else abs(stated - a) < room
     if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ * a and e.record.fine:
         return f"{OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
