@@ -13,10 +13,11 @@ from rod_bath import ROD, STEP, THERMAL, M
 RATE = 0.5 / STEP
 
 
+@pytest.mark.parametrize("place", ["Reference", "CPU"])
 @pytest.mark.parametrize("thermal", [0.0, THERMAL])
-def test_openmm_takes_the_step(thermal: float, need: Any) -> None:
-    need("openmm:verlet")
-    q, p, kinetic = rod_bath.openmm(*rod_bath.started(30), 60, RATE, thermal, rod_bath.PULL)
+def test_openmm_takes_the_step(thermal: float, place: str, need: Any) -> None:
+    need(f"openmm:verlet@{place}")
+    q, p, kinetic = rod_bath.openmm(*rod_bath.started(30), 60, RATE, thermal, rod_bath.PULL, place)
     departure, draws = rod_bath.judged(q, p, RATE, thermal, rod_bath.PULL)
     assert departure <= 1
     assert kinetic == pytest.approx(np.sum(p * p / (2 * M), axis=(1, 2)), rel=1e-13)

@@ -62,7 +62,9 @@ def started(n: int) -> tuple[Any, Any]:
     return q, ROD.projected(q, np.sqrt(THERMAL * M) * rng.normal(size=q.shape))
 
 
-def openmm(q: Any, p: Any, steps: int, rate: float, thermal: float, pull: Any) -> Any:
+def openmm(
+    q: Any, p: Any, steps: int, rate: float, thermal: float, pull: Any, place: str = "Reference"
+) -> Any:
     """States (f, n, 6) as it stores them, and the kinetic energies that it reports (f,)."""
     import openmm as mm
 
@@ -78,7 +80,7 @@ def openmm(q: Any, p: Any, steps: int, rate: float, thermal: float, pull: Any) -
     integrator = mm.LangevinMiddleIntegrator(thermal / (1.380649e-26 * 6.02214076e23), rate, STEP)
     integrator.setConstraintTolerance(TOLERANCE)
     integrator.setRandomNumberSeed(3)
-    context = mm.Context(system, integrator, mm.Platform.getPlatformByName("Reference"))
+    context = mm.Context(system, integrator, mm.Platform.getPlatformByName(place))
     context.setPositions(q.reshape(-1, 3))
     context.setVelocities((p / M).reshape(-1, 3))
     x, v, found = np.empty((2 * len(q), 3)), np.empty((2 * len(q), 3)), []
