@@ -19,6 +19,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
 from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, law_of, one_rounding, read
+from springcheck.thermal.stepper import forces
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""
@@ -119,15 +120,21 @@ def noise_map(subject: Seeded) -> Finding | str:
     size_p = np.sqrt(scene.m * scene.thermal)
     pushes = np.concatenate([np.diag(abs(scene.step) * size_p / scene.m), np.diag(size_p)])
     base = subject.run(scene, 2)
-    force, none = scene.system.potential_force, np.zeros(scene.n, np.longdouble)
-    rest, worst = force(none, none), 0.0
+    none, worst = np.zeros(scene.n, np.longdouble), 0.0
+
+    def without_rest(terms: Any) -> Any:
+        force = scene.system.force_of(terms)
+        rest = force(none, none)
+        return lambda q, p: force(q, p) - rest
+
+    force = forces(scheme, scene.system, without_rest)
     for i, push in enumerate(pushes):
         dq, dp = (push, 0 * push) if i < scene.n else (0 * push, push)
         other = subject.run(replace(scene, q=scene.q + dq, p=scene.p + dp), 2)
         # the second step: the draw of a start that acts again is then in both
         d = [(a - b)[1:].astype(np.longdouble) for a, b in ((other.q, base.q), (other.p, base.p))]
         draws = [none] * scheme.draws
-        ideal = subject.stepper(scene)(d[0][0], d[1][0], lambda q, p: force(q, p) - rest, draws)
+        ideal = subject.stepper(scene)(d[0][0], d[1][0], force, draws)
         both = [subject.allowed(run, 1) for run in (base, other)]
         allowed = both[0][0] + both[1][0], both[0][1] + both[1][1]
         worst = max(worst, _off((d[0][1], d[1][1]), ideal, allowed))
@@ -223,14 +230,15 @@ def noise_matrix(subject: Seeded) -> Finding | str:
         run = subject.run(scene, 1, Script(unit))
         draws = [np.full(scene.n, np.longdouble(x)) for x in unit]
         start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
-        ideal = subject.stepper(scene)(*start, scene.system.potential_force, draws)
+        pull = forces(scheme, scene.system)
+        ideal = subject.stepper(scene)(*start, pull, draws)
         factor: Any = True
         if scheme.rescales:
             force = scene.system.potential_force if scheme.rescales_after else lambda q, p: 0 * q
             both = [subject.stepper(scene)(*start, force, draws, hit)[1] for hit in (None, 1.0)]
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
         # of a noise that comes of 1 - c, taken from c
-        none = subject.stepper(scene)(*start, scene.system.potential_force, [0 * x for x in draws])
+        none = subject.stepper(scene)(*start, pull, [0 * x for x in draws])
         lost = run.arithmetic.unit / min(1.0, scene.bath.friction * scene.step)
         allowed = [
             x + lost * np.abs(y - z)

@@ -153,7 +153,8 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
 
 
 _ACTS = {
-    "kick": "p = p + {c} h F", "held": "p = p + {c} h F, as it was last evaluated",
+    "kick": "p = p + {c} h F", "slow": "p = p + {c} h F of slow terms",
+    "fast": "p = p + {c} h F of fast terms", "held": "p = p + {c} h F, as it was last evaluated",
     "drift": "q = q + {c} h p/m",
     "exchange": "p = c p + sqrt((1 - c**2) m kT) xi, c of x = gamma h", "damp": "p = (1 - {c}) p",
     "undamp": "p = p / (1 + {c})", "noise": "p = p + {c} sqrt(2 x m kT) xi",

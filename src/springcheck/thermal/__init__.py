@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from springcheck import schemes
-from springcheck.thermal.catalogue import THERMOSTATS, Stepper, Thermostat
+from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
 from springcheck.thermal.laws import Law
+from springcheck.thermal.stepper import Stepper
 
 __all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat"]
 

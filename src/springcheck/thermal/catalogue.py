@@ -1,4 +1,4 @@
-"""Thermostats as data: the stages of random schemes, written once, and one step of any of them.
+"""Thermostats as data: the stages of random schemes, written once.
 
 A step takes draws: independent numbers of mean 0 and variance 1, some of which may be those of the step
 before.  Coefficients are functions of x = gamma h, the friction rate times the step; exact if rational.
@@ -14,7 +14,7 @@ Phys. 126 (2007) 014101, and the sign: Bussi & Parrinello, Comput. Phys. Commun.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
@@ -22,7 +22,6 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import Force, Reals
 from springcheck.thermal.chain import FOURTH, SIXTH, Chain
 from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
@@ -37,6 +36,8 @@ class Act(NamedTuple):
 
     kind: Literal[
         "kick",
+        "slow",
+        "fast",
         "held",
         "drift",
         "exchange",
@@ -91,6 +92,11 @@ class Thermostat:
         return any(act.kind == "collide" for act in self.acts)
 
     @property
+    def splits(self) -> bool:
+        """Whether it kicks by slow and by fast terms apart."""
+        return any(act.kind == "fast" for act in self.acts)
+
+    @property
     def rescales_after(self) -> bool:
         """Whether that factor comes after kicks and drifts."""
         return self.rescales and self.acts[0].kind == "kick"
@@ -111,101 +117,6 @@ def value_of(part: Part, x: Any) -> Any:
     if callable(part):
         return part(x)
     return x.dtype.type(part.numerator) / x.dtype.type(part.denominator)
-
-
-class Stepper:
-    """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
-
-    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
-    on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
-    With `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the
-    roundings of a step, bounds its rounding.
-    """
-
-    def __init__(
-        self, scheme: Thermostat, *, h: float, m: Reals, rate: float, thermal: float, width: Any,
-        absolute: bool = False, freedoms: int = 0,
-    ) -> None:  # fmt: skip
-        self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
-        if scheme.chain:
-            freedoms = freedoms or self.m.size
-            Q = scheme.chain.masses(freedoms, width(thermal), width(rate))
-            self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
-            self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
-        x = np.asarray(self.h * width(rate), width)
-        self.collision = float(-np.expm1(-x))
-        size = np.sqrt(self.m * width(thermal))
-        shot = np.sqrt(2 * x) * size
-        sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
-        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
-        self._moved = len(moves) - moves[::-1].index(True)
-        self._acts, self._sign = [], 1 if absolute else -1
-        for kind, part, number in scheme.acts:
-            c = value_of(part, x)
-            lost = part.lost(x) if isinstance(part, Decay) else 1 - c
-            noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
-            if kind in ("rescale", "scale"):
-                noise = lost * width(thermal)
-            if absolute and kind != "undamp":
-                c = -np.abs(c) if kind == "damp" else np.abs(c)
-            self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
-
-    def __call__(
-        self,
-        q: Reals,
-        p: Reals,
-        force: Force,
-        draws: Sequence[Any],
-        hit: Any = None,
-        end: Reals | None = None,
-    ) -> tuple[Reals, Reals]:
-        """One step from (q, p), each (..., n).
-
-        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place, or is
-        the factor of all momenta, which else comes of the draws.  A force after the last drift is taken at
-        `end`, where it is known: draws of other particles act there.
-        """
-        m, h, last, q_old = self.m, self.h, p, q
-        for i, (kind, c, noise, number) in enumerate(self._acts):
-            if kind == "drift":
-                q = q + c * (p / m)
-            elif kind == "kick":
-                last = force(q if end is None or i < self._moved else end, np.zeros_like(p))
-                p = p + (c * h) * last
-            elif kind == "exchange":
-                p = c * p + noise * draws[number]
-            elif kind == "noise":
-                p = p + c * draws[number]
-            elif kind == "damp":
-                p = p * (1 - c)
-            elif kind == "undamp":
-                p = p / (np.abs(1 + c) if self._sign > 0 else 1 + c)
-            elif kind == "jump":
-                q = q + c * draws[number]
-            elif kind == "held":
-                p = p + (c * h) * last
-            elif kind == "creep":
-                q = q + c * force(q, np.zeros_like(p)) / m
-            elif kind == "chain" and hit is None:
-                self.chain, factor = self._swing(
-                    self.chain, np.sum(p * p / m, axis=-1), c * h, **self.of_chain
-                )
-                p = p * np.expand_dims(factor, -1)
-            elif kind in ("rescale", "scale", "chain"):
-                p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
-            elif kind == "rebuild":
-                p = m * ((q + self._sign * q_old) / h)
-            else:
-                p = np.where(hit, noise * draws[number] + (self._sign > 0) * p, p)
-        return q, p
-
-    def _factor(self, p: Reals, c: Any, lost: Any, xi: Any, signed: bool) -> Any:
-        """What all momenta are multiplied by (..., 1), by a draw for each: Bussi & Parrinello 2008; `lost` is
-        (1 - c) kT."""
-        share = lost / np.sum(p * p / self.m, axis=-1, keepdims=True)
-        first = xi[..., :1] + np.sqrt(c / share)
-        size = np.sqrt(share * (first * first + np.sum(xi[..., 1:] ** 2, axis=-1, keepdims=True)))
-        return np.where(first < 0, -size, size) if signed else size
 
 
 def splitting(letters: str) -> tuple[Act, ...]:
@@ -238,6 +149,19 @@ def _by_letters(letters: str) -> Thermostat:
     return Thermostat(
         name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=splitting(letters),
         draws=letters.count("O"), synchronised=letters != "BAOA", source="Leimkuhler & Matthews 2013",
+    )  # fmt: skip
+
+
+def _by_groups(substeps: int) -> Thermostat:
+    """BAOAB of fast terms, so often between two half kicks of slow ones."""
+    share, slow = Fraction(1, 2 * substeps), Act("slow", HALF)
+    acts = [slow]
+    for j in range(substeps):
+        inner = Act("fast", share), Act("drift", share)
+        acts += [*inner, Act("exchange", decay(substeps), j), *inner[::-1]]
+    return Thermostat(
+        name=f"baoab-respa{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
+        acts=(*acts, slow), draws=substeps, source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
     )  # fmt: skip
 
 
@@ -300,6 +224,7 @@ _VEC_NOISE = (
 )
 
 _OTHERS = (
+    _by_groups(2),
     Thermostat(
         name="bbk", title="BBK, each random force used in two half kicks",
         acts=(

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import ENERGY_LEFT, Stepper, Thermostat, value_of
+from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
 from springcheck.thermal.laws import Law
+from springcheck.thermal.stepper import Stepper, forces
 
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
@@ -68,8 +69,16 @@ class Reading:
 def law_of(scheme: Thermostat, scene: Scene) -> Law:
     """The law of a scheme on each particle by itself, with its own curvature at the start."""
     assert scene.bath is not None
-    k = np.asarray(scene.system.hessian_diagonal(scene.q.astype(np.longdouble)), np.longdouble)
-    return Law(scheme=scheme, h=scene.step, m=scene.m, k=k, rate=scene.bath.friction, thermal=scene.thermal)
+    q = scene.q.astype(np.longdouble)
+    # of all terms, and of fast ones
+    all_k, fast = (
+        np.asarray(one.system.hessian_diagonal(q), np.longdouble)
+        for one in (scene, scene.derived(terms=scene.system.fast))
+    )
+    return Law(
+        scheme=scheme, h=scene.step, m=scene.m, k=all_k, rate=scene.bath.friction, thermal=scene.thermal,
+        fast=fast,
+    )  # fmt: skip
 
 
 def read(
@@ -90,7 +99,8 @@ def one_rounding(
     """One rounding of everything that a step of absolute values adds up, of q and of p (..., n)."""
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
-    q, p = sizer(size, np.abs(start[1]), scene.system.magnitude(), draws, hit)
+    sizes = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(terms=terms))
+    q, p = sizer(size, np.abs(start[1]), sizes, draws, hit)
     if how.cancels:
         # coefficients of all that is added to q, and of p
         lost = max(x, 1 / x) ** how.cancels
@@ -113,6 +123,7 @@ class _Reader:
         about["freedoms"] = scheme.freedoms(scene.n, scene.particles)
         self.stepper = Stepper(scheme, **about, width=np.longdouble)
         self.sizer = Stepper(scheme, **about, width=np.longdouble, absolute=True)
+        self._force = forces(scheme, scene.system)
         self.roundings = IN_AND_OUT + PER_ACT * len(scheme.acts)
         self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)
 
@@ -238,9 +249,6 @@ class _Reader:
             squares = J @ squares @ J.T + np.diag((new / usual).astype(np.float64) ** 2)
         none = np.empty((0, len(m)))
         return self._reading(none, across, none)
-
-    def _force(self, q: Reals, p: Reals) -> Reals:
-        return self.scene.system.potential_force(q, p)
 
     def _allowed(
         self, start: tuple[Extended, Extended], draws: Any, hit: Any = True

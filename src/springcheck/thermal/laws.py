@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Floats, Reals
-from springcheck.thermal.catalogue import Stepper, Thermostat
+from springcheck.thermal.catalogue import Thermostat
+from springcheck.thermal.stepper import Stepper
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +29,8 @@ class Branch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T] and thermal energy kT."""
+    """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T] and thermal energy kT;
+    `fast` (n,) of k are those of fast terms."""
 
     scheme: Thermostat
     h: float
@@ -36,6 +38,7 @@ class Law:
     k: Reals
     rate: float
     thermal: float
+    fast: Reals | float = 0.0
 
     @cached_property
     def collision(self) -> float:
@@ -61,7 +64,9 @@ class Law:
         stepper = Stepper(
             self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
         )
-        a, b = stepper(q, p, lambda q, p: -k * q, list(draws), hit)
+        parts = {"slow": lambda q, p: (self.fast - k) * q, "fast": lambda q, p: -self.fast * q}
+        whole = parts if self.scheme.splits else lambda q, p: -k * q
+        a, b = stepper(q, p, whole, list(draws), hit)
         both = np.stack([a, b], axis=0).transpose(2, 0, 1)
         return Branch(chance=chance, A=both[:, :, :2], G=both[:, :, 2:])
 

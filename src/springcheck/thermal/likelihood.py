@@ -110,18 +110,20 @@ def likely(
 def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
     """The first scheme of which every few steps fall short of the best candidate by less than `ODDS`.
 
-    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them.
+    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them;
+    so it is with each step of one that takes fast terms apart, at some share of them.
     """
     from scipy.optimize import minimize
 
     moments, n = _moments(q, v)
-    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2])
+    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2, 1.0])
 
     def minus(name: str, every: int, at: Floats) -> float:
-        x, thermal, a = np.exp(at)
+        x, thermal, a, odds = np.exp([*at, 0.0][:4])
+        k = a / h**2 * np.ones(1)
         law = Law(
-            scheme=THERMOSTATS[name], h=h / every, m=np.ones(1), k=a / h**2 * np.ones(1), rate=float(x) / h,
-            thermal=float(thermal),
+            scheme=THERMOSTATS[name], h=h / every, m=np.ones(1), k=k, rate=float(x) / h,
+            thermal=float(thermal), fast=odds / (1 + odds) * k,
         )  # fmt: skip
         S = law.covariance[0]
         if not np.isfinite(S).all():
@@ -131,10 +133,11 @@ def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] 
 
     least = minus(best.scheme, 1, start)
     how = {"xatol": 1e-3, "fatol": 1e-2, "maxiter": 300}
-    for every in (2, 3, 4, 8):
-        for name in (x for x, one in THERMOSTATS.items() if not one.rescales):
+    for every in (1, 2, 3, 4, 8):
+        for name in (x for x, one in THERMOSTATS.items() if not one.rescales and one.splits == (every == 1)):
+            some = start if every == 1 else start[:3]
             with np.errstate(all="ignore"):
-                fit: Any = minimize(partial(minus, name, every), start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
+                fit: Any = minimize(partial(minus, name, every), some, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
             if fit.fun - least < ODDS:
                 return name, every
     return None

@@ -117,6 +117,10 @@ ENGINE = Engine(
             _ON_A_LINE, default=False,
         ),
         thermostat(
+            "mts-langevin-2", "baoab-respa2", "MTSLangevinIntegrator, fast springs twice a step", _DRAWS,
+            _ON_A_LINE, default=False,
+        ),
+        thermostat(
             "variable-langevin", "baoa",
             "VariableLangevinIntegrator, its longest step that of the scene, at a tolerance that allows it",
             _DRAWS, _ON_A_LINE, default=False, rebuilds_velocity=True,

@@ -34,9 +34,10 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
         return mm.NoseHooverIntegrator(temperature, rate, step)
     elif name == "mts-langevin":
         noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1)])
-        made.setGlobalVariableByName("kT", scene.thermal)
         for force in system.getForces():
             force.setForceGroup(0)
+    elif name == "mts-langevin-2":
+        noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1), (1, 2)])
     elif name == "variable-langevin":
         noise = made = mm.VariableLangevinIntegrator(temperature, rate, LOOSE)
         made.setStepSize(step)
@@ -44,5 +45,7 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
     else:
         kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
         noise = made = kind(temperature, rate, step)
+    if name.startswith("mts"):
+        made.setGlobalVariableByName("kT", scene.thermal)
     noise.setRandomNumberSeed(seed)
     return made

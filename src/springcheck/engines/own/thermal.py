@@ -9,6 +9,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS, Stepper
+from springcheck.thermal.stepper import forces
 
 MOST_DRAWS = 1 << 16
 """Draws that are made at once: each step takes its own in the order of the steps, however many at once."""
@@ -31,8 +32,8 @@ class Random:
             width=np.float64,
             freedoms=self._scheme.freedoms(scene.n, scene.particles),
         )
-        self._force = scene.system.potential_force
-        self._each = sum(act.kind in ("kick", "creep") for act in self._scheme.acts)
+        self._force = forces(self._scheme, scene.system)
+        self._each = sum(act.kind in ("kick", "slow", "fast", "creep") for act in self._scheme.acts)
         scripted = hasattr(seed, "standard_normal")
         self._rng = seed if scripted else np.random.Generator(np.random.PCG64(seed))
         # collisions take numbers of their own, far along the same sequence

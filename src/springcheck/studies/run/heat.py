@@ -10,6 +10,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import Heated
 from springcheck.thermal import THERMOSTATS, Law
+from springcheck.thermal.draws import law_of
 
 SETTLED = 5.0
 """Times over which the slowest part of the motion decays before frames count: exp(-5) of a start is left in
@@ -64,10 +65,16 @@ class Heat:
         assert scene.bath is not None
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
-            self._law = Law(
-                scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n), k=scene.system.modes.w2,
-                rate=scene.bath.friction, thermal=scene.thermal,
-            )  # fmt: skip
+            if not THERMOSTATS[piece.scheme].splits:
+                self._law = Law(
+                    scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n),
+                    k=scene.system.modes.w2, rate=scene.bath.friction, thermal=scene.thermal,
+                )  # fmt: skip
+            elif scene.system.is_separate:
+                # modes of all terms are not those of the fast ones
+                self._law = law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
+            else:
+                return
             left = self._law.slowest
             self._from = round(SETTLED / -np.log(left)) if 0 < left < 1 else 0
 

@@ -1,0 +1,121 @@
+"""One step of any random scheme, by its stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from springcheck.physics.arrays import Force, Reals
+from springcheck.physics.system import System
+from springcheck.physics.term import Term
+from springcheck.thermal.catalogue import Thermostat, value_of
+from springcheck.thermal.decays import Decay
+
+
+def forces(
+    scheme: Thermostat, system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None
+) -> Any:
+    """What the stages of a scheme push by, as `of` makes it of terms: one force, or those of slow and fast
+    terms by these names."""
+    of = of or system.force_of
+    if scheme.splits:
+        return {"slow": of(system.slow), "fast": of(system.fast)}
+    return of([term for term in system.terms if term.kind == "potential"])
+
+
+class Stepper:
+    """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
+
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
+    on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
+    With `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the
+    roundings of a step, bounds its rounding.
+    """
+
+    def __init__(
+        self, scheme: Thermostat, *, h: float, m: Reals, rate: float, thermal: float, width: Any,
+        absolute: bool = False, freedoms: int = 0,
+    ) -> None:  # fmt: skip
+        self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
+        if scheme.chain:
+            freedoms = freedoms or self.m.size
+            Q = scheme.chain.masses(freedoms, width(thermal), width(rate))
+            self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
+            self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
+        x = np.asarray(self.h * width(rate), width)
+        self.collision = float(-np.expm1(-x))
+        size = np.sqrt(self.m * width(thermal))
+        shot = np.sqrt(2 * x) * size
+        sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
+        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
+        self._moved = len(moves) - moves[::-1].index(True)
+        self._acts, self._sign = [], 1 if absolute else -1
+        for kind, part, number in scheme.acts:
+            c = value_of(part, x)
+            lost = part.lost(x) if isinstance(part, Decay) else 1 - c
+            noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
+            if kind in ("rescale", "scale"):
+                noise = lost * width(thermal)
+            if absolute and kind != "undamp":
+                c = -np.abs(c) if kind == "damp" else np.abs(c)
+            self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
+
+    def __call__(
+        self,
+        q: Reals,
+        p: Reals,
+        force: Any,
+        draws: Sequence[Any],
+        hit: Any = None,
+        end: Reals | None = None,
+    ) -> tuple[Reals, Reals]:
+        """One step from (q, p), each (..., n), by what `forces` gives.
+
+        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place, or is
+        the factor of all momenta, which else comes of the draws.  A force after the last drift is taken at
+        `end`, where it is known: draws of other particles act there.
+        """
+        m, h, last, q_old = self.m, self.h, p, q
+        for i, (kind, c, noise, number) in enumerate(self._acts):
+            if kind == "drift":
+                q = q + c * (p / m)
+            elif kind in ("kick", "slow", "fast"):
+                push = force if kind == "kick" else force[kind]
+                last = push(q if end is None or i < self._moved else end, np.zeros_like(p))
+                p = p + (c * h) * last
+            elif kind == "exchange":
+                p = c * p + noise * draws[number]
+            elif kind == "noise":
+                p = p + c * draws[number]
+            elif kind == "damp":
+                p = p * (1 - c)
+            elif kind == "undamp":
+                p = p / (np.abs(1 + c) if self._sign > 0 else 1 + c)
+            elif kind == "jump":
+                q = q + c * draws[number]
+            elif kind == "held":
+                p = p + (c * h) * last
+            elif kind == "creep":
+                q = q + c * force(q, np.zeros_like(p)) / m
+            elif kind == "chain" and hit is None:
+                self.chain, factor = self._swing(
+                    self.chain, np.sum(p * p / m, axis=-1), c * h, **self.of_chain
+                )
+                p = p * np.expand_dims(factor, -1)
+            elif kind in ("rescale", "scale", "chain"):
+                p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
+            elif kind == "rebuild":
+                p = m * ((q + self._sign * q_old) / h)
+            else:
+                p = np.where(hit, noise * draws[number] + (self._sign > 0) * p, p)
+        return q, p
+
+    def _factor(self, p: Reals, c: Any, lost: Any, xi: Any, signed: bool) -> Any:
+        """What all momenta are multiplied by (..., 1), by a draw for each: Bussi & Parrinello 2008; `lost` is
+        (1 - c) kT."""
+        share = lost / np.sum(p * p / self.m, axis=-1, keepdims=True)
+        first = xi[..., :1] + np.sqrt(c / share)
+        size = np.sqrt(share * (first * first + np.sum(xi[..., 1:] ** 2, axis=-1, keepdims=True)))
+        return np.where(first < 0, -size, size) if signed else size
