@@ -15,7 +15,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.studies.run.heat import heated_of
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.states import identify_thermal
+from springcheck.thermal.likelihood import TWO, likely
 
 LABELS = ("own:baoab-respa2", "openmm:mts-langevin-2")
 
@@ -76,21 +76,15 @@ def test_joined_particles_have_no_law_by_modes() -> None:
     assert found.kinetic > 0
 
 
-def test_a_file_of_it_is_not_named_after_another_scheme() -> None:
-    """By two draws a step, which Vanden-Eijnden & Ciccotti's scheme would explain as well."""
+def test_a_file_of_it_is_told_with_its_share_of_fast_springs() -> None:
     scene = two_scales(steps=1000)
-    run = driver.run(replace(scene, step=0.25), LABELS[0], seed=3)
-    for j, m in enumerate(scene.m):
-        found = identify_thermal(run.t, run.q[:, j], run.p[:, j] / m)
-        assert found is None or not found.named
-    slow = WallSpring(i=np.arange(1), k=np.array([2.9]), at=np.zeros(1))
-    alone = replace(
-        scene, m=scene.m[:1], q=scene.q[:1], p=scene.p[:1], terms=(slow,), step=0.76 / np.sqrt(2.9 / 3.7),
-        bath=Bath(temperature=1.7, friction=0.16 / (0.76 / np.sqrt(2.9 / 3.7))),
-    )  # fmt: skip
-    run = driver.run(alone, LABELS[0], seed=3)
-    found = identify_thermal(run.t, run.q[:, 0], run.p[:, 0] / 3.7)
-    assert found is not None
-    assert found.candidates[0].scheme == "vanden-eijnden-ciccotti"
-    assert found.sparser == ("baoab-respa2", 1)
-    assert not found.named
+    run = driver.run(scene, LABELS[0], seed=3)
+    for j, fast in enumerate([41 / 43.9, 17 / 18.1]):
+        found = likely(TWO, run.q[:, j], run.p[:, j] / scene.m[j], scene.step)
+        assert found[0].scheme == "baoab-respa2"
+        assert found[1].nats > 13.8
+        assert found[0].fast == pytest.approx(fast, abs=0.1)
+    other = driver.run(scene, "own:obabo", seed=3)
+    found = likely(TWO, other.q[:, 0], other.p[:, 0] / scene.m[0], scene.step)
+    assert found[0].scheme == "obabo"
+    assert {x.scheme: x.nats for x in found}["baoab-respa2"] > 13.8

@@ -69,8 +69,7 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
             "frames, may tell them apart"
         )
     if sparse := next((one.sparser for one in found if one.sparser), None):
-        which = f"every step {sparse[1]} of {sparse[0]}" if sparse[1] > 1 else sparse[0]
-        notes.append(f"{which} would leave such frames nearly as well")
+        notes.append(f"every step {sparse[1]} of {sparse[0]} would leave such frames nearly as well")
     if first.free:
         combination = ", ".join(f"{x:.9g}" for x in first.free)
         notes.append(f"free of noise at every step: ({combination}) on (x', v', x, v), to {first.misfit:.0e}")

@@ -20,7 +20,7 @@ from springcheck.thermal.laws import Law
 ODDS = float(np.log(1e6))
 """Nats by which one scheme must beat every other to be named."""
 
-TWO = ("obabo", "oabao", "boaob", "vanden-eijnden-ciccotti")
+TWO = ("obabo", "oabao", "boaob", "vanden-eijnden-ciccotti", "baoab-respa2")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +36,8 @@ class Candidate:
     thermal: float = nan
     """kT/m [L2/T2]."""
     thermal_error: float = nan
+    fast: float = 0.0
+    """Share of fast terms in omega**2."""
     nats: float = 0.0
     """By how much its likelihood falls short of the best one's."""
 
@@ -52,17 +54,18 @@ def likely(
     moments, n = _moments(q, v)
     single = names[0] not in TWO
 
+    def share(at: Floats) -> float:
+        # the last number of a scheme that takes them apart: fast terms over slow ones
+        return float(1 / (1 + np.exp(-at[-1])))
+
     def minus(name: str, at: Floats) -> float:
         a = turn if turn is not None else float(np.exp(at[2]))
-        one = np.ones(1)
+        k = a / h**2 * np.ones(1)
+        fast = share(at) if THERMOSTATS[name].splits else 0.0
         law = Law(
-            scheme=THERMOSTATS[name],
-            h=h,
-            m=one,
-            k=a / h**2 * one,
-            rate=float(np.exp(at[0])) / h,
-            thermal=float(np.exp(at[1])),
-        )
+            scheme=THERMOSTATS[name], h=h, m=np.ones(1), k=k, rate=float(np.exp(at[0])) / h,
+            thermal=float(np.exp(at[1])), fast=fast * k,
+        )  # fmt: skip
         A, G = law.A[0].astype(float), law.G[0].astype(float)
         Q = G @ G.T
         if not single:
@@ -81,7 +84,8 @@ def likely(
         with np.errstate(all="ignore"):
             of_name: Any = partial(minus, name)
             how = {"xatol": 1e-7, "fatol": 1e-7, "maxiter": 2000}
-            fit: Any = minimize(of_name, start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
+            first = [*start, 0.0] if THERMOSTATS[name].splits else start
+            fit: Any = minimize(of_name, first, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
             errors = _errors(of_name, fit.x)
         of_a = turn if turn is not None else float(np.exp(fit.x[2]))
         w, rate, thermal = float(np.sqrt(of_a) / h), float(np.exp(fit.x[0]) / h), float(np.exp(fit.x[1]))
@@ -94,6 +98,7 @@ def likely(
                 friction_error=float(rate * errors[0]),
                 thermal=thermal,
                 thermal_error=float(thermal * errors[1]),
+                fast=share(fit.x) if THERMOSTATS[name].splits else 0.0,
                 nats=float(fit.fun),
             )
         )
@@ -101,7 +106,7 @@ def likely(
     if not single:
         free = moments[:2, :2] - A @ moments[2:, :2]
         floor = n / 2 * (float(np.log(np.linalg.det(free))) + 2)
-        # seven numbers less three: 25 nats more come about by chance once in 1e9 times
+        # seven numbers less three or four: 25 nats more come about by chance once in 1e9 times
         if not best - floor < 25:
             return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
@@ -110,20 +115,19 @@ def likely(
 def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
     """The first scheme of which every few steps fall short of the best candidate by less than `ODDS`.
 
-    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them;
-    so it is with each step of one that takes fast terms apart, at some share of them.
+    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them.
     """
     from scipy.optimize import minimize
 
     moments, n = _moments(q, v)
-    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2, 1.0])
+    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2])
 
-    def minus(name: str, every: int, at: Floats) -> float:
-        x, thermal, a, odds = np.exp([*at, 0.0][:4])
+    def minus(name: str, every: int, at: Floats, fast: float = 0.0) -> float:
+        x, thermal, a = np.exp(at)
         k = a / h**2 * np.ones(1)
         law = Law(
             scheme=THERMOSTATS[name], h=h / every, m=np.ones(1), k=k, rate=float(x) / h,
-            thermal=float(thermal), fast=odds / (1 + odds) * k,
+            thermal=float(thermal), fast=fast * k,
         )  # fmt: skip
         S = law.covariance[0]
         if not np.isfinite(S).all():
@@ -131,13 +135,12 @@ def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] 
         A = law.autocovariance(every)[0] @ np.linalg.inv(S)
         return _nats(A, S - A @ S @ A.T, moments, n)
 
-    least = minus(best.scheme, 1, start)
+    least = minus(best.scheme, 1, start, best.fast)
     how = {"xatol": 1e-3, "fatol": 1e-2, "maxiter": 300}
-    for every in (1, 2, 3, 4, 8):
-        for name in (x for x, one in THERMOSTATS.items() if not one.rescales and one.splits == (every == 1)):
-            some = start if every == 1 else start[:3]
+    for every in (2, 3, 4, 8):
+        for name in (x for x, one in THERMOSTATS.items() if not (one.rescales or one.splits)):
             with np.errstate(all="ignore"):
-                fit: Any = minimize(partial(minus, name, every), some, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
+                fit: Any = minimize(partial(minus, name, every), start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
             if fit.fun - least < ODDS:
                 return name, every
     return None
