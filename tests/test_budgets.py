@@ -12,17 +12,17 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 6768,
     ("schemes",): 1665,
-    ("thermal",): 1826,
-    ("engines/own",): 1682,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1229,
+    ("thermal",): 1892,
+    ("engines/own",): 1683,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1236,
     ("engines",): 2607,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4478,
+    ("checks",): 4486,
     ("identify",): 7877,
     ("formats", "store"): 5135,
     ("studies",): 1603,
-    ("studies/*",): 10991,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6829,
+    ("studies/*",): 10998,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6830,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
