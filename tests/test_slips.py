@@ -114,6 +114,8 @@ def test_numbers_names_and_options_that_serve_nothing(
         ("run spring --forse", "did you mean --force?"),
         ("run spring --metod=own:euler", "did you mean --method?"),
         ("run spring --method own:eular", "did you mean own:euler?"),
+        ("run spring --method openmm:verlet@cpu", "did you mean openmm:verlet@CPU?"),
+        ("run spring --method own:euler@cpu", "springcheck has no platforms: own:euler is all"),
         ("run spring --method opemm:verlet", "did you mean openmm"),
         ("inspect a.h5 --trajectory own:eular", "did you mean own:euler?"),
     ],

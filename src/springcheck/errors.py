@@ -87,8 +87,9 @@ def nearest(word: str, known: Iterable[str], before: str = "") -> str:
 
     # the time that a comparison takes grows with the square of the lengths
     short = (one for one in known if len(one) <= LONGEST_WORD)
-    close = get_close_matches(word[:LONGEST_WORD], list(islice(short, MOST_WORDS)), n=1)
-    return f", did you mean {before}{close[0]}?" if close else ""
+    folded = {one.casefold(): one for one in islice(short, MOST_WORDS)}
+    close = get_close_matches(word[:LONGEST_WORD].casefold(), folded, n=1)
+    return f", did you mean {before}{folded[close[0]]}?" if close else ""
 
 
 class StoreWarning(UserWarning):

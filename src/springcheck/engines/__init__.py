@@ -188,8 +188,9 @@ def parse(text: str) -> Label:
         near = nearest(method, every, f"{name}:")
         raise MethodError(f"unknown method {text!r}{near}; {found.title} has {known}")
     if "@" in text and place not in found.platforms:
-        known = ", ".join(found.platforms) or "none"
-        raise MethodError(f"unknown platform {place!r} in {text!r}; {found.title} has: {known}")
+        known, near = ", ".join(found.platforms), nearest(place, found.platforms, f"{name}:{method}@")
+        has = f"has: {known}" if known else f"has no platforms: {name}:{method} is all"
+        raise MethodError(f"unknown platform {place!r} in {text!r}{near}; {found.title} {has}")
     platform, _, precision = place.partition("-")
     return Label(engine=name, method=method, platform=platform, precision=precision)
 
