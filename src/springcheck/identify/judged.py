@@ -40,9 +40,10 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
         return record, rough[:1], [maps[rough[0]]], notes
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:
-            j = lost[0] if lost else free[0]
             raise IdentificationError(
-                f"no force acts on oscillator {j}: every scheme moves it in a straight line"
+                f"the velocities of oscillator {lost[0]} do not depend on its positions: no spring moves it"
+                if lost
+                else f"no force acts on oscillator {free[0]}: every scheme moves it in a straight line"
             )
         if proportion := _proportional(record, lost[0]):
             raise IdentificationError(f"the velocities of oscillator {lost[0]} {proportion}")
