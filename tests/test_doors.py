@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -275,6 +276,8 @@ def test_mended_code_runs_again_and_the_others_are_shown_all_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    # mended within the second, in as many letters: bytecode that is kept would be that of the mistake
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
     code = "def mine(q, p, h, force, mass):\n    p = p + h * fores(q)\n    return q + h * p / mass, p\n"
     (tmp_path / "mine.py").write_text(code)
     command = ["run", "spring", "--method", "own:euler", "--method", "own:rk4", "--stepper", "mine.py:mine"]

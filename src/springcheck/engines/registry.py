@@ -263,5 +263,6 @@ def module_of(path: Path) -> ModuleType:
         raise MethodError(f"{path} is not a Python file: its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     with foreign(str(path), f"{path} cannot be imported", str(path)):
-        spec.loader.exec_module(module)
+        # the loader would take bytecode of a text of the same length and second for that of this one
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     return module
