@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
 import json
@@ -81,6 +80,9 @@ for(const r of rows)r.hidden=!w.every(x=>r.textContent.toLowerCase().includes(x)
 document.querySelectorAll('th').forEach((th,i)=>{let up=1;th.onclick=()=>{
 rows.sort((a,b)=>up*a.cells[i].textContent.localeCompare(b.cells[i].textContent,undefined,{numeric:true}));
 up=-up;body.append(...rows)}});
+for(const a of document.querySelectorAll('a[download]')){
+const x=JSON.parse(document.getElementById(a.download).textContent);
+a.href=URL.createObjectURL(new Blob([typeof x==='string'?x:JSON.stringify(x)]))}
 """
 
 
@@ -159,15 +161,13 @@ def as_csv(found: Sequence[Mapping[str, str]]) -> str:
 def html(found: Sequence[Mapping[str, str]], documents: Sequence[Mapping[str, Any]]) -> str:
     """The page: a table to filter and sort; CSV and JSON are in it."""
     known = set(map(engine, found))
-    shown = {
-        "CSV": ("text/csv", as_csv(found)),
-        "JSON": ("application/json", json.dumps(list(documents), separators=(",", ":"))),
-    }
-    links = " ".join(
-        f'<a download="engines.{name.lower()}" href="data:{kind};base64,'
-        f'{base64.b64encode(text.encode()).decode()}">{name}</a>'
-        for name, (kind, text) in shown.items()
-    )
+    parts = {"csv": as_csv(found), "json": list(documents)}
+    links = " ".join(f'<a download="engines.{name}">{name.upper()}</a>' for name in parts)
+    kept = "\n".join(
+        f'<script type="application/json" id="engines.{name}">'
+        + json.dumps(part, separators=(",", ":")).replace("<", "\\u003c") + "</script>"
+        for name, part in parts.items()
+    )  # fmt: skip
     head = "".join(f"<th>{escape(title)}</th>" for title in COLUMNS.values())
     body = "\n".join("<tr>" + "".join(map(_cell, row, row.values())) + "</tr>" for row in found)
     left = sorted({f"{x['method']}: {x['reason']}" for one in documents for x in one.get("left_out", ())})
@@ -185,6 +185,7 @@ of thermostats from those of springs at h omega = 0.5 and friction times step 0.
 {body}
 </tbody></table>
 {"<h2>Not in the table</h2><ul>" + rest + "</ul>" if rest else ""}
+{kept}
 <script>{SCRIPT}</script></body></html>
 """
     if len(page.encode()) > MOST_BYTES:
