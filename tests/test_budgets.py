@@ -15,14 +15,14 @@ BUDGETS = {
     ("thermal",): 1892,
     ("engines/own",): 1683,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1236,
-    ("engines",): 2607,
+    ("engines",): 2609,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4486,
     ("identify",): 7877,
     ("formats", "store"): 5135,
     ("studies",): 1603,
-    ("studies/*",): 10998,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6830,
+    ("studies/*",): 10999,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6831,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
