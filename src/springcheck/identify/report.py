@@ -49,7 +49,7 @@ from springcheck.identify.search import (
     visible,
 )  # fmt: skip
 from springcheck.identify.shortened import single_parameters
-from springcheck.identify.thermal import of_bath
+from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import OF_A_PAIR, distance, of_a_bond, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
@@ -117,7 +117,7 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         raise
     # what a scheme or the record explains takes no noise
     local = any(x.local for x in found.explanations)
-    return found if found.candidates or local else of_bath(t, q, p, v, mass) or found
+    return found if found.candidates or local else explained(found, t, q, p, v, mass)
 
 
 def _of_record(

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.identify.factor import by_a_factor
 from springcheck.identify.result import Candidate, Explanation, Identification
+from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
@@ -17,8 +19,34 @@ MOST = 8
 REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
 
 
+def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification:
+    """What a bath explains of states (f, n) at times t (f,), or what was found before."""
+    given = _given(t, q, p, v, mass)
+    if given is None:
+        return found
+    times, positions, u, _ = given
+    h = float(np.mean(np.diff(times)))
+    return by_a_factor(of_bath(t, q, p, v, mass) or found, h, positions, u)
+
+
 def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
     """What a thermostat has left in states (f, n) at times t (f,); None where nothing random shows."""
+    given = _given(t, q, p, v, mass)
+    if given is None:
+        return None
+    times, positions, u, m = given
+    found = [
+        identify_thermal(times, x, y, np.delete(positions, j, axis=1))
+        for j, (x, y) in enumerate(zip(positions.T, u.T, strict=True))
+    ]
+    if any(one is None for one in found):
+        return None
+    known, h = [one for one in found if one is not None], float(np.mean(np.diff(times)))
+    return _said(known, h, None if mass is None and v is None else m, mass is not None)
+
+
+def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
+    """Times (f,), positions and velocities (f, n) and masses (n,) that a bath may be seen in, or None."""
     times, positions = np.asarray(t, np.float64), np.asarray(q, np.float64)
     u = np.asarray(p if v is None else v, np.float64)
     if times.ndim != 1 or len(times) < FEWEST or positions.shape != u.shape or len(positions) != len(times):
@@ -32,14 +60,7 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
         return None
     if v is None:
         u = u / m
-    found = [
-        identify_thermal(times, x, y, np.delete(positions, j, axis=1))
-        for j, (x, y) in enumerate(zip(positions.T, u.T, strict=True))
-    ]
-    if any(one is None for one in found):
-        return None
-    known = [one for one in found if one is not None]
-    return _said(known, float(np.mean(steps)), None if mass is None and v is None else m, mass is not None)
+    return times, positions, u, m
 
 
 def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identification:

@@ -1,0 +1,83 @@
+"""One factor a step for all momenta: told of two particles or more, in linear forces, and of nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import driver
+from springcheck.identify.factor import one_factor
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic, Spring, WallSpring
+
+PLACE = {
+    "nose-hoover": "before", "nose-hoover-fourth": "before", "nose-hoover-middle": "amid", "bussi": "before",
+    "bussi-unsigned": "before", "bussi-after": "after",
+}  # fmt: skip
+
+
+def particles(n: int, *, joined: bool = False, steps: int = 500) -> Scene:
+    """So many unlike particles on walls, joined or not; nothing is 1."""
+    i = np.arange(n)
+    walls = WallSpring(i=i, k=np.linspace(2.9, 1.7, n), at=np.full(n, 0.1))
+    bonds = Spring(a=i[:-1], b=i[1:], k=np.full(n - 1, 2.2), rest=np.full(n - 1, 0.6))
+    return Scene(
+        m=np.linspace(3.7, 1.3, n), q=np.linspace(0.3, 0.9, n), p=np.linspace(0.7, -0.4, n),
+        terms=(walls, bonds) if joined else (walls,), step=0.35, steps=steps,
+        bath=Bath(temperature=1.7, friction=0.8), name="particles",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("joined", [False, True], ids=["apart", "joined"])
+@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("name", PLACE)
+def test_the_place_and_the_factors_are_found_to_rounding(name: str, n: int, joined: bool) -> None:
+    scene = particles(n, joined=joined)
+    run = driver.run(scene, f"own:{name}", seed=4)
+    found = one_factor(scene.step, run.q, run.p / scene.m)
+    assert found is not None
+    place, misfit, factor = found
+    assert place.split()[0] == PLACE[name]
+    assert misfit < 1e-14
+    # the sign of Bussi's is drawn too
+    assert np.all(factor > 0) or name == "bussi"
+    single = one_factor(scene.step, *(x.astype(np.float32).astype(float) for x in (run.q, run.p / scene.m)))
+    assert single is not None
+    assert single[0] == place
+
+
+@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog", "baoab", "obabo", "brownian"])
+@pytest.mark.parametrize("n", [2, 3])
+def test_draws_of_each_particle_are_no_factor(name: str, n: int) -> None:
+    scene = particles(n, joined=True)
+    run = driver.run(scene, f"own:{name}", seed=4)
+    assert one_factor(scene.step, run.q, run.p / scene.m) is None
+
+
+def test_two_baths_and_a_force_that_is_not_linear_are_none() -> None:
+    first, other = (driver.run(particles(1), "own:nose-hoover", seed=4), particles(2))
+    second = driver.run(replace(particles(1), q=np.array([0.7])), "own:nose-hoover", seed=4)
+    q, v = (np.column_stack([getattr(x, y) for x in (first, second)]) for y in "qp")
+    assert one_factor(other.step, q, v / 3.7) is None
+    bent = Quartic(i=np.arange(2), b=np.array([1.5, 2.0]), at=np.zeros(2))
+    scene = replace(other, terms=(*other.terms, bent))
+    run = driver.run(scene, "own:nose-hoover", seed=4)
+    assert one_factor(scene.step, run.q, run.p / scene.m) is None
+    # two particles that move alike say no more than one
+    assert one_factor(other.step, *(np.repeat(x, 2, axis=1) for x in (first.q, first.p / 3.7))) is None
+
+
+def test_identify_says_that_all_momenta_have_one_factor() -> None:
+    scene = particles(3, steps=1000)
+    chain = springcheck.identify(driver.run(scene, "own:nose-hoover", seed=4), mass=scene.m)
+    assert chain.statement.startswith("One factor a step multiplies the momenta of all 3 coordinates, before")
+    assert (chain.verdict, chain.fits, chain.candidates) == ("none", False, ())
+    rescaled = springcheck.identify(driver.run(scene, "own:bussi", seed=4), mass=scene.m)
+    assert [x.scheme for x in rescaled.candidates] == ["bussi", "bussi-unsigned"]
+    alone = particles(1, steps=1000)
+    found = springcheck.identify(driver.run(alone, "own:nose-hoover", seed=4), mass=alone.m)
+    assert "shows in two particles or more" in found.explanations[0].remedy
