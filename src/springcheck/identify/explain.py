@@ -350,7 +350,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
     )
 
 
-FACTOR = (
+NEEDS_TWO = (
     "; a bath whose factor multiplies all momenta, as a Nose-Hoover chain, shows in two particles or more"
 )
 
@@ -377,7 +377,7 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
-            "steps has no fixed scheme to find" + (FACTOR if e.record.q.shape[1] == 1 else ""),
+            "steps has no fixed scheme to find" + (NEEDS_TWO if e.record.q.shape[1] == 1 else ""),
             misfit=size,
         )
     if e.record.parts is not None and e.record.q.shape[1] > 1:

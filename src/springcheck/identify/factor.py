@@ -15,12 +15,12 @@ from springcheck.identify.result import Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
 
-PLACES = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
+PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
 
-SHARP = 1e-3
+SHARP_FACTOR = 1e-3
 """Misfit over the spread of the factor, below which it is one: two particles of unlike factors leave 1."""
 
-APART = 0.01
+UNLIKE_MOTION = 0.01
 """Share of the products of two particles' numbers in their difference, below which the two move alike."""
 
 
@@ -35,15 +35,15 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
         for j in range(1, n):
             one, other = a[:, j] * b[:, 0], a[:, 0] * b[:, j]
             size = float(np.linalg.norm(np.abs(one) + np.abs(other)))
-            if not np.linalg.norm(one - other) > APART * size:
+            if not np.linalg.norm(one - other) > UNLIKE_MOTION * size:
                 return None
             columns = np.concatenate([-a[:, [j]] * F, a[:, [0]] * F], axis=1)
             c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
             misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / size)
             pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
         factor = np.sum(a * pulled, axis=1) / np.sum((pulled if i else a) ** 2, axis=1)
-        if misfit < SHARP * np.subtract(*np.quantile(factor, [0.9, 0.1])):
-            return PLACES[i], misfit, np.asarray(factor)
+        if misfit < SHARP_FACTOR * np.subtract(*np.quantile(factor, [0.9, 0.1])):
+            return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
     return None
 
 
