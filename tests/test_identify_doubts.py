@@ -252,3 +252,39 @@ def test_a_force_constant_of_half_the_size_is_said_beside_the_fault_that_does_th
     found = identify(0.1 * np.arange(301), q, v=v, mass=M, stiffness=K)
     assert "without its second half kick; or Semi-implicit Euler" in found.statement
     assert "k/2 q**2 taken for k q**2" in found.statement
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "order"),
+    [((2.9, 2.9), (1, 0)), ((2.9, 4.1), (1, 0)), ((2.9, 4.1, 1.7), (1, 2, 0)), ((2.9, 4.1, 1.7), (0, 2, 1))],
+)
+def test_velocities_in_other_columns_in_every_frame_are_told_with_their_columns(
+    stiffness: tuple[float, ...], order: tuple[int, ...]
+) -> None:
+    """They were "of the wrong sign", or a one-step method that is not known here."""
+    starts = ((0.83, -0.61), (-0.31, 0.4), (0.5, 0.2))
+    each = [euler(0.1, k, *start) for k, start in zip(stiffness, starts, strict=False)]
+    q, v = (np.stack(x, axis=1) for x in zip(*each, strict=True))
+    found = identify(0.1 * np.arange(301), q, v=v[:, order], mass=M)
+    assert not found.fits
+    assert "in every frame" in found.statement
+    for j in range(len(order)):
+        said = f"of coordinate {j} in column {order.index(j)}"
+        assert (said in found.statement) == (order.index(j) != j)
+    assert identify(0.1 * np.arange(301), q, v=v, mass=M).fits
+    assert "in every frame" not in identify(0.1 * np.arange(301), q, v=-v, mass=M).statement
+
+
+def test_slips_of_a_clock_over_few_frames_are_no_other_method() -> None:
+    """Semi-implicit Euler, ten steps of an accumulated clock to a frame, half a turn: less than their phases
+    show; too few frames to fit what the slips do."""
+    t = [0.0, 0.015074484428289722, 0.03014896885657945, 0.045223453284869146, 0.06029793771315884]
+    q = [
+        0.21626591105245838,
+        -0.2757081389464383,
+        0.21696866111245916,
+        -0.27641066740542797,
+        0.2176709676544483,
+    ]
+    v = [-99.43450325446838, 99.38928620411033, -99.34402444946224, 99.29871801088177, -99.25336690874781]
+    assert identify(t, q, v=v, mass=0.15781853472461824).scheme == "semi-implicit-euler"

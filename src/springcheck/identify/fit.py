@@ -285,8 +285,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
         # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
         length = _lengths(z, best.centre)
         process = ROUNDING * length * unknown
-    if record.fine and centred:
-        best = _minimum(z, 0 * sigma, process, best, centred, slips)
+        best = _minimum(z, 0 * sigma, process, best, centred, slips) if record.fine else best
     if not record.fine:
         best, centred, _ = _constant_part(z, sigma, process, best, record, constant)
     once: bool | None = None
@@ -300,9 +299,10 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
         if best.chi2 > expected:
             best = other
     scale = max(best.chi2 / max(freedom, 1), _least(freedom) if record.fine else 1.0)
-    covariance = best.inverse[:4, :4] * scale
-    if not record.fine:
-        covariance = covariance * repeats(z)
+    if record.slips is not None and 2 * pairs_kept <= FEWEST_SLIPPING:
+        # too few to be fitted, they turn each state on by as much of half a turn at most
+        scale = max(scale, (math.pi * float(np.max(np.abs(record.slips))) / ROUNDING) ** 2)
+    covariance = best.inverse[:4, :4] * scale * (1.0 if record.fine else repeats(z))
     state = z - best.centre
     share = length.astype(np.longdouble)[:, None] ** -2
     shift = np.sum(share * state[:-1], axis=0) / np.sum(share) if centred else 0 * best.centre

@@ -24,6 +24,9 @@ LEAPS = 4.0
 AGAINST = 0.3
 """Share of the way between frames by which it may differ from that of the velocities, turned over."""
 
+ROUNDED = 2.0**-46
+"""What one map may leave over of numbers in their place, of their size: 64 units in the last place."""
+
 MOST_COMPARED = 12
 """Coordinates of which every two are compared."""
 
@@ -82,6 +85,27 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
     )
 
 
+def unsorted(record: Record) -> list[Explanation]:
+    """Velocities that stand in other columns in every frame, if one map fits each with the right ones."""
+    each = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    if not 1 < len(each) <= MOST_COMPARED:
+        return []
+    way = np.diff(record.q[:, each], axis=0).astype(np.float64)
+    mean = ((record.v[1:, each] + record.v[:-1, each]) / 2 * record.interval).astype(np.float64)
+    off = np.sum(way**2, axis=0)[:, None] + np.sum(mean**2, axis=0) - 2 * way.T @ mean
+    of = each[np.argmin(off, axis=1)]
+    others = np.flatnonzero((of != each) & (FALLS * np.min(off, axis=1) < np.diag(off)))
+    put = replace(record, v=record.v.copy())
+    put.v[:, each] = record.v[:, of]
+    sure = others.size and len(set(of)) == len(of) and others.size == np.count_nonzero(of != each)
+    if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, ROUNDED) for j in each[others].tolist()):
+        return []
+    where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
+    cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"
+    remedy = "sort the particles by their number before they are written, positions and velocities alike"
+    return [Explanation(cause=cause, remedy=remedy, misfit=0.0, local=True)]
+
+
 def turned(record: Record, moving: list[int]) -> list[Explanation]:
     """Velocities of the other sign: positions move against them, in frames so close that this shows."""
     against = []
@@ -121,15 +145,9 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
             swapped = np.zeros(len(x), dtype=bool)
             begin = what == "velocities" and _nearer(q[:, two], v[:, two], h)
             for i in range(len(x)):
-                if i == 0 and not begin:
-                    continue
                 other = (x[i, ::-1] if whose[0] else x[i], u[i, ::-1] if whose[1] else u[i])
-                if i == 0:
-                    swap = True
-                else:
-                    was = _off(x[i - 1], u[i - 1], x[i], u[i], h)
-                    swap = _off(x[i - 1], u[i - 1], *other, h) < was
-                if swap:
+                last = x[i - 1], u[i - 1]
+                if begin if i == 0 else _off(*last, *other, h) < _off(*last, x[i], u[i], h):
                     x[i], u[i] = other
                     swapped[i] = True
             if not np.any(swapped):
@@ -137,10 +155,8 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
             qs, vs = record.q.copy(), record.v.copy()
             at = np.flatnonzero(swapped)
             here, there = (np.ix_(at, np.array(columns)) for columns in (two, two[::-1]))
-            if whose[0]:
-                qs[here] = qs[there]
-            if whose[1]:
-                vs[here] = vs[there]
+            for column, moved in zip((qs, vs), whose, strict=True):
+                column[here] = column[there] if moved else column[here]
             yield (
                 replace(record, q=qs, v=vs),
                 f"The {what} of coordinates {pair[0]} and {pair[1]} have changed places {_where(at, len(x))}",

@@ -99,11 +99,8 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
     if not found.fits or (certain and not near):
         return found
-    tells = (
-        []
-        if near and not found.scheme
-        else [f"what would tell: {'more digits' if near else 'the step, stated'}"]
-    )
+    more = "more digits" if near else "the step, stated"
+    tells = [f"what would tell: {more}"] if found.scheme or not near else []
     out = replace(found, statement=found.statement + OR_UNKNOWN, notes=(*found.notes, *tells))
     if found.scheme in (None, "exact") or min(x.stride for x in found.candidates) <= CERTAIN_STEPS:
         return out

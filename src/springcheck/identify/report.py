@@ -194,13 +194,12 @@ def _of_coordinates(
     if stated is not None:
         precisions = {x: ds[0].precision for x, ds in explained.items()}
         joints = of_stated_stiffness(record, moving, precisions, stated)
+    stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
         joints, stated_fits = agreeing or joints, bool(agreeing)
-    else:
-        stated_fits = stride is None
-    if stride is not None and stride > 0 and not stated_fits:
-        notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
+        if not agreeing:
+            notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
     asked = friction
     if friction is not None:
         of_rate = [x for x in joints if candidates_of(record, moving, x, friction)]

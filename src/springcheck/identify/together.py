@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from springcheck.identify.field import of_plane
-from springcheck.identify.misplaced import MOST_COMPARED
+from springcheck.identify.misplaced import MOST_COMPARED, unsorted
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.identify.result import Identification
 from springcheck.physics.arrays import Floats, Reals
@@ -95,8 +95,8 @@ def distance(record: Record) -> Record | None:
 
 def of_rotation(record: Record, found: Identification) -> Identification:
     """What was found, where the states may as well be a rotation, or are one and no scheme fits."""
-    if found.explanations and (turned := of_plane(record)):
-        return replace(found, statement=turned[0].cause, explanations=tuple(turned))
+    if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
+        return replace(found, statement=cause[0].cause, explanations=tuple(cause))
     if not found.fits or (pair := _turning(record)) is None:
         return found
     i, j, factor = pair
