@@ -24,7 +24,7 @@ LEAPS = 4.0
 AGAINST = 0.3
 """Share of the way between frames by which it may differ from that of the velocities, turned over."""
 
-IN_PLACE = 2.0**-46
+PLACED = 2.0**-46
 """What one map may leave over of numbers in their place, of their size: 64 units in the last place."""
 
 MOST_COMPARED = 12
@@ -98,9 +98,7 @@ def unsorted(record: Record) -> list[Explanation]:
     put = replace(record, v=record.v.copy())
     put.v[:, each] = record.v[:, of]
     sure = others.size and len(set(of)) == len(of) and others.size == np.count_nonzero(of != each)
-    if not sure or any(
-        _left(put, j) > max(_left(record, j) / FALLS, IN_PLACE) for j in each[others].tolist()
-    ):
+    if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, PLACED) for j in each[others].tolist()):
         return []
     where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
     cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"

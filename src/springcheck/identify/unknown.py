@@ -26,10 +26,10 @@ dies."""
 LASTING = 0.1
 """Share of the largest state that each must have for what dies down to be a memory."""
 
-READ_TO, CHOSEN_PARTS = 1e-6, 1200
+READ, CHOSEN = 1e-6, 1200
 """Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
 
-METHOD_OF = "if every step was recorded, it is that of a one-step method, "
+MAP_OF = "if every step was recorded, it is that of a one-step method, "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
 
 FEWEST_WITH_MEMORY = 12
@@ -52,7 +52,7 @@ def misfit(e: Evidence) -> Explanation:
     kind = _class(e) or growth
     none = f", but it is none of the known schemes' in up to {STRIDES[1]} steps to a frame"
     return Explanation(
-        cause=f"One linear map explains the states{'' if kind.startswith(METHOD_OF) else none}: {kind}{near}",
+        cause=f"One linear map explains the states{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
         remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
@@ -84,11 +84,11 @@ def _class(e: Evidence) -> str:
     with np.errstate(divide="ignore", invalid="ignore"):
         a = 2 * (1 - x) / y
         beta, gamma = (1 / y - 1) / a, (1 - u) / (a * y)
-        off = abs(beta - np.rint(CHOSEN_PARTS * beta) / CHOSEN_PARTS) * a
+        off = abs(beta - np.rint(CHOSEN * beta) / CHOSEN) * a
     # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring
     own = off < room if stated is None else abs(stated - a) < room
-    if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ_TO * a and e.record.fine:
-        return f"{METHOD_OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
+    if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ * a and e.record.fine:
+        return f"{MAP_OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
     growing = f"multiplies areas by 1 {det - 1:+.2e}"
     if symmetric and keeps:
@@ -101,8 +101,8 @@ def _class(e: Evidence) -> str:
         return ""
     w, r = 1j * step, complex(x, step * y)
     theta = (r - 1 - w) / (w * (r - 1))
-    if abs(theta.imag) * turn < room < READ_TO * turn and e.record.fine:
-        return f"{METHOD_OF}the theta method with theta = {theta.real:.6g} (implicit Euler 1, trapezoidal rule 1/2)"
+    if abs(theta.imag) * turn < room < READ * turn and e.record.fine:
+        return f"{MAP_OF}the theta method with theta = {theta.real:.6g} (implicit Euler 1, trapezoidal 1/2)"
     wrong = r - cmath.exp(1j * step)
     found = {n: wrong / (1j * step) ** n for n in ORDERS}
     real = [n for n, c in found.items() if abs(c.imag) < REAL * abs(c.real)]
