@@ -20,13 +20,18 @@ campaign = importlib.util.module_from_spec(_spec)
 sys.modules["thermal_campaign"] = campaign
 _spec.loader.exec_module(campaign)
 
-WRONG_BEFORE = (37, 104, 123, 134, 135, 148, 154, 185, 292, 596, 597, 1031)
-"""Cases that had a wrong name, or a list without the right one."""
+WRONG_BEFORE = {
+    37: ("boaob", "strided"), 104: ("gj-v", "text"), 123: ("andersen-leapfrog", "text"),
+    134: ("gj-iv", "coupled"), 135: ("gj-v", "coupled"), 148: ("lammps-langevin", "coupled"),
+    154: ("andersen-leapfrog", "coupled"), 185: ("andersen-leapfrog", "whole"), 292: ("gj-vii", "coupled"),
+    596: ("gj-i", "coupled"), 597: ("gj-ii", "coupled"), 1031: ("gj-ii", "text"),
+}  # fmt: skip
+"""Cases that had a wrong name, or a list without the right one, with their schemes and kinds."""
 
 
 @pytest.mark.parametrize("case", WRONG_BEFORE)
 def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
-    scheme, kind, (t, q, p, scene) = campaign.file_of(case)
+    scheme, kind, (t, q, p, scene) = campaign.file_of(case, *WRONG_BEFORE[case])
     found = campaign.of_bath(t, q, p, None, scene.m)
     assert found is None or found.scheme in (None, scheme), kind
     if kind in ("whole", "single", "text"):

@@ -101,10 +101,11 @@ def by_engine(case: int) -> dict[str, int]:
     }  # fmt: skip
 
 
-def file_of(case: int) -> tuple[str, str, Any]:
-    """Scheme, kind and (t, q, p, m, omega) of a random file of 1,000 frames."""
-    rng, names = np.random.default_rng([27, case]), LINEAR
-    name, kind = names[case % len(names)], KINDS[case // len(names) % len(KINDS)]
+def file_of(case: int, name: str = "", kind: str = "") -> tuple[str, str, Any]:
+    """Scheme, kind and (t, q, p, scene) of a random file of 1,000 frames; of another scheme or kind if given,
+    by which a case stays what it is when the catalogue grows."""
+    rng, many = np.random.default_rng([27, case]), len(LINEAR)
+    name, kind = name or LINEAR[case % many], kind or KINDS[case // many % len(KINDS)]
     every = int(rng.integers(2, 6)) if kind == "strided" else 1
     scene = scene_of(rng, name, coupled=kind == "coupled", steps=1000 * every).derived(every=every)
     run = driver.run(scene, Label(engine="own", method=name), seed=case + 1)

@@ -264,5 +264,5 @@ def module_of(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     with foreign(str(path), f"{path} cannot be imported", str(path)):
         # the loader would take bytecode of a text of the same length and second for that of this one
-        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
+        exec(compile(path.read_bytes(), str(path), "exec", dont_inherit=True), vars(module))
     return module
