@@ -81,3 +81,9 @@ def test_ranges_of_cases_are_kept_apart_go_on_and_are_merged(
     campaign.add("alarms", 2, 104)
     assert campaign.merge() == 1
     assert json.loads((tmp_path / "alarms.json").read_text()) == known
+
+
+def test_right_steps_of_every_linear_scheme_raise_no_alarm() -> None:
+    found = [campaign.alarms(case) for case in range(len(campaign.LINEAR))]
+    assert sum(one.get("runs", 0) for one in found) >= 20
+    assert sum(one.get("alarms", 0) for one in found) == 0

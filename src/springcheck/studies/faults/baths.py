@@ -10,9 +10,10 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.seeds import SEEDED, Seeded
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats, Force
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import clean
 from springcheck.studies.faults.clean import walls
@@ -20,6 +21,7 @@ from springcheck.studies.faults.seeded import Fault, Make
 from springcheck.studies.faults.steppers import trajectory
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
 from springcheck.thermal.catalogue import HALF, ONE, Act
+from springcheck.thermal.stepper import forces
 
 Draws: TypeAlias = Callable[[Sequence[Floats], Scene, float], Any]
 """(right draws so far, each (n,) and the last one due; scene, size) -> what is used in place of the last."""
@@ -90,9 +92,11 @@ def broken(
                 found.append(draws(right, scene, size))
             return found
 
-        def force(q: Reals, p: Reals) -> Reals:
-            return np.asarray(scene.system.potential_force(q, p) * f.get("k", 1.0))
+        def stiffer(terms: Sequence[Term]) -> Force:
+            right = scene.system.force_of(terms)
+            return lambda q, p: np.asarray(right(q, p) * f.get("k", 1.0))
 
+        force = forces(of, scene.system, stiffer)
         q, p = np.empty((2, scene.frames, scene.n))
         a, b = q[0], p[0] = scene.q, scene.p
         carried = some(of.carried)
