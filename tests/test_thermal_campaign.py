@@ -87,3 +87,7 @@ def test_right_steps_of_every_linear_scheme_raise_no_alarm() -> None:
     found = [campaign.alarms(case) for case in range(len(campaign.LINEAR))]
     assert sum(one.get("runs", 0) for one in found) >= 20
     assert sum(one.get("alarms", 0) for one in found) == 0
+
+
+def test_a_chain_that_rests_and_at_four_times_the_temperature_does_not_raises_no_alarm() -> None:
+    assert campaign.alarms(20399) == {"runs": 1, "verdicts": 5, "alarms": 0}

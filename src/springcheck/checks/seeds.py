@@ -156,6 +156,9 @@ def noise_size(subject: Seeded) -> Finding | str:
     collides = scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
+    least = scheme.chain.least if scheme.chain else 0.0
+    if least / 4 <= np.sum(one.p[-1] ** 2 / scene.m) / 2 < least:
+        return "its chain rests at this temperature, and not at four times as much"
     hot = replace(scene, bath=Bath(temperature=4 * scene.bath.temperature, friction=scene.bath.friction))
     hot = replace(hot, q=2 * scene.q, p=2 * scene.p)
     heavy = replace(scene.system.scaled(4.0), m=4 * scene.m, q=scene.q / 2, p=2 * scene.p)
