@@ -90,4 +90,5 @@ def test_right_steps_of_every_linear_scheme_raise_no_alarm() -> None:
 
 
 def test_a_chain_that_rests_and_at_four_times_the_temperature_does_not_raises_no_alarm() -> None:
-    assert campaign.alarms(20399) == {"runs": 1, "verdicts": 5, "alarms": 0}
+    found = campaign.alarms(20399)
+    assert (found["runs"], found["alarms"]) == (1, 0)
