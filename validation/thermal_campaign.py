@@ -185,7 +185,9 @@ def merge() -> int:
                 print(f"{path}: some of its cases are counted already", file=sys.stderr)
                 return 1
             known["more"] = [*known.get("more", []), [first, end]]
-            _write(whole, known, Counter(known["found"]) + Counter(one["found"]))
+            found = Counter(known["found"])
+            found.update(one["found"])  # a sum of counters would drop what is 0
+            _write(whole, known, found)
             path.unlink()
             print(f"{part}: cases {first} to {end - 1} added")
     return 0
