@@ -92,20 +92,22 @@ def test_a_force_between_the_recorded_states_is_weighed_where_the_scheme_takes_i
         assert alarms(checks.judge(scene, plain(scene, name))) == [], seed
 
 
+BOND = Morse(
+    a=np.array([0]),
+    b=np.array([1]),
+    depth=np.array([2.3]),
+    steepness=np.array([1.7]),
+    rest=np.array([0.9]),
+)
+
+
 @pytest.mark.parametrize("name", FIXED)
 def test_a_bond_between_the_recorded_states_likewise(name: str) -> None:
-    bond = Morse(
-        a=np.array([0]),
-        b=np.array([1]),
-        depth=np.array([2.3]),
-        steepness=np.array([1.7]),
-        rest=np.array([0.9]),
-    )
     for seed in range(6):
         rng = np.random.default_rng([8, seed])
         q = np.array([0.1, 1.0]) + 0.2 * rng.normal(size=2)
         scene = clean.scene(
-            np.array([1.3, 2.1]), (bond,), q, rng.normal(size=2), step=float(rng.uniform(0.02, 0.3)), steps=60
+            np.array([1.3, 2.1]), (BOND,), q, rng.normal(size=2), step=float(rng.uniform(0.02, 0.3)), steps=60
         )
         assert alarms(checks.judge(scene, plain(scene, name))) == [], seed
 
@@ -226,13 +228,6 @@ def test_bonds_that_are_torn_apart_pull_to_a_rounding_of_what_is_subtracted(
 ) -> None:
     """exp(-a u) by way of 1 - exp(-a u), as good engines have it for small u, is known to a rounding of 1."""
     pytest.importorskip(label.partition(":")[0].replace("own", "numpy"))
-    bond = Morse(
-        a=np.array([0]),
-        b=np.array([1]),
-        depth=np.array([2.3]),
-        steepness=np.array([1.7]),
-        rest=np.array([0.9]),
-    )
     q = np.array([0.1, 1.0 + stretched])
-    scene = clean.scene(np.array([1.3, 2.1]), (bond,), q, np.zeros(2), step=0.1, steps=20)
+    scene = clean.scene(np.array([1.3, 2.1]), (BOND,), q, np.zeros(2), step=0.1, steps=20)
     assert alarms(checks.judge(scene, springcheck.simulate(scene, label))) == []

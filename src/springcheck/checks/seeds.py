@@ -226,14 +226,13 @@ def noise_matrix(subject: Seeded) -> Finding | str:
     scheme, scene = subject.scheme, subject.scene
     if not subject.scripted or not scheme.draws or scheme.uniform or scheme.collides:
         return "it takes no generator of normal numbers"
-    worst = 0.0
+    worst, pull = 0.0, forces(scheme, scene.system)
     assert scene.bath is not None
-    for j in range(scheme.draws):
-        unit = np.eye(scheme.draws)[j]
+    start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
+    none = subject.stepper(scene)(*start, pull, [np.zeros(scene.n, np.longdouble)] * scheme.draws)
+    for unit in np.eye(scheme.draws):
         run = subject.run(scene, 1, Script(unit))
         draws = [np.full(scene.n, np.longdouble(x)) for x in unit]
-        start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
-        pull = forces(scheme, scene.system)
         ideal = subject.stepper(scene)(*start, pull, draws)
         factor: Any = True
         if scheme.rescales:
@@ -241,7 +240,6 @@ def noise_matrix(subject: Seeded) -> Finding | str:
             both = [subject.stepper(scene)(*start, force, draws, hit)[1] for hit in (None, 1.0)]
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
         # of a noise that comes of 1 - c, taken from c
-        none = subject.stepper(scene)(*start, pull, [0 * x for x in draws])
         lost = run.arithmetic.unit / min(1.0, scene.bath.friction * scene.step)
         allowed = [
             x + lost * np.abs(y - z)

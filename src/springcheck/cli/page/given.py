@@ -148,7 +148,7 @@ def drawn(piece: Trajectory, scene: Scene | None = None, *, failed: bool = False
         "label": piece.label,
         "failed": failed,
         "loop": loop if known else "",
-        "rounding": 256 * max(how.state, how.force, how.quantum, 2.0**-53) * _stretch(piece, scene),
+        "rounding": 256 * max(how.unit, how.quantum, 2.0**-53) * _stretch(piece, scene),
         "scheme": piece.scheme,
         "title": schemes.title(piece.scheme),
         "every": piece.every,

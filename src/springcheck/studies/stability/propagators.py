@@ -59,7 +59,7 @@ def noise(label: Label) -> float:
     """Relative rounding of an entry of a propagator: all roundings of one step, of one sign."""
     how = engines.arithmetic(label)
     scheme = schemes.scheme(engines.method(label).scheme)
-    return schemes.roundings(scheme) * (max(how.state, how.force) + how.quantum / FORCE)
+    return schemes.roundings(scheme) * (how.unit + how.quantum / FORCE)
 
 
 def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
