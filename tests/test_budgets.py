@@ -18,11 +18,11 @@ BUDGETS = {
     ("engines",): 2609,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4489,
-    ("identify",): 7959,
+    ("identify",): 7964,
     ("formats", "store"): 5135,
     ("studies",): 1603,
     ("studies/*",): 11003,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6831,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6832,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -121,6 +121,7 @@ def _identify(options: Namespace) -> int:
     from springcheck import schemes
     from springcheck.doors import function
     from springcheck.identify import identify_stepper
+    from springcheck.identify.files import titled
     from springcheck.identify.result import identification
     from springcheck.text.lines import plain as plain_line
 
@@ -160,7 +161,7 @@ def _identify(options: Namespace) -> int:
         if not options.json:
             titles = {label: label for label in found}
             if many:
-                titles = {label: file if label == Path(file).name else f"{file}, {label}" for label in found}
+                titles = {label: titled(file, label) for label in found}
             output.show([x for label, one in found.items() for x in identification(titles[label], one)])
             output.show([plain_line(f"{titles[x]}: {y}", "bold red") for x, y in unlike.items() if y])
         fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())

@@ -197,6 +197,11 @@ def shown(scene: Scene, run: Trajectory, about: int) -> str:
     return sentence(run, scene.m, np.diag(springs) if springs is not None and alone else None, about=about)
 
 
+def titled(file: Path | str, label: str) -> str:
+    """A trajectory by its file, and by its label where the file has several."""
+    return str(file) if label == Path(file).name else f"{file}, {label}"
+
+
 def identify_file(
     path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
 ) -> dict[str, Identification]:
@@ -212,11 +217,11 @@ def identify_file(
         try:
             found[states.label] = identify_states(states, **given)
         except SpringcheckError as error:
-            raise type(error)(f"{path}, {states.label}: {error}") from error
+            raise type(error)(f"{titled(path, states.label)}: {error}") from error
         except (ArithmeticError, ValueError) as error:
             numbers = ", ".join(f"--{name} {value:g}" for name, value in given.items()) or "its numbers"
             raise IdentificationError(
-                f"{path}, {states.label}: nothing can be worked out with {numbers}: {error}"
+                f"{titled(path, states.label)}: nothing can be worked out with {numbers}: {error}"
             ) from error
     return found
 
