@@ -225,6 +225,18 @@ def test_figures_are_not_drawn_into_a_file(capsys: pytest.CaptureFixture[str]) -
     assert Path("mine.toml").read_text() == SPRING
 
 
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no folder in which nothing can be made")
+@pytest.mark.parametrize(
+    "command", [["run", "spring", "-o", "/proc/a.h5"], ["report", "mine.h5", "-o", "/proc/a.html"]]
+)
+def test_a_folder_in_which_nothing_can_be_made_is_said_to_be_that(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    if command[0] == "report":
+        assert main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "mine.h5"]) == 0
+    refused(capsys, command, "no file can be made there" if os.geteuid() == 0 else "/proc")
+
+
 @pytest.mark.parametrize("blocks", [1, 3, 40])
 def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
     resource = pytest.importorskip("resource")

@@ -48,7 +48,8 @@ def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
         for name, figure in content.items():
             files.put_bytes(figure, folder / name)
     except OSError as error:
-        raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error
+        why = files.cause(error, writing=True)
+        raise StoreError(f"{folder}: figures cannot be written: {why}") from error
     return [folder / name for name in content]
 
 

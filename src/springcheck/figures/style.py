@@ -79,7 +79,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             files.put_bytes(drawn[one.rpartition(".")[2]], folder / one)
             written.append(folder / one)
     except OSError as error:
-        raise StoreError(f"{folder}: figures cannot be written: {error.strerror or error}") from error
+        why = files.cause(error, writing=True)
+        raise StoreError(f"{folder}: figures cannot be written: {why}") from error
     return written
 
 

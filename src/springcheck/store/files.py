@@ -52,7 +52,7 @@ CAUSES = {
 }
 
 
-def cause(error: BaseException) -> str:
+def cause(error: BaseException, *, writing: bool = False) -> str:
     """What an exception of the system or of HDF5 says, in a few words."""
     if isinstance(error, MemoryError):
         return "it asks for more memory than there is"
@@ -60,6 +60,9 @@ def cause(error: BaseException) -> str:
         return "it is damaged, or its layout is not what its name says"
     said = str(error)
     number = number_of(error)
+    if writing and number == errno.ENOENT:
+        # its folder is there, as /proc is, or has just gone
+        return "no file can be made there"
     if number in CAUSES:
         return CAUSES[number]
     if "signature not found" in said:
@@ -102,7 +105,8 @@ def told(path: Path, doing: str) -> Iterator[None]:
     try:
         yield
     except BROKEN as error:
-        raise StoreError(f"cannot {doing} {shown(path)}: {cause(error)}") from error
+        why = cause(error, writing=doing.startswith("write"))
+        raise StoreError(f"cannot {doing} {shown(path)}: {why}") from error
 
 
 def need_space(path: Path, size: int) -> None:

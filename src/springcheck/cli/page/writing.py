@@ -102,7 +102,8 @@ def write(content: Content, path: Path) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         files.put_bytes(page, path)
     except OSError as error:
-        raise StoreError(f"{path}: the report cannot be written: {error.strerror or error}") from error
+        why = files.cause(error, writing=True)
+        raise StoreError(f"{path}: the report cannot be written: {why}") from error
     return len(page)
 
 
