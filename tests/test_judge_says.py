@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, driver, engines
+from springcheck import checks, driver, engines, schemes
 from springcheck.checks import experiments
+from springcheck.checks.steps import NO_BETTER
 from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic, WallSpring
+from springcheck.physics.terms import Cosine, Quartic, WallSpring
 from springcheck.studies.extremes import grid, running
-from springcheck.studies.faults import clean
+from springcheck.studies.faults import clean, steppers
 from springcheck.studies.run import measure, text
 
 Need = Callable[[str], None]
@@ -241,6 +242,29 @@ def test_what_far_walls_hide_of_a_motion_is_named_with_its_size(at: float) -> No
             (kicked,) = checks.judge(scene, replace(run, **{name: states}), [checks.step_defect])
             assert kicked.passed is passed, (name, part)
     assert float(found[1]) < 1e-14 * at
+
+
+def test_what_is_off_by_more_than_recording_it_rounds_fails_or_is_named() -> None:
+    """Two opposite forces hide much more of a momentum than a right engine loses of it."""
+    at, k, depth = np.zeros(1), np.array([-0.43]), np.array([0.151])
+    wave = Cosine(i=np.array([0]), depth=depth, wave=np.array([2.7]), at=at)
+    terms = (WallSpring(i=np.array([0]), k=k, at=at), wave)
+    start = np.array([1.6e-3]), np.array([8e-4])
+    scene = clean.scene(np.array([3.3]), terms, *start, step=0.057, steps=10)
+    scheme = schemes.SCHEMES["implicit-euler"]
+    run = steppers.record(scene, scheme, steppers.textbook(scene, scheme))
+    (right,) = checks.judge(scene, run, [checks.step_defect])
+    assert right.passed is True
+    assert NO_BETTER not in right.why
+    seen = []
+    for off in 24.0 * 4.0 ** np.arange(6):
+        p = run.p.copy()
+        p[5] += off * np.spacing(np.max(np.abs(p))) / 2
+        (found,) = checks.judge(scene, replace(run, p=p), [checks.step_defect])
+        assert found.passed is False or re.search(r"p of particle 0 \(\S+\).* cannot be judged to", found.why)
+        seen.append(found.passed)
+    assert seen[0] is True
+    assert seen[-1] is False
 
 
 def test_nothing_is_named_that_stays_by_right() -> None:

@@ -7,12 +7,13 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.checks.claim import Claim
-from springcheck.physics.arrays import ROUNDOFF, Extended, Force, Reals
+from springcheck.physics.arrays import ROUNDOFF, WIDE, Extended, Force, Reals
 from springcheck.physics.term import Term
 from springcheck.schemes.rounding import Met
 
-SMALLEST = np.longdouble(5e-324)
-"""What an operation can lose to underflow: one unit of a subnormal double."""
+SMALLEST = np.longdouble(5e-324 if WIDE else 1e-323)
+"""What an operation can lose to underflow: one unit of a subnormal double, and where the scheme's own step,
+which it is compared with, is no wider, as much there."""
 
 
 def of_step(

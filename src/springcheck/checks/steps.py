@@ -65,7 +65,8 @@ def _step_defect(case: Case) -> Finding | str:
         value, most, why = slow
     sees, hidden = _sees(case, bound, told)
     why += f"; as the engine declares: {run.arithmetic}" if str(run.arithmetic) else ""
-    return Finding(value, most, "roundings", why + _blind(case, told) + hidden, sees)
+    why += _blind(case, told, passed=bool(value <= most))
+    return Finding(value, most, "roundings", why + hidden, sees)
 
 
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
@@ -87,9 +88,13 @@ BLIND = "cannot be judged by single steps here: rounding may be as large as they
 NO_BETTER = "cannot be judged to better than that here: rounding is as large"
 
 
-def _blind(case: Case, told: NDArray[np.bool_]) -> str:
+def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
     """Which positions and momenta move by no more in any step than rounding may, and of which others it is
-    much more than that of their own digits, or no small part of how far they move."""
+    much more than that of their own digits, or no small part of how far they move.
+
+    Of steps that pass, also which are off by much more than recording them rounds: a right engine's may be,
+    and so may those of a wrong force.
+    """
     ahead, run = case.ahead, case.trajectory
     if ahead is None:
         return ""
@@ -100,12 +105,20 @@ def _blind(case: Case, told: NDArray[np.bool_]) -> str:
         worst = np.max(most, axis=1)
         digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
         known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
+        if passed:
+            off = np.max(np.abs(ahead.end - states[:, 1:])[:, told], axis=1)
+            coarser = run.arithmetic.state / Arithmetic().state
+            known &= off <= OF_RECORDING * coarser * np.spacing(digits) / 2
         coarse = (way > 0) & ~hidden & ~known
     return _list(hidden, BLIND) + _list(coarse, NO_BETTER, worst)
 
 
 OF_DIGITS, OF_WAY = 512.0, 1e-9
 """Roundings of a number, and part of its way, above which what rounding hides of it is said."""
+
+OF_RECORDING = 20.0
+"""Times what rounding a recorded number may change it by, half a unit in its last place, above which it is
+said to be known no better than to what rounding allows."""
 
 
 def _list(which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
