@@ -110,6 +110,47 @@ def test_another_turn_is_rejected(name: str, scene: str) -> None:
     broken = replace(run, q=states[:, 0].copy(), p=states[:, 1].copy(), energy=None)
     found = {v.check: v for v in checks.judge(replace(law, quantities=("q", "p")), broken)}
     assert found["step-defect"].passed is False
+    assert found["gyration"].passed is False
+
+
+@pytest.mark.parametrize("label", ["own:boris", "openmm:boris"])
+@pytest.mark.parametrize(("name", "step"), [("magnetic", 1.3), ("foucault", -0.07)])
+def test_the_turn_of_a_step_sees_what_it_says_that_it_sees(
+    label: str, name: str, step: float, need: Any
+) -> None:
+    need(label)
+    scene = replace(scenes.load_scene(name), steps=60, step=step)
+
+    def turned(by: float) -> Any:
+        # the same turn as of a step that is too long, and no other drift or kick
+        field = scene.terms[-1]
+        assert isinstance(field, Magnetic)
+        strong = replace(field, strength=field.strength * (1 + by))
+        run = springcheck.simulate(replace(scene, terms=(*scene.terms[:-1], strong)), label)
+        return next(v for v in checks.judge(scene, run) if v.check == "gyration")
+
+    right = turned(0.0)
+    assert right.passed is True
+    assert right.value < right.bound / 4
+    assert turned(3 * right.sees.step).passed is False
+    assert "off by" in right.why
+
+
+def test_a_speed_that_is_not_kept_is_told_beside_an_angle_that_is_right() -> None:
+    scene = replace(scenes.load_scene("magnetic"), steps=40)
+    run = springcheck.simulate(scene, "own:boris")
+    grown = replace(run, p=run.p * (1 + 1e-12) ** np.arange(41)[:, None], energy=None)
+    found = {v.check: v for v in checks.judge(replace(scene, quantities=("q", "p")), grown)}
+    assert found["gyration"].passed is False
+    assert "changes the speed by 1.0e-12" in found["gyration"].why
+
+
+def test_where_no_stage_turns_by_the_field_the_turn_is_not_judged() -> None:
+    scene = replace(scenes.load_scene("magnetic"), steps=20)
+    for label, every in (("own:rk4", 1), ("own:boris", 2)):
+        coarse = replace(scene, every=every)
+        found = {v.check: v for v in checks.judge(coarse, springcheck.simulate(coarse, label))}
+        assert found["gyration"].passed is None
 
 
 def test_the_exact_motion_has_friction_and_a_resting_place_too() -> None:

@@ -26,7 +26,14 @@ from springcheck.checks import check, experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import shared
-from springcheck.checks.motion import angular_momentum, closed_form, frequency, momentum, shadow_energy
+from springcheck.checks.motion import (
+    angular_momentum,
+    closed_form,
+    frequency,
+    gyration,
+    momentum,
+    shadow_energy,
+)
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.rods import rod_length, rod_velocity, turn
@@ -62,6 +69,7 @@ CHECKS: tuple[Check, ...] = (
     rod_length,
     rod_velocity,
     turn,
+    gyration,
     energies,
     tolerance,
 )

@@ -98,6 +98,11 @@ _ALL = (
         lambda x: x.scheme.stages and all(term.kind == "constraint" for term in x.scene.terms)
         and exact.has_true_motion(x.scene),
         "forces act on the ends of the rods, or they are no flat body that turns about an axis across it")),
+    Requirement("gyration", "a field, and a stage of each step that turns by it", _unless(
+        lambda x: x.law.fields and x.trajectory.every == 1
+        and [kind.evaluates for kind in x.scheme.kinds].count("magnetic") == 1
+        and not np.any(np.bincount(np.concatenate([i for y in x.law.fields[0] for i in y.particles])) > 1),
+        "no field turns velocities by a stage of every step recorded, or several fields act on one axis")),
     Requirement("alike", "two axes along which the same springs act", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(

@@ -48,7 +48,7 @@ def turning(turn: Turn, *, first: float = 0.5, mass: bool = True) -> seeded.Make
 
 
 def _field(name: str, about: str, make: seeded.Make, size: float | None = None) -> Fault:
-    return Fault(name, about, ("step-defect",), make, scheme="boris", size=size, scene="field")
+    return Fault(name, about, ("step-defect", "gyration"), make, scheme="boris", size=size, scene="field")
 
 
 FIELDS = (
