@@ -12,6 +12,7 @@ import pytest
 
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import EXPLICIT
+from springcheck.physics.arrays import Floats
 
 M, K = 3.7, 2.9
 DOUBT = "or a scheme that is not known here"
@@ -160,6 +161,53 @@ def test_every_other_step_of_a_method_with_a_parameter_shows_none() -> None:
         assert "beta" not in found.statement
 
 
+def remembered(m: float, f: float, h: float, c: float = 0.0, count: int = 100) -> tuple[Floats, Floats]:
+    """The generalised alpha method of alpha_m and alpha_f, and least damping; c is a friction."""
+    gamma, beta = 0.5 - m + f, (1 - m + f) ** 2 / 4
+    q, v, a = 0.31, 0.44, -(K * 0.31 + c * 0.44) / M
+    rows = [(q, v)]
+    for _ in range(count):
+        x, u = q + h * v + h * h * (0.5 - beta) * a, v + h * (1 - gamma) * a
+        old = f * (K * q + c * v) + (1 - f) * (K * x + c * u)
+        new = -(m * M * a + old) / ((1 - m) * M + (1 - f) * (K * h * h * beta + c * h * gamma))
+        q, v, a = x + h * h * beta * new, u + h * gamma * new, new
+        rows.append((q, v))
+    each = np.array(rows)
+    return each[:, 0], each[:, 1]
+
+
+@pytest.mark.parametrize("h", [0.07, 1.3])
+@pytest.mark.parametrize(
+    ("shares", "said"),
+    [
+        ((0.0, 0.1), "HHT with alpha = -0.1"), ((0.0, 0.27), "HHT with alpha = -0.27"),
+        ((1 / 3, 4 / 9), "generalised alpha with rho_infinity = 0.8"),
+        ((-1.0, 0.0), "generalised alpha with rho_infinity = 0"), ((-0.2, 0.0), "WBZ with alpha_m = -0.2"),
+    ],
+)  # fmt: skip
+def test_methods_with_an_acceleration_of_their_own_are_told_with_their_parameter(
+    shares: tuple[float, float], said: str, h: float
+) -> None:
+    q, v = remembered(*shares, h)
+    for stated in ({}, {"stiffness": K}):
+        found = identify(h * np.arange(101), q, v=v, mass=M, **stated)
+        assert not found.fits
+        assert f"a scheme with memory, of second order, {said}" in found.statement
+
+
+def test_a_method_with_memory_that_is_none_of_the_known_is_none_of_them() -> None:
+    """Every other step of one, another one with friction, and another of the stages' weights."""
+    h = 0.2
+    for (q, v), n in (
+        (remembered(0.0, 0.1, h, count=200), 2), (remembered(1 / 3, 4 / 9, h, c=0.4), 1),
+        (remembered(0.1, 0.15, h), 1),
+    ):  # fmt: skip
+        found = identify(n * h * np.arange(101), q[::n], v=v[::n], mass=M)
+        assert "memory" in found.statement
+        assert "alpha =" not in found.statement
+        assert "infinity =" not in found.statement
+
+
 def test_of_steps_that_coarse_numbers_do_not_tell_apart_the_fewest_are_not_the_answer() -> None:
     h = 0.11
     q, v = (x.astype(np.float32) for x in frames(PEFRL, h, every=10, count=100))
@@ -288,3 +336,30 @@ def test_slips_of_a_clock_over_few_frames_are_no_other_method() -> None:
     ]
     v = [-99.43450325446838, 99.38928620411033, -99.34402444946224, 99.29871801088177, -99.25336690874781]
     assert identify(t, q, v=v, mass=0.15781853472461824).scheme == "semi-implicit-euler"
+
+
+def kutta(q: float, v: float, h: float, c: float) -> State:
+    return runge_kutta(((), (0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6))(q, v, h, c)
+
+
+@pytest.mark.parametrize(("h", "every"), [(0.11, 1), (0.06, 7)])
+def test_a_list_of_what_coarse_numbers_leave_open_holds_schemes_that_are_not_run(h: float, every: int) -> None:
+    q, v = (digits(x, 6) for x in frames(kutta, h, every=every, count=100))
+    found = identify(every * h * np.arange(101), q, v=v, mass=M)
+    assert "rk4" in names(found)
+    assert ("rk3-kutta", every) in {(x.scheme, x.stride) for x in found.candidates}
+
+
+def test_a_stiffness_that_goes_up_and_down_in_nearly_two_frames_is_not_one_that_alternates() -> None:
+    h, (q, v) = 0.9, (0.31, 0.44)
+    rows = [(q, v)]
+    for n in range(8 * 50):
+        k = K * (1 + 1e-9 * np.sin(0.392 * n))
+        v -= h / 2 * k / M * q
+        q += h * v
+        v -= h / 2 * k / M * q
+        rows.append((q, v))
+    x, u = np.array(rows[::8]).T
+    found = identify(8 * h * np.arange(51), x, v=u, mass=M)
+    assert "changes in time" in found.statement
+    assert "alternat" not in found.statement

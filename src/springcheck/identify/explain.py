@@ -163,6 +163,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "constant": [q, v, np.ones_like(q)],
         "drag": [*linear, np.abs(v) * v],
         "parity": [*_alternating(e).T],
+        "beat": [*_alternating(e).T, *(z * (t * (-1.0) ** np.arange(e.pairs))[:, None]).T],
         "quadratic": [q, v, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
         "oscillation": [*linear, *driven.waves(q, tuned["oscillation"])],
@@ -202,6 +203,9 @@ def _shape(e: Evidence) -> list[Explanation]:
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
+    if "parity" in good:
+        # a beat without its slope
+        good = [name for name in good if name != "beat"]
     untried = counted < FEWEST_MISSES or (good[0] in tuned and "anharmonic" not in left)
     if untried and FALLS * left[good[0]] > 1 and good[0] != "constant":
         # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
@@ -243,7 +247,7 @@ KIND = {
     "quadratic": "is anharmonic", "cubic": "is anharmonic", "anharmonic": "is anharmonic",
     "position": "is anharmonic", "parity": "alternates from step to step", "oscillation": "changes in time",
     "stiffness in time": "changes in time", "friction in time": "changes in time",
-    "map in time": "changes in time", "drive": "is driven",
+    "map in time": "changes in time", "beat": "changes in time", "drive": "is driven",
 }  # fmt: skip
 """What the force depends on in each group of columns."""
 
@@ -251,7 +255,7 @@ KIND = {
 STATE = ("quadratic", "anharmonic", "position", "velocity")
 """Groups of functions of the state that follow most functions of time where states hardly come back."""
 
-TIME = ("oscillation", "stiffness in time", "friction in time", "map in time", "drive")
+TIME = ("oscillation", "stiffness in time", "friction in time", "map in time", "beat", "drive")
 """Groups of functions of time, which the state follows there as well."""
 
 IN_STEP = 0.1
@@ -334,6 +338,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         "oscillation": "The stiffness changes in time, up and down, which",
         "friction in time": "The friction changes in time, which",
         "map in time": "The step or the stiffness changes in time, which",
+        "beat": "The step or the stiffness changes in time, up and down in nearly two frames, which",
         "drive": "A force from outside drives the motion, up and down in time, which",
     }
     remedies = {
@@ -343,6 +348,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
         "oscillation": "look for a parameter or a clock that moves during the run",
         "friction in time": "look for a thermostat or a damping that is switched during the run",
         "map in time": "look for a step that is adapted, or give a part of the trajectory",
+        "beat": "look for a parameter or a clock that moves during the run",
     }
     return (
         f"{causes[name]} moves a frame by {strength}",

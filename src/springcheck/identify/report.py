@@ -182,6 +182,14 @@ def _of_coordinates(
             others = _elsewhere(record, moving, maps, base, strides)
             others = {x: ds for x, ds in others.items() if agrees(x)}
             explained = {**(explained if right or not others else {}), **others}
+    elif not record.fine:
+        # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
+        least = min(x.stride for x in explained)
+        alone = len({(x.scheme, x.stride) for x in explained}) == 1
+        strides = range(1, least) if alone else FEW
+        others = _elsewhere(record, moving, maps, base, strides) if strides else {}
+        both = {**explained, **others}
+        explained = {x: both[x] for x in likely(list(both))}
     if not explained:
         joints, remark = single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)

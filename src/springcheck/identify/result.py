@@ -50,7 +50,7 @@ class Explanation:
     remedy: str
     misfit: float
     local: bool = False
-    """Whether it lies in the record, as numbers in the wrong place do, so that no noise is its cause."""
+    """Whether it leaves no noise to explain: numbers in the wrong place, or a motion known to rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, distance
 from springcheck.identify.families import title
+from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
 from springcheck.identify.result import Explanation
+from springcheck.physics.arrays import Floats
+from springcheck.text.wording import either
 
 REAL = 0.3
 """Largest share of an imaginary part in a coefficient that is real but for the terms of the next order."""
@@ -22,9 +27,6 @@ ORDERS = range(1, 9)
 FORGOTTEN = 0.1
 """Share of what a map misses at first that is left in the last three quarters of the frames, of a memory that
 dies."""
-
-LASTING = 0.1
-"""Share of the largest state that each must have for what dies down to be a memory."""
 
 READ, CHOSEN = 1e-6, 1200
 """Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
@@ -123,25 +125,104 @@ def memory(e: Evidence) -> list[Explanation]:
     """
     z = e.found.z.astype(np.float64)
     size = np.sqrt(np.sum(z**2, axis=1))
-    if len(z) < FEWEST_WITH_MEMORY or np.min(size) < LASTING * np.max(size):
-        # what a motion that dies or grows misses does so as well
+    if len(z) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
         return []
-    off = np.max(np.abs(e.misses), axis=1)
-    if np.max(off[1:]) < 64 * np.max(e.unit) or np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
+    # of a motion that dies down or grows each frame counts by its size
+    unit = float(np.max(e.unit / size[1:]))
+    off = np.max(np.abs(e.misses), axis=1) / size[1:]
+    if np.max(off[1:]) < 64 * unit or np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
         return []
-    columns = np.concatenate([z[1:-1], z[:-2]], axis=1)
-    left = z[2:] - columns @ np.linalg.lstsq(columns, z[2:], rcond=None)[0]
+    now, old, new = z[1:-1] / size[2:, None], z[:-2] / size[2:, None], z[2:] / size[2:, None]
+    columns = np.concatenate([now, old], axis=1)
+    left = new - columns @ np.linalg.lstsq(columns, new, rcond=None)[0]
     # the first frames alone show the other map, but for which all follow one
-    one = z[2:] - z[1:-1] @ np.linalg.lstsq(z[len(z) // 2 : -1], z[len(z) // 2 + 1 :], rcond=None)[0]
+    later = len(new) // 2
+    one = new - now @ np.linalg.lstsq(now[later:], new[later:], rcond=None)[0]
     before, after = (float(np.max(np.abs(y))) for y in (one, left))
-    if before < FALLS * after or before < 64 * float(np.max(e.unit)):
+    if before < FALLS * after or before < 64 * unit:
         return []
+    whose = _remembering(e)
+    kind = "of two steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha)"
     return [
         Explanation(
-            cause="Each state follows from the two before it, and not from one: a scheme with memory, of two "
-            "steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha), whose "
-            f"start differs from one map by {before:.1e} of the state's size",
+            cause=f"Each state follows from the two before it, and not from one: a scheme with memory, "
+            f"{f'of second order, {whose},' if whose else f'{kind},'} whose start differs from one map by "
+            f"{before:.1e} of the state's size",
             remedy="leave the first frames out, and judge it as a scheme of two steps",
             misfit=after / before,
+            local=after < 64 * unit,
         )
     ]
+
+
+def _two_steps(old: Floats, slopes: Floats, x: Floats) -> Floats:
+    """What a method of two steps makes of (q, v h) once its start is forgotten: y'' - y' + old (y' - y) is
+    h L times the slopes' weights of y'', y' and y; x is (h w)**2."""
+    z = 1j * math.sqrt(max(x[0], 1e-300))
+    roots = np.roots([1 - slopes[0] * z, old[0] - 1 - slopes[1] * z, -old[0] - slopes[2] * z])
+    r = roots[np.argmin(np.abs(roots - np.exp(z)))]
+    return np.array([r.real, r.imag / z.imag, -z.imag * r.imag, r.real])
+
+
+def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> Floats:
+    """The same of the generalised alpha method (Chung & Hulbert, J. Appl. Mech. 60 (1993) 371), of second
+    order and least damping, by the shares alpha_m and alpha_f of the parameter x[1]; x[0] is (h w)**2."""
+    a, (m, f) = x[0], shares(x[1])
+    gamma, beta = 0.5 - m + f, (1 - m + f) ** 2 / 4
+    whole = 1 - m + (1 - f) * a * beta
+    last = -np.array([a, (1 - f) * a, m + (1 - f) * a * (0.5 - beta)]) / whole
+    rows = np.array([[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [0, 0, 0]]) + np.outer([beta, gamma, 1], last)
+    values, left = np.linalg.eig(rows.T)
+    # the acceleration that is left once the third motion has died
+    dead = left[:, np.argmin(np.abs(values))].real
+    return (rows[:2, :2] - np.outer(rows[:2, 2], dead[:2] / dead[2])).ravel()
+
+
+WITH_MEMORY: dict[str, Callable[[Floats], Floats]] = {
+    "Adams-Bashforth (AB2)": partial(_two_steps, np.zeros(1), np.array([0, 1.5, -0.5])),
+    "BDF2": partial(_two_steps, np.array([-1 / 3]), np.array([2 / 3, 0, 0])),
+    "HHT with alpha = -{:.6g}": partial(_generalised, lambda x: (0.0, x)),
+    "generalised alpha with rho_infinity = {:.6g}": partial(
+        _generalised, lambda x: ((2 * x - 1) / (x + 1), x / (x + 1))
+    ),
+    "WBZ with alpha_m = -{:.6g}": partial(_generalised, lambda x: (-x, 0.0)),
+}
+"""Schemes that remember more than a state, by what they are once the start is forgotten, and the name."""
+
+DIGITS = 9
+"""Decimals of a parameter that are looked at."""
+
+PARAMETERS = 0.05, 0.3, 0.6, 0.9
+"""Values of a parameter from which it is looked for."""
+
+
+def _remembering(e: Evidence) -> str:
+    """The schemes with memory that the later half of the frames is of; "" where it is of none that is known."""
+    from scipy.optimize import least_squares
+
+    if e.terms.mass_unknown or not e.record.fine:
+        return ""
+    found = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
+    entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
+    ratio = float(found.size[1] / found.size[0])
+    error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14
+    turn = -entries[2] / entries[1]
+    out = []
+    for name, entries_of in WITH_MEMORY.items():
+        starts = [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]
+
+        def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
+            return (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
+
+        for start in starts if turn > 0 else []:
+            best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+            k = best.x[0] * turn / float(e.record.interval) ** 2
+            mass = e.record.mass
+            other = e.stiffness is not None and mass is not None
+            if np.max(np.abs(best.fun)) > 1 or (other and abs(k * mass[e.j] / e.stiffness - 1) > READ):
+                continue
+            known = [round(float(y), DIGITS) + 0.0 for y in best.x[1:]]
+            if all(0 <= y <= 1 for y in known):
+                out.append(name.format(*known))
+                break
+    return either(out)
