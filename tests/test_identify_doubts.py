@@ -343,7 +343,7 @@ def kutta(q: float, v: float, h: float, c: float) -> State:
 
 
 @pytest.mark.parametrize(("h", "every"), [(0.11, 1), (0.06, 7)])
-def test_a_list_of_what_coarse_numbers_leave_open_holds_schemes_that_are_not_run(h: float, every: int) -> None:
+def test_a_list_of_what_coarse_numbers_leave_open_has_schemes_that_are_not_run(h: float, every: int) -> None:
     q, v = (digits(x, 6) for x in frames(kutta, h, every=every, count=100))
     found = identify(every * h * np.arange(101), q, v=v, mass=M)
     assert "rk4" in names(found)

@@ -203,8 +203,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
-    if "parity" in good:
-        # a beat without its slope
+    if "parity" in good:  # which is a beat without its slope
         good = [name for name in good if name != "beat"]
     untried = counted < FEWEST_MISSES or (good[0] in tuned and "anharmonic" not in left)
     if untried and FALLS * left[good[0]] > 1 and good[0] != "constant":

@@ -188,8 +188,8 @@ def _of_coordinates(
         alone = len({(x.scheme, x.stride) for x in explained}) == 1
         strides = range(1, least) if alone else FEW
         others = _elsewhere(record, moving, maps, base, strides) if strides else {}
-        both = {**explained, **others}
-        explained = {x: both[x] for x in likely(list(both))}
+        others = {**explained, **others}
+        explained = {x: others[x] for x in likely(list(others))}
     if not explained:
         joints, remark = single_parameters(record, moving, maps, base, stride)
         explained = _explained(record, moving, maps, joints, base)

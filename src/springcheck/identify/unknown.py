@@ -79,9 +79,7 @@ def _class(e: Evidence) -> str:
         return ""
     size = float(e.found.size[1] / e.found.size[0])
     symmetric = abs(x - u) <= SURE * math.hypot(error[0], error[3]) + 1e-14
-    stated = None
-    if e.stiffness is not None and e.record.mass is not None:
-        stated = e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
+    stated = _stated(e)
     room = 4 * (SURE * float(np.max(error)) * max(size, 1 / size) + 1e-14)
     with np.errstate(divide="ignore", invalid="ignore"):
         a = 2 * (1 - x) / y
@@ -116,6 +114,13 @@ def _class(e: Evidence) -> str:
         f"if every step was recorded, a one-step method of order {n - 1}, whose stability function has "
         f"{should + found[n].real:.3g} z**{n} in place of {should:.3g} z**{n}"
     )
+
+
+def _stated(e: Evidence) -> float | None:
+    """(h w)**2 of the stated stiffness."""
+    if e.stiffness is None or e.record.mass is None:
+        return None
+    return e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
 
 
 def memory(e: Evidence) -> list[Explanation]:
@@ -197,7 +202,7 @@ PARAMETERS = 0.05, 0.3, 0.6, 0.9
 
 
 def _remembering(e: Evidence) -> str:
-    """The schemes with memory that the later half of the frames is of; "" where it is of none that is known."""
+    """The schemes with memory that the later half of the frames is of; "" where none is known."""
     from scipy.optimize import least_squares
 
     if e.terms.mass_unknown or not e.record.fine:
@@ -206,8 +211,7 @@ def _remembering(e: Evidence) -> str:
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
     ratio = float(found.size[1] / found.size[0])
     error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14
-    turn = -entries[2] / entries[1]
-    out = []
+    turn, stated, out = -entries[2] / entries[1], _stated(e), []
     for name, entries_of in WITH_MEMORY.items():
         starts = [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]
 
@@ -216,10 +220,8 @@ def _remembering(e: Evidence) -> str:
 
         for start in starts if turn > 0 else []:
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            k = best.x[0] * turn / float(e.record.interval) ** 2
-            mass = e.record.mass
-            other = e.stiffness is not None and mass is not None
-            if np.max(np.abs(best.fun)) > 1 or (other and abs(k * mass[e.j] / e.stiffness - 1) > READ):
+            other = stated is not None and abs(best.x[0] * turn / stated - 1) > READ
+            if np.max(np.abs(best.fun)) > 1 or other:
                 continue
             known = [round(float(y), DIGITS) + 0.0 for y in best.x[1:]]
             if all(0 <= y <= 1 for y in known):
