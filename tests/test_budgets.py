@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6768,
+    ("physics",): 6772,
     ("schemes",): 1665,
     ("thermal",): 1892,
     ("engines/own",): 1683,
@@ -21,7 +21,7 @@ BUDGETS = {
     ("identify",): 8060,
     ("formats", "store"): 5139,
     ("studies",): 1603,
-    ("studies/*",): 11003,
+    ("studies/*",): 11138,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6835,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -350,7 +350,7 @@ def test_a_study_of_stability_says_how_the_exact_motion_grows_in_a_period(name: 
     scene = scenes.load_scene(name)
     found = floquet(scene.system)
     assert found is not None
-    factor, period = found
+    factor, period, _ = found
     many = exact.true_motion(scene, np.array([0, 40, 41]), period)[0][:, 0]
     if grown:
         # far from the start only the growing solution is left

@@ -141,15 +141,19 @@ def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> St
     return u, v * system.m
 
 
-def floquet(system: System[Any]) -> tuple[float, float] | None:
+def floquet(system: System[Any]) -> tuple[float, float, float] | None:
     """The factor by which the exact motion grows in a period of the modulation, its larger Floquet multiplier
-    where that is above 1 and else 1, and the period [T], of what grows fastest; None of other scenes."""
+    where that is above 1 and else 1, the period [T], and the angle of the multiplier, 0 to pi [rad], of what
+    grows fastest; None of other scenes."""
     each = []
     for mode in prepare(system) or () if "modulated-spring" in system.acting else ():
-        half = float(np.abs(np.trace(mode.nodes[-1]))) / 2
+        half = float(np.trace(mode.nodes[-1])) / 2
         # the matrix of a period has the determinant 1
-        each.append((half + float(np.sqrt(max(half * half - 1, 0))), float(2 * PI / np.abs(mode.turn))))
-    return max(((max(grown, 1.0), period) for grown, period in each), default=None)
+        grown = abs(half) + float(np.sqrt(max(half * half - 1, 0)))
+        each.append(
+            (max(grown, 1.0), float(2 * PI / np.abs(mode.turn)), float(np.arccos(np.clip(half, -1, 1))))
+        )
+    return max(each, default=None)
 
 
 MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)

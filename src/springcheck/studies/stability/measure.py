@@ -2,7 +2,8 @@
 
 Every method of fixed step gets its limit on a spring (`limits`).  A scene with friction adds the region
 of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple time
-steps (`resonance`), and the scenes `two-scales` and `overdamped` what stiffness costs (`costs`).
+steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`), and the scenes
+`two-scales` and `overdamped` what stiffness costs (`costs`).
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
 from springcheck.studies.keeper import How, Keeper, each
-from springcheck.studies.stability import costs, limits, propagators, regions, resonance
+from springcheck.studies.stability import costs, limits, multipliers, propagators, regions, resonance
 from springcheck.studies.stability.longest import fastest
-from springcheck.studies.stability.result import COSTS, LIMITS, REGIONS, RESONANCES, Stability
+from springcheck.studies.stability.result import COSTS, LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
 from springcheck.studies.tables import Form
 
 
@@ -60,6 +61,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
     braked = [label for label in usable if "damping" in engines.method(label).terms]
     damped = braked if scene.system.is_damped else []
     resonant = [label for label in usable if resonance.serves(scene, label)]
+    modulated = [label for label in usable if multipliers.serves(scene, label)]
     family = next((name for name in costs.RATIOS if name == scene.name), None)
     stiff = [label for label in chosen if family and costs.serves(label, family)]
     plan = [
@@ -67,10 +69,15 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         each(damped, "region of", partial(partial, regions.measure), REGIONS),
         each(resonant, "resonances of", lambda label: partial(resonance.measure, scene, label), RESONANCES),
         each(stiff, "stiffness,", lambda label: partial(costs.measure, label, family or "two-scales"), COSTS),
+        each(
+            modulated, "multiplier of", lambda label: partial(multipliers.measure, scene, label), MULTIPLIERS
+        ),
     ]
     kept = kept or Keeper()
     found = iter(kept.results([piece for part in plan for piece in part]))
-    of_limits, of_regions, of_resonances, of_costs = ([next(found) for _ in part] for part in plan)
+    of_limits, of_regions, of_resonances, of_costs, of_multipliers = (
+        [next(found) for _ in part] for part in plan
+    )
     if not usable and not of_costs:
         reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
         raise MethodError(f"none of these methods has a limit to measure: {reasons}")
@@ -80,6 +87,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         regions=tuple(of_regions),
         resonances=tuple(of_resonances),
         costs=tuple(row for rows in of_costs for row in rows),
+        multipliers=tuple(of_multipliers),
         left_out=tuple(left_out),
         resumed=kept.resumed,
         path=kept.path,
@@ -111,7 +119,7 @@ def stored(kept: keeper.Kept) -> Stability:
 
     def under(form: Form[Any], name: str) -> tuple[Any, ...]:
         # the document knows the order in which they were measured
-        methods = dict.fromkeys(one["method"] for one in kept.document[name])
+        methods = dict.fromkeys(one["method"] for one in kept.document.get(name, ()))
         return tuple(kept.found(form, method) for method in methods)
 
     return Stability(
@@ -120,5 +128,6 @@ def stored(kept: keeper.Kept) -> Stability:
         regions=under(REGIONS, "regions"),
         resonances=under(RESONANCES, "resonances"),
         costs=tuple(row for rows in under(COSTS, "costs") for row in rows),
+        multipliers=under(MULTIPLIERS, "multipliers"),
         left_out=kept.left_out,
     )

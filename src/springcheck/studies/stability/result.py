@@ -17,6 +17,7 @@ from springcheck.studies.stability import limits
 from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest, longest
+from springcheck.studies.stability.multipliers import Multiplier
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.study import Shown
@@ -40,6 +41,8 @@ class Stability(Shown):
     resonances: tuple[Resonance, ...]
     costs: tuple[Cost, ...]
     left_out: tuple[LeftOut, ...]
+    multipliers: tuple[Multiplier, ...] = ()
+    """Of a spring of modulated stiffness."""
     resumed: int = 0
     """Limits, regions, resonances and costs that an interrupted call had finished."""
     path: Path | None = None
@@ -82,6 +85,11 @@ class Stability(Shown):
         for y in self.resonances:
             if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
                 out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
+        out += [
+            f"{z.method}: Floquet multiplier off by {z.off:.1e} from its scheme's, allowed {z.bound:.1e}"
+            for z in self.multipliers
+            if not z.off <= z.bound
+        ]
         return out
 
     def largest(self, found: Limit) -> float:
@@ -128,6 +136,7 @@ class Stability(Shown):
             ],
             resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
             costs=self.costs,
+            multipliers=self.multipliers,
             left_out=self.left_out,
             failures=self.failures,
         )
@@ -190,5 +199,6 @@ RESONANCES: RecordForm[Resonance] = RecordForm(
     axes=("h_w",),
     auxiliary=("radius_predicted",),
 )
+MULTIPLIERS: RecordForm[Multiplier] = RecordForm(kind=Multiplier, beginning="stability/multipliers/")
 COSTS: Rows[Cost] = Rows(kind=Cost, beginning="stability/costs/", named="")
 """How each kind of measurement is kept: a table for each method."""

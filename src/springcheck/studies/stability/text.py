@@ -36,6 +36,13 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
             rows.append([plain(cell, style) for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
         out += [table(titles, rows), plain()]
+    if study.multipliers and (exact := floquet(study.scene.system)):
+        count = study.multipliers[0].steps
+        step = exact[1] / count
+        out.append(plain(f"Floquet multipliers of a period of the modulation, {count} steps of {step:.6g}"))
+        found = [("exact motion", f"{exact[0]:.9f}", f"{exact[2]:.9f}", "")]
+        found += [(x.method, f"{x.grown:.9f}", f"{x.turned:.9f}", f"{x.off:.0e}") for x in study.multipliers]
+        out += [table(("method", "grows by", "turns by", "off its scheme's"), found), plain()]
     if study.costs:
         costs = [
             (
@@ -74,7 +81,7 @@ def _of_scene(study: Stability) -> Lines:
     elif any(study.largest(x) >= abs(scene.step) for x in study.limits):
         out.append(plain("  within the limit of every method measured here"))
     if modulated := floquet(scene.system):
-        grown, period = modulated
+        grown, period, _ = modulated
         bounded = "stays bounded" if grown == 1 else f"grows by a factor of {grown:.6g}"
         out.append(
             plain(f"  in each period of its modulation, {period:.4g}, the exact motion {bounded} (Floquet)")

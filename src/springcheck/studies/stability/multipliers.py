@@ -1,0 +1,109 @@
+"""Floquet multipliers of methods on a spring of modulated stiffness: of so many steps as make a period.
+
+The state a period later is a matrix times that of now, of the exact motion and of every method whose steps
+fit the period.  Its eigenvalues say whether the motion grows, and by which angle it turns (Nayfeh & Mook,
+Nonlinear Oscillations, 1979, 5.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from springcheck import driver, engines, schemes
+from springcheck.engines.contract import Label
+from springcheck.physics.driven import CLOCK, ModulatedSpring
+from springcheck.physics.exact.mathieu import floquet
+from springcheck.physics.scene import Scene
+
+MOST_STEPS = 4096
+"""In a period: of a scene whose step is shorter the multipliers of that many are measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Multiplier:
+    """The multiplier of largest size of one method, as its size and its angle from 0 to pi [rad]."""
+
+    method: str
+    steps: int
+    """In a period of the modulation."""
+    grown: float
+    """Measured: two starts, a period each."""
+    turned: float
+    grown_predicted: float
+    """By the scheme's own steps."""
+    turned_predicted: float
+    off: float
+    """Distance of both in the complex plane."""
+    bound: float
+    """Roundings of each step, carried to the end of the period, by the condition of the eigenvectors."""
+
+
+def serves(scene: Scene, label: Label) -> bool:
+    """Whether a method of fixed step takes the scene, one modulated spring whose exact motion is known."""
+    one = scene.n == 1 and floquet(scene.system) is not None and not engines.refusal(scene, label)
+    return one and schemes.scheme(engines.method(label).scheme).has("one-step")
+
+
+def measure(scene: Scene, label: Label) -> Multiplier:
+    """Run a period from two starts, in whole steps that come nearest to that of the scene."""
+    found = floquet(scene.system)
+    assert found is not None
+    _, period, _ = found
+    steps = int(np.clip(round(period / abs(scene.step)), 1, MOST_STEPS))
+    scene = replace(scene, step=np.copysign(period / steps, scene.step), steps=steps, every=steps)
+    rest, size = float(_spring(scene).at[0]), float(scene.m[0] * 2 * np.pi / period)
+    starts = [(rest + 1, 0.0), (rest, size)]
+    runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
+    complete = all(run.outcome.status == "complete" for run in runs)
+    ends = np.array([[run.q[-1, 0] - rest, run.p[-1, 0] / size] for run in runs]).T
+    right = _powers(scene, label, starts, rest, size)
+    values, vectors = np.linalg.eig(right[-1])
+    own, largest = _largest(values), _largest(np.linalg.eigvals(ends)) if complete else complex(np.nan)
+    # a rounding of the state after each step, carried on to the end
+    carried = [np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right]
+    law, method = schemes.Law(scheme=_scheme(label), scene=scene, h=scene.step), engines.method(label)
+    # a velocity rebuilt from positions has the rounding of these over the step
+    each = law.roundings * (1 + steps / (2 * np.pi) * method.rebuilds_velocity)
+    allowed = engines.arithmetic(label).state * each * float(np.sum(carried)) * float(np.linalg.cond(vectors))
+    return Multiplier(
+        method=str(label),
+        steps=steps,
+        grown=abs(largest),
+        turned=float(np.angle(largest)),
+        grown_predicted=abs(own),
+        turned_predicted=float(np.angle(own)),
+        off=abs(largest - own),
+        bound=allowed,
+    )
+
+
+def _scheme(label: Label) -> schemes.Scheme:
+    return schemes.scheme(engines.method(label).scheme)
+
+
+def _spring(scene: Scene) -> ModulatedSpring:
+    term = scene.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    return term
+
+
+def _largest(values: np.ndarray) -> complex:
+    """Of two that are conjugate, that of the upper half plane; the size of a real one is its own."""
+    return complex(max(values, key=lambda one: (round(abs(one), 12), one.imag)))
+
+
+def _powers(
+    scene: Scene, label: Label, starts: list[tuple[float, float]], rest: float, size: float
+) -> np.ndarray:
+    """What the scheme's own first j + 1 steps make of a displacement and of a momentum, (steps, 2, 2)."""
+    law = schemes.Law(scheme=_scheme(label), scene=scene.system.clocked, h=scene.step)
+    q, p = (
+        np.array([[one[i], clock] for one in starts], np.longdouble) for i, clock in enumerate((0.0, CLOCK))
+    )
+    out = []
+    for _ in range(scene.steps):
+        q, p = law.step(q, p)
+        out.append([q[:, 0] - rest, p[:, 0] / size])
+    return np.array(out, np.float64)

@@ -1,0 +1,165 @@
+"""Mathieu's equation by Hill's series in 40 digits, which takes no step, beside the exact solution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import engines
+from springcheck.physics import exact, scenefile
+from springcheck.physics.arrays import WIDE
+from springcheck.physics.exact.mathieu import floquet
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import ModulatedSpring
+from springcheck.studies.stability import multipliers
+
+ORDERS = 60
+"""Of Hill's series to both sides: the terms fall like (r/4 n**2)**n."""
+
+W = float(np.sqrt(2.9 / 3.7))
+
+POINTS = {
+    "between two tongues": (2.9, 0.3, 1.55 * W),
+    "below all that are wide": (2.9, 0.2, 0.41 * W),
+    "an inverted spring that is held by its modulation": (-0.029, -40.0, 2.1 * W),
+    "the first tongue": (2.9, 0.3, 2 * W),
+    "its edge": (2.9, 0.3, 2.13 * W),
+    "the second tongue": (2.9, 0.7, 0.95 * W),
+}
+GROWING = ("the first tongue", "its edge", "the second tongue")
+
+
+def scene(name: str) -> Scene:
+    """A modulated spring about a place that is not 0, from a start that lies in no symmetry."""
+    k, depth, frequency = POINTS[name]
+    term = ModulatedSpring(i=np.array([0]), k=k, depth=depth, frequency=frequency, phase=0.4, at=0.2)
+    return Scene(m=[3.7], q=[0.3], p=[0.7], terms=(term,), step=0.37, steps=120, name=name)
+
+
+class Hill:
+    """y = exp(i nu x) sum c_n exp(2 i n x) solves y'' + (a - 2 r cos 2x) y = 0, and so does y(-x)."""
+
+    def __init__(self, a: Any, r: Any) -> None:
+        self.a, self.r = a, r
+        # Whittaker & Watson 19.42: sin(pi nu/2)**2 = D(0) sin(pi sqrt(a)/2)**2 starts Newton's iteration
+        n = 2.0 * np.arange(-ORDERS, ORDERS + 1)
+        rows = float(r) / (n**2 - float(a))
+        hill = np.eye(len(n)) - np.diag(rows[:-1], 1) - np.diag(rows[1:], -1)
+        square = np.linalg.det(hill) * complex(mpmath.sin(mpmath.pi * mpmath.sqrt(a) / 2) ** 2).real
+        start = 2 / mpmath.pi * mpmath.asin(mpmath.sqrt(mpmath.mpc(square)))
+        self.nu = mpmath.findroot(self.closes, (start, start * (1 + mpmath.mpf("1e-8"))), tol=1e-60)
+        c = {0: mpmath.mpc(1)}
+        for sign in (1, -1):
+            for n, ratio in enumerate(reversed(self.ratios(self.nu, sign)), 1):
+                c[sign * n] = c[sign * (n - 1)] * ratio
+        self.c = c
+
+    def ratios(self, nu: Any, sign: int) -> list[Any]:
+        """c_n/c_(n-1) from the outermost order in, by the continued fraction that falls there."""
+        out = [mpmath.mpc(0)]
+        for n in range(ORDERS, 0, -1):
+            out.append(self.r / (self.a - (nu + 2 * sign * n) ** 2 - self.r * out[-1]))
+        return out[1:]
+
+    def closes(self, nu: Any) -> Any:
+        """The equation of order 0, which the exponent solves."""
+        return self.a - nu**2 - self.r * (self.ratios(nu, 1)[-1] + self.ratios(nu, -1)[-1])
+
+    def at(self, x: Any) -> tuple[Any, Any]:
+        """y and y' at x."""
+        terms = [(c * mpmath.expj((self.nu + 2 * n) * x), 1j * (self.nu + 2 * n)) for n, c in self.c.items()]
+        return mpmath.fsum(y for y, _ in terms), mpmath.fsum(y * slope for y, slope in terms)
+
+
+def by_hill(found: Scene, steps: np.ndarray) -> tuple[list[Any], list[Any], Any]:
+    """q and p after so many steps, and the exponent of the series."""
+    term = found.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    k, depth, drive, phase, at = (
+        mpmath.mpf(float(x[0])) for x in (term.k, term.depth, term.frequency, term.phase, term.at)
+    )
+    m, h = mpmath.mpf(float(found.m[0])), mpmath.mpf(found.step)
+    series = Hill(4 * k / m / drive**2, -2 * k / m * depth / drive**2)
+
+    def both(t: Any) -> Any:
+        x = (drive * t + phase) / 2
+        (y, v), (z, w) = series.at(x), series.at(-x)
+        return mpmath.matrix([[y, z], [v * drive / 2, -w * drive / 2]])
+
+    start = mpmath.matrix([mpmath.mpf(float(found.q[0])) - at, mpmath.mpf(float(found.p[0])) / m])
+    share = mpmath.lu_solve(both(mpmath.mpf(0)), start)
+    ends = [both(int(n) * h) * share for n in steps]
+    return [mpmath.re(x[0]) + at for x in ends], [mpmath.re(x[1]) * m for x in ends], series.nu
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_the_exact_solution_is_that_of_hills_series_within_what_it_states_at_every_frame(name: str) -> None:
+    found = scene(name)
+    steps = np.array([1, 2, 9, 31, 77, 120])
+    q, p = exact.true_motion(found, steps, found.step)
+    assert found.system.solution is not None
+    size = float(np.max(np.abs([q, p])))
+    with mpmath.workdps(40):
+        right_q, right_p, _ = by_hill(found, steps)
+        for i, n in enumerate(steps):
+            doubts = found.system.solution.doubt(n * found.step)
+            for one, right, doubt in zip((q[i, 0], p[i, 0]), (right_q[i], right_p[i]), doubts, strict=True):
+                off = abs(mpmath.mpf(np.format_float_scientific(one, precision=25)) - right)
+                assert off <= mpmath.mpf(float(doubt[0]))
+                # beside the largest number of the motion
+                assert float(off) <= (1e-16 if WIDE else 1e-13) * size
+                assert float(doubt[0]) <= (1e-13 if WIDE else 1e-10) * size
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_the_floquet_multiplier_is_that_of_hills_exponent(name: str) -> None:
+    found = scene(name)
+    with mpmath.workdps(40):
+        *_, nu = by_hill(found, np.array([1]))
+        grown = float(abs(mpmath.exp(mpmath.pi * abs(mpmath.im(nu)))))
+    multiplier = floquet(found.system)
+    assert multiplier is not None
+    assert multiplier[0] == pytest.approx(grown, rel=1e-13)
+    assert np.cos(multiplier[2]) == pytest.approx(np.cos(float(mpmath.re(nu)) * np.pi), abs=1e-13)
+    assert (grown > 1.01) == (name in GROWING)
+
+
+@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
+def test_a_study_of_stability_has_the_multiplier_of_each_method_beside_that_of_its_scheme(name: str) -> None:
+    found = springcheck.stability(
+        scenefile.load_scene(name), ["own:euler", "own:velocity-verlet", "own:yoshida4"]
+    )
+    assert found.passed
+    euler, verlet, fourth = found.multipliers
+    exactly = floquet(found.scene.system)
+    assert exactly is not None
+    # explicit Euler grows where nothing else does, and a scheme of order 4 is as good as exact
+    assert euler.grown > verlet.grown
+    assert fourth.grown == pytest.approx(exactly[0], abs=2e-5)
+    assert fourth.turned == pytest.approx(exactly[2], abs=2e-5)
+    assert verlet.off <= verlet.bound <= 1e-11
+    assert f"{euler.grown:.9f}" in str(found)
+    wrong = replace(found, multipliers=(replace(verlet, off=2 * verlet.bound),))
+    assert wrong.status == 1
+    assert "Floquet multiplier off" in wrong.failures[0]
+
+
+@pytest.mark.parametrize("size", [1e-9, -1e-9])
+def test_a_modulation_that_is_a_little_too_deep_has_another_multiplier(size: float) -> None:
+    """That of the engine: the law's own stays."""
+    scene = scenefile.load_scene("mathieu-tongue")
+    term = scene.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    label = engines.parse("own:velocity-verlet")
+    right = multipliers.measure(scene, label)
+    deeper = multipliers.measure(replace(scene, terms=(replace(term, depth=term.depth * (1 + size)),)), label)
+    assert abs(deeper.grown - right.grown_predicted) > right.bound
+
+
+def test_scenes_without_a_modulation_have_no_multipliers() -> None:
+    assert not multipliers.serves(scenefile.load_scene("driven-spring"), engines.parse("own:euler"))
