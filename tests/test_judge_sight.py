@@ -66,6 +66,20 @@ def test_three_limits_fail_and_a_tenth_of_one_passes(where: str, name: str) -> N
     assert tried >= (3 if where == "free chain" else 2)
 
 
+def test_a_spring_whose_effect_drowns_in_the_references_rounding_has_its_own_limit() -> None:
+    """A quartic beside a wall spring, so near their place that half a percent of it is a rounding."""
+    walls = WallSpring(i=np.array([0, 1]), k=np.array([2.3e-4, 9.1e-4]), at=np.zeros(2))
+    wells = Quartic(i=np.array([0, 1]), b=np.array([9.3e-6, 2.1e-6]), at=np.zeros(2))
+    start = np.array([1.3e-4, 6.7]), np.array([2e-6, 0.1])
+    scene = clean.scene(np.array([0.141, 0.039]), (walls, wells), *start, step=0.02, steps=15)
+    scheme = schemes.SCHEMES["explicit-euler"]
+    tried, wrong = detection.wrong(scene, scheme)
+    assert (tried, wrong) == (2, [])
+    sees = checks.judge(scene, detection.planted(scene, scheme), [checks.step_defect])[0].sees
+    assert sees.stiffness is not None
+    assert 1e-3 < sees.stiffness < 2.0**-5
+
+
 @pytest.mark.parametrize("experiment", detection.EXPERIMENTS, ids=lambda experiment: experiment.name)
 def test_the_limits_of_experiments_hold_likewise(experiment: checks.Experiment) -> None:
     cases = [("h w = 0.3", "semi-implicit-euler")]

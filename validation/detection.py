@@ -9,8 +9,7 @@ are the limits of as many random scenes of every term, scheme and distance of fr
 those of the experiments: areas in phase space that grow at each step, and orders.  It prints a table of the
 limits; exit status 1 where one of them is wrong.
 
-Measured with 400 steps and 20 random scenes: 815 limits, 99 of experiments and 60; one wrong, of a spring
-among five whose effect drowns in the reference's own rounding.
+Measured with 400 steps and 100 random scenes: 815 limits, 99 of experiments and 336; none wrong.
 """
 
 from __future__ import annotations

@@ -37,6 +37,9 @@ ROUNDING = np.longdouble(64 * ROUNDOFF)
 LARGEST = 2.0**-5
 """Relative change up to which its effect is taken to be proportional to it."""
 
+COARSER = LARGEST / CHANGE
+"""Times a change whose effect drowns in the reference's rounding, one of which it may show."""
+
 LOOKED_AT = 64
 """Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
 
@@ -57,12 +60,17 @@ NAMES = ("stiffness", "step", "friction", *OF_A_DRIVE)
 
 
 def limits(
-    right: States, motions: Callable[[str], Sequence[States]], change: float, part: Part
+    right: States,
+    motions: Callable[[str], Sequence[States]],
+    change: float,
+    part: Part,
+    coarse: Callable[[str], Sequence[States]] | None = None,
 ) -> tuple[Limits, int]:
     """The limits of a check, and how many springs and frictions it does not see however far they are off.
 
     `motions(name)` are the right one with a parameter larger by `change`, one for each spring or friction,
-    none where that is not known, and `part` says how many bounds changes (r, n) of it are.
+    none where that is not known, and `part` says how many bounds changes (r, n) of it are.  Those whose
+    effect drowns in the reference's own rounding are tried again at `COARSER` times that, if it is known.
     """
     found: dict[str, float | None] = {}
     hidden = 0
@@ -70,10 +78,16 @@ def limits(
         unknown = _largest(part((np.abs(right[0]) * ROUNDING, np.abs(right[1]) * ROUNDING)))
         for name in NAMES:
             sizes = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in motions(name)]
-            known = [size for size in sizes if size > 8 * unknown and change < LARGEST * size]
-            found[name] = change / min(known) if known else None
-            # one whose effect drowns in the reference's own rounding may be seen or not
-            hidden += sum(size > 8 * unknown and change >= LARGEST * size for size in sizes)
+            tried = [(size, change) for size in sizes]
+            if coarse is not None and any(size <= 8 * unknown for size in sizes):
+                again = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in coarse(name)]
+                tried = [
+                    (more, COARSER * change) if size <= 8 * unknown else (size, change)
+                    for size, more in zip(sizes, again, strict=True)
+                ]
+            least = [change / size for size, change in tried if size > 8 * unknown]
+            found[name] = max((x for x in least if x < LARGEST), default=None)
+            hidden += sum(not x < LARGEST for x in least)
     return Limits(**found), hidden
 
 
@@ -174,13 +188,16 @@ def of_steps(
     at = rows(case, len(told), told)
     change = change_of(case.trajectory.every)
 
-    def motions(name: str) -> list[States]:
+    def motions(name: str, change: float = change) -> list[States]:
         if name == "step":
             return [_ends(changed(case, name, change), at)]
         some = _weakest(case, every_row(case, name, copies), at)
         return [_ends(changed(case, name, change, one), at) for one in some]
 
-    found, hidden = limits(_ends(case, at), motions, change, lambda off: part(at, off))
+    def coarse(name: str) -> list[States]:
+        return motions(name, COARSER * change)
+
+    found, hidden = limits(_ends(case, at), motions, change, lambda off: part(at, off), coarse)
     said = f"; {count(hidden, 'spring')} could be off by any part and not be seen in a step" if hidden else ""
     return found, said
 
