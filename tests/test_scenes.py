@@ -48,11 +48,12 @@ def shortened(name: str) -> Scene:
     return replace(scene, steps=min(scene.steps, 2000))
 
 
+SHIPPED = {name: scenes.load_scene(name) for name in scenes.names()}
 CASES = [
     (name, str(label))
-    for name in scenes.names()
-    for label in engines.match(scenes.load_scene(name).include, bath=scenes.load_scene(name).bath is not None)
-    if engines.refusal(scenes.load_scene(name), label) is None
+    for name, scene in SHIPPED.items()
+    for label in engines.match(scene.include, bath=scene.bath is not None)
+    if engines.refusal(scene, label) is None
 ]
 
 
@@ -70,6 +71,8 @@ LEFT_OUT_AT_START = {
 def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: str, need: Need) -> None:
     need(label)
     scene = shortened(name)
+    # a step takes 0.3 ms by ASE, a hundred times that of others
+    scene = replace(scene, steps=min(scene.steps, 400)) if label.startswith("ase:") else scene
     if (name, label) in LEFT_OUT_AT_START:
         with pytest.raises(MethodError, match=LEFT_OUT_AT_START[name, label]):
             driver.run(scene, label)
