@@ -23,15 +23,15 @@ _spec.loader.exec_module(judge_campaign)
 def test_the_campaign_has_more_than_a_hundred_kinds_of_faults() -> None:
     assert len(judge_campaign.FAULTS) >= 100
     assert len(judge_campaign.LEGAL) == 16
+    assert len(judge_campaign.explicit_forms.FORMS) == 5
 
 
 @pytest.mark.parametrize("first", [0, 100])
-def test_no_legal_engine_is_rejected_and_no_fault_is_missed_that_is_far_above_their_noise(first: int) -> None:
+def test_no_legal_engine_is_rejected_and_no_fault_is_missed_that_is_above_their_noise(first: int) -> None:
     found = judge_campaign.campaign(first, 20)
     assert found.sets >= 60
     assert found.alarms == []
-    # on these scenes none is missed; below 100 times the noise one may hide in a bound
-    assert set(found.decades) <= {"1e2"}
+    assert found.missed == []
     assert found.numbers == []
     assert found.seen >= 20
     assert max(found.noise.values()) < 0.5

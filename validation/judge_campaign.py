@@ -8,12 +8,12 @@ amplitudes away, hubs, 33 to 48 particles; every scheme with a step of its own; 
 legal orders of operation (as written, in extended precision and rounded once a step or never, velocities
 instead of momenta, terms in another order, row by row, fused products, the one-step matrix less 1 and
 whole, the force as f0 - K q, positions counted from where particles rest, velocities rebuilt from positions),
-and four forms of an implicit step (`implicit_forms.py`); and
+four forms of an implicit step (`implicit_forms.py`), and five of an explicit one (`explicit_forms.py`); and
 faults of more than a hundred kinds: every parameter of every term and of the grid, coefficients of the
 schemes, every other scheme, and what happens to states on their way.
 
-A set is all verdicts on one trajectory; a scene has two of legal engines and two of faulty ones.  A false
-alarm is a failed verdict on a legal engine.
+A set is all verdicts on one trajectory; a scene has two or three of legal engines and two of faulty ones.
+A false alarm is a failed verdict on a legal engine.
 
 How large a fault is follows from no allowance of the judge.  The defect of a coordinate is how far recorded
 frames are from the scheme's own steps, in extended precision, from the frame before; its noise is the
@@ -45,6 +45,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+import explicit_forms
 import implicit_forms
 from arguments import arguments
 from springcheck import checks, driver, engines, schemes
@@ -738,6 +739,22 @@ def one(seed: int, counts: Counts) -> None:
             if order in chosen:
                 what = f"seed {seed}, {scheme.name}, {order}, every {scene.every}"
                 _legal(counts, checks.judge(scene, right), what)
+        # one of those that this scheme and scene have, of a stream of its own
+        others = {name: form(scene, scheme) for name, form in explicit_forms.FORMS.items()}
+        fitting = [(name, step) for name, step in others.items() if step is not None]
+        if fitting:
+            order, step = fitting[int(np.random.default_rng([15, seed]).integers(len(fitting)))]
+            right = run(scene, scheme, step)
+            if _subnormal(right):
+                return
+            found = _defect(scene, right)
+            if found is not None:
+                noise = found if noise is None else np.maximum(noise, found)
+            _legal(
+                counts,
+                checks.judge(scene, right),
+                f"seed {seed}, {scheme.name}, {order}, every {scene.every}",
+            )
         near = np.random.default_rng([14, seed])
         for _ in range(min(STARTS, max(6, STEPS // scene.steps)) if len(right.t) < FRAMES else 0):
             start = tuple(x * (1 + 1e-6 * near.normal(size=scene.n)) for x in (scene.q, scene.p))
