@@ -106,9 +106,10 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
         digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
         known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
         if passed:
-            off = np.max(np.abs(ahead.end - states[:, 1:])[:, told], axis=1)
+            ends = states[:, 1:]
+            off = np.max(np.abs(ahead.end - ends)[:, told], axis=1)
             coarser = run.arithmetic.state / Arithmetic().state
-            known &= off <= OF_RECORDING * coarser * np.spacing(digits) / 2
+            known &= off <= OF_RECORDING * coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
         coarse = (way > 0) & ~hidden & ~known
     return _list(hidden, BLIND) + _list(coarse, NO_BETTER, worst)
 
