@@ -16,6 +16,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
+from springcheck.thermal import THERMOSTATS, Law
 from springcheck.thermal.states import identify_thermal
 
 pytestmark = pytest.mark.slow
@@ -100,11 +101,31 @@ def test_single_precision_and_text_say_less_and_nothing_wrong() -> None:
         assert found.misfit > 1e-9
 
 
-def test_frames_several_steps_apart_are_named_by_nothing_wrong() -> None:
-    for name in ("baoab", "obabo", "baoa"):
-        t, q, v = run(name, 8000)
-        found = identify_thermal(t[::4], q[::4], v[::4])
-        assert found is None or not found.named or found.candidates[0].scheme == name
+@pytest.mark.parametrize("name", ["baoab", "obabo", "gj-ii-half"])
+def test_frames_several_steps_apart_list_their_scheme_and_their_stride(name: str) -> None:
+    t, q, v = run(name, 8000)
+    found = identify_thermal(t[::4], q[::4], v[::4])
+    assert found is not None
+    assert not found.named
+    (one,) = [x for x in found.candidates if x.scheme == name]
+    assert 4 in one.strides
+    # at any stride that fits, few turns apart, the friction and the temperature are those of the bath
+    if one.strides[0] == 4:
+        assert abs(one.friction - RATE) < 5 * one.friction_error < 0.4
+        assert abs(one.thermal - THERMAL / M) < 5 * one.thermal_error < 0.2
+
+
+def test_several_steps_of_a_law_are_its_autocovariance() -> None:
+    """A**s and the noise of s steps, by steps taken one by one and by the stationary covariance."""
+    about: dict[str, Any] = {"h": 0.31, "m": np.array([1.7, 0.4]), "k": np.array([3.3, 2.1]), "thermal": 0.6}
+    for name in ("obabo", "bbk", "gj-iii-half"):
+        law = Law(scheme=THERMOSTATS[name], rate=0.9, **about)
+        B, Q = law.apart([3, 1])
+        S = law.covariance
+        for i, steps in enumerate((3, 1)):
+            lag = law.autocovariance(steps)[i]
+            assert np.allclose(B[i] @ S[i], lag, rtol=1e-12, atol=1e-13)
+            assert np.allclose(Q[i], S[i] - B[i] @ S[i] @ B[i].T, rtol=1e-12, atol=1e-13)
 
 
 def test_the_public_function_and_the_command_say_it(

@@ -72,9 +72,11 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
     verdict: Any = "named" if named else "not told apart" if best else "none"
     rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
     kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
+    every = {name: rows[name][0].strides[0] for name in kept}
     candidates = tuple(
         Candidate(
-            scheme=name, aliases=(), stride=1, step=h, turns=0, omega=tuple(y.omega for y in rows[name]),
+            scheme=name, aliases=(), stride=every[name], step=h / every[name], turns=0,
+            omega=tuple(y.omega for y in rows[name]),
             stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
             if with_mass else None,
             friction=tuple(y.friction for y in rows[name]), law="of the bath",
@@ -84,13 +86,15 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
     notes = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
     if first.uniform:
         notes.append("the draws are uniform, not normal")
+    apart = any(s > 1 for one in found for y in one.candidates for s in y.strides)
     if first.candidates and not named:
+        more = "frames of every step, a stated" if apart else "a stated"
         notes.append(
-            "one scheme is named where it beats every other by a factor of 1e6; a stated stiffness, or more "
-            "frames, may tell them apart"
+            "one scheme is named where it beats every other, of any number of steps between two frames, by a "
+            f"factor of 1e6; {more} stiffness, or more frames, may tell them apart"
         )
-    if sparse := next((one.sparser for one in found if one.sparser), None):
-        notes.append(f"every step {sparse[1]} of {sparse[0]} would leave such frames nearly as well")
+    if apart:
+        notes.append("of frames several steps apart whole turns between two of them do not show")
     if first.free:
         combination = ", ".join(f"{x:.9g}" for x in first.free)
         notes.append(f"free of noise at every step: ({combination}) on (x', v', x, v), to {first.misfit:.0e}")
@@ -100,7 +104,8 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
         statement = f"{head}, {THERMOSTATS[best].title}{late}"
     elif best:
-        statement = f"{head}, {' or '.join(kept)}{'' if first.known else ' or one that is not known here'}"
+        which = [_with_strides(name, rows[name][0].strides) for name in kept]
+        statement = f"{head}, {' or '.join(which)}{'' if first.known else ' or one that is not known here'}"
     else:
         statement = (
             f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
@@ -120,6 +125,14 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
     )  # fmt: skip
 
 
+def _with_strides(name: str, strides: tuple[int, ...]) -> str:
+    """A scheme and the steps from frame to frame that it leaves open."""
+    if strides == (1,):
+        return name
+    low, high = min(strides), max(strides)
+    return f"{name} ({low}{f' to {high}' if high > low else ''} step{'s' * (high > 1)} a frame)"
+
+
 def _numbers(name: str, one: Any, m: float | None) -> str:
     """The numbers that a candidate means, each with its standard error."""
     scale = 1.0 if m is None else m
@@ -127,7 +140,7 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
         ("omega", one.omega, one.omega_error), ("friction", one.friction, one.friction_error),
         ("kT/m" if m is None else "kT", one.thermal * scale, one.thermal_error * scale),
     )  # fmt: skip
-    return f"{name}: " + ", ".join(
+    return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(
         f"{word} {x:.12g}" + ("" if error == 0 else f" +- {error:.1g}" if error > 0 else "")
         for word, x, error in of
         if math.isfinite(x)

@@ -87,6 +87,13 @@ class Thermostat:
         return self.draws - self.carried
 
     @property
+    def full_rank(self) -> bool:
+        """Whether the noise of every step has rank two, by a drift between new draws: no combination of
+        (q', p', q, p) is free of it."""
+        drawn = [i for i, act in enumerate(self.acts) if act.kind in ("exchange", "noise")]
+        return self.fresh > 1 and any(act.kind == "drift" for act in self.acts[drawn[0] : drawn[-1]])
+
+    @property
     def collides(self) -> bool:
         """Whether noise comes with a probability."""
         return any(act.kind == "collide" for act in self.acts)

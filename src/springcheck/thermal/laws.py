@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +30,14 @@ class Branch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T] and thermal energy kT;
-    `fast` (n,) of k are those of fast terms."""
+    """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T], one or (n,) of them,
+    and thermal energy kT; `fast` (n,) of k are those of fast terms."""
 
     scheme: Thermostat
     h: float
     m: Reals
     k: Reals
-    rate: float
+    rate: Reals | float
     thermal: float
     fast: Reals | float = 0.0
 
@@ -108,8 +109,8 @@ class Law:
             g = G / scale[:, :, None]
             right += chance * np.einsum("nij,nkj->nik", g, g).reshape(n, d * d)
         out = np.full((n, d, d), np.inf)
-        for i in np.flatnonzero(self.growth < 1):
-            out[i] = np.linalg.solve(np.eye(d * d) - self._moments[i], right[i]).reshape(d, d)
+        i = self.growth < 1
+        out[i] = np.linalg.solve(np.eye(d * d) - self._moments[i], right[i][..., None]).reshape(-1, d, d)
         return np.asarray(out * scale[:, :, None] * scale[:, None, :])
 
     @cached_property
@@ -152,6 +153,23 @@ class Law:
         """<z(t + steps h) z(t)'> of (q, p), (n, 2, 2)."""
         mean = np.asarray(sum(chance * A for chance, A, _ in self._state))
         return np.asarray((np.linalg.matrix_power(mean, steps) @ self._covariance)[:, :2, :2])
+
+    def apart(self, steps: Any) -> tuple[Floats, Floats]:
+        """What so many steps (n,) come to, as a map (n, 2, 2) and a covariance of noise (n, 2, 2): of draws
+        that are carried on into them that part which q and p say nothing of."""
+        (_, A, G), every = self._state[0], np.asarray(steps)[:, None, None]
+        W = G @ G.transpose(0, 2, 1)
+        B, Q = A, W
+        for j in range(1, int(np.max(every))):
+            B = np.where(j < every, A @ B, B)
+            Q = np.where(j < every, A @ Q @ A.transpose(0, 2, 1) + W, Q)
+        if not self.scheme.carried:
+            return B, Q
+        S = self._covariance
+        known = S[:, 2:, :2] @ np.linalg.inv(S[:, :2, :2])
+        unknown = S[:, 2:, 2:] - known @ S[:, :2, 2:]
+        D = B[:, :2, 2:]
+        return B[:, :2, :2] + D @ known, Q[:, :2, :2] + D @ unknown @ D.transpose(0, 2, 1)
 
     @property
     def configurational(self) -> Floats:

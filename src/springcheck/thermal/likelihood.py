@@ -1,6 +1,8 @@
 """Thermostats by the Gaussian likelihood of an oscillator's states in (h w)**2, gamma h and kT/m.
 
-The second moments of the frames are sufficient.
+The second moments of the frames are sufficient: of frames s steps of A and G apart, the map A**s and the
+covariance of what s steps of noise come to.  In units of a step the law depends on (h w)**2 and gamma h
+alone, and kT/m has its best value in closed form; Newton's method goes on from all starts at once.
 """
 
 from __future__ import annotations
@@ -8,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from math import nan
-from typing import Any
+from math import inf, nan
 
 import numpy as np
 
@@ -20,7 +21,26 @@ from springcheck.thermal.laws import Law
 ODDS = float(np.log(1e6))
 """Nats by which one scheme must beat every other to be named."""
 
-TWO = ("obabo", "oabao", "boaob", "vanden-eijnden-ciccotti", "baoab-respa2")
+CHANCE = 25.0
+"""Nats that seven free numbers of a map and a noise gain over three or four by chance once in 1e9 times."""
+
+STRIDES = (2, 3, 4, 5, 6, 8)
+"""Steps from frame to frame that are tried where they are not known."""
+
+FULL = tuple(name for name, one in THERMOSTATS.items() if one.full_rank)
+"""Schemes whose every step has noise of rank two."""
+
+LINEAR = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
+"""Schemes whose several steps are one map and one normal noise."""
+
+EITHER_WAY = 0.5
+"""Sine of the turn between two frames, below which it is taken both ways."""
+
+FAR = 200.0
+"""Nats above the best start's, from which on a start is left as soon as little is gained."""
+
+TRIES = 40
+"""Steps of Newton's method at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,110 +60,212 @@ class Candidate:
     """Share of fast terms in omega**2."""
     nats: float = 0.0
     """By how much its likelihood falls short of the best one's."""
+    strides: tuple[int, ...] = (1,)
+    """Steps from frame to frame that the frames leave open, the likeliest first, of which the numbers are."""
 
 
 def likely(
     names: tuple[str, ...], q: Floats, v: Floats, h: float, *, turn: float | None = None
 ) -> list[Candidate]:
-    """Schemes by the likelihood of their innovations; `turn` is (h w)**2 where it is known.
+    """Schemes by the likelihood of their innovations in frames of every step; `turn` is (h w)**2 if known.
 
     None where every one falls short of a free map and a free noise by more than chance allows.
     """
-    from scipy.optimize import minimize
+    found = [y for name in names for y in _of_scheme(name, q, v, h, (1,), turn)]
+    return _compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank)
 
-    moments, n = _moments(q, v)
-    single = names[0] not in TWO
 
-    def share(at: Floats) -> float:
-        # the last number of a scheme that takes them apart: fast terms over slow ones
-        return float(1 / (1 + np.exp(-at[-1])))
+def likely_apart(q: Floats, v: Floats, h: float) -> list[Candidate]:
+    """Schemes by their likelihood, the steps between two frames h apart unknown; such as fall short of the
+    best by more than `ODDS` at every stride are left out, but for those of every step.
 
-    def minus(name: str, at: Floats) -> float:
-        a = turn if turn is not None else float(np.exp(at[2]))
-        k = a / h**2 * np.ones(1)
-        fast = share(at) if THERMOSTATS[name].splits else 0.0
-        law = Law(
-            scheme=THERMOSTATS[name], h=h, m=np.ones(1), k=k, rate=float(np.exp(at[0])) / h,
-            thermal=float(np.exp(at[1])), fast=fast * k,
-        )  # fmt: skip
-        A, G = law.A[0].astype(float), law.G[0].astype(float)
-        Q = G @ G.T
-        if not single:
-            return _nats(A, Q, moments, n)
-        # the position says what the momentum says
-        over = np.concatenate([np.eye(2), -A], axis=1)
-        value = np.log(Q[1, 1]) + (over @ moments @ over.T)[1, 1] / Q[1, 1]
-        return n / 2 * float(value) if np.isfinite(value) else 1e300
+    None as in `likely`.
+    """
+    found = [
+        y for name in LINEAR for y in _of_scheme(name, q, v, h, (1, *STRIDES) if name in FULL else STRIDES)
+    ]
+    kept: dict[str, Candidate] = {}
+    for one in _compared(found, q, v):
+        before = kept.get(one.scheme)
+        if before is None:
+            kept[one.scheme] = one
+        elif one.nats < ODDS:
+            kept[one.scheme] = replace(before, strides=(*before.strides, *one.strides))
+    return [one for one in kept.values() if one.nats < ODDS or one.strides == (1,)]
 
-    A = moments[:2, 2:] @ np.linalg.inv(moments[2:, 2:])
-    decay = min(max(float(np.linalg.det(A)), 1e-6), 1 - 1e-6)
-    a = min(max(2 * (1 - float(np.trace(A)) / (1 + decay)), 1e-6), 3.9)
-    start: Any = np.log([-np.log(decay), np.var(v), a][: 2 if turn is not None else 3])
-    found = []
-    for name in names:
-        with np.errstate(all="ignore"):
-            of_name: Any = partial(minus, name)
-            how = {"xatol": 1e-7, "fatol": 1e-7, "maxiter": 2000}
-            first = [*start, 0.0] if THERMOSTATS[name].splits else start
-            fit: Any = minimize(of_name, first, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
-            errors = _errors(of_name, fit.x)
-        of_a = turn if turn is not None else float(np.exp(fit.x[2]))
-        w, rate, thermal = float(np.sqrt(of_a) / h), float(np.exp(fit.x[0]) / h), float(np.exp(fit.x[1]))
-        found.append(
-            Candidate(
-                scheme=name,
-                omega=w,
-                omega_error=0.0 if turn is not None else float(w * errors[2] / 2),
-                friction=rate,
-                friction_error=float(rate * errors[0]),
-                thermal=thermal,
-                thermal_error=float(thermal * errors[1]),
-                fast=share(fit.x) if THERMOSTATS[name].splits else 0.0,
-                nats=float(fit.fun),
-            )
-        )
-    best = min(y.nats for y in found)
-    if not single:
+
+def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = False) -> list[Candidate]:
+    """Candidates by what their likelihood falls short of the best, if one `fits` as a free map would."""
+    best = min((y.nats for y in found), default=inf)
+    if not fits:
+        moments, n = _moments(q, v)
+        A = _free(moments)
         free = moments[:2, :2] - A @ moments[2:, :2]
-        floor = n / 2 * (float(np.log(np.linalg.det(free))) + 2)
-        # seven numbers less three or four: 25 nats more come about by chance once in 1e9 times
-        if not best - floor < 25:
+        if not best - n / 2 * (float(np.log(np.linalg.det(free))) + 2) < CHANCE:
             return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
 
-def sparser(best: Candidate, q: Floats, v: Floats, h: float) -> tuple[str, int] | None:
-    """The first scheme of which every few steps fall short of the best candidate by less than `ODDS`.
-
-    What several steps do is near the exact flow whatever the scheme, and two draws suffice for any of them.
-    """
-    from scipy.optimize import minimize
-
-    moments, n = _moments(q, v)
-    start = np.log([best.friction * h, best.thermal, (best.omega * h) ** 2])
-
-    def minus(name: str, every: int, at: Floats, fast: float = 0.0) -> float:
-        x, thermal, a = np.exp(at)
-        k = a / h**2 * np.ones(1)
-        law = Law(
-            scheme=THERMOSTATS[name], h=h / every, m=np.ones(1), k=k, rate=float(x) / h,
-            thermal=float(thermal), fast=fast * k,
+def _of_scheme(
+    name: str, q: Floats, v: Floats, h: float, strides: tuple[int, ...], turn: float | None = None
+) -> list[Candidate]:
+    """The best of a scheme at each stride; nats are those of its likelihood."""
+    moments, n = _moments(q, v * h)
+    begins, every = _starts(_free(moments), strides)
+    if turn is not None:
+        begins = begins[:, :1]
+    elif THERMOSTATS[name].splits:
+        begins = np.column_stack([begins, np.zeros(len(begins))])
+    of = partial(_profile, name, moments, n, turn)
+    with np.errstate(all="ignore"):
+        at, nats, curved = _descend(of, begins, every)
+        thermal = of(at, every)[1]
+    out = []
+    for s in strides:
+        rows = np.flatnonzero(every == s)
+        if not len(rows) or not np.isfinite(nats[rows]).any():
+            continue
+        i = rows[np.nanargmin(nats[rows])]
+        errors = _errors(of, at[i], s, curved[i], 1 / n if THERMOSTATS[name].full_rank or s > 1 else 2 / n)
+        w = float(np.sqrt(turn if turn is not None else np.exp(at[i, 1])) * s / h)
+        rate, heat = float(np.exp(at[i, 0]) * s / h), float(thermal[i] * (s / h) ** 2)
+        out.append(
+            Candidate(
+                scheme=name, omega=w, omega_error=0.0 if turn is not None else float(w * errors[1] / 2),
+                friction=rate, friction_error=float(rate * errors[0]), thermal=heat,
+                thermal_error=float(heat * errors[-1]), fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
+                # a unit of velocity is no news
+                nats=float(nats[i] - n * np.log(h)), strides=(s,),
+            )
         )  # fmt: skip
-        S = law.covariance[0]
-        if not np.isfinite(S).all():
-            return 1e300
-        A = law.autocovariance(every)[0] @ np.linalg.inv(S)
-        return _nats(A, S - A @ S @ A.T, moments, n)
+    return out
 
-    least = minus(best.scheme, 1, start, best.fast)
-    how = {"xatol": 1e-3, "fatol": 1e-2, "maxiter": 300}
-    for every in (2, 3, 4, 8):
-        for name in (x for x, one in THERMOSTATS.items() if not (one.rescales or one.splits)):
-            with np.errstate(all="ignore"):
-                fit: Any = minimize(partial(minus, name, every), start, method="Nelder-Mead", options=how)  # type: ignore[call-overload]
-            if fit.fun - least < ODDS:
-                return name, every
-    return None
+
+def _share(at: Floats) -> Floats:
+    """Fast terms in all, of the last number of a scheme that takes them apart: log of fast over slow."""
+    return np.asarray(1 / (1 + np.exp(-at[..., -1])))
+
+
+def _profile(
+    name: str, moments: Floats, n: int, turn: float | None, at: Floats, every: Floats
+) -> tuple[Floats, Floats]:
+    """Minus the logarithm of the likelihood (k,) at log gamma h and log (h w)**2 (k, 2) of strides (k,), in
+    units of a frame, and the best kT/m in those of a step."""
+    scheme = THERMOSTATS[name]
+    turns = np.full(len(at), turn) if turn is not None else np.exp(at[:, 1])
+    law = Law(
+        scheme=scheme, h=1.0, m=np.ones(len(at)), k=turns, rate=np.exp(at[:, 0]), thermal=1.0,
+        fast=_share(at) * turns if scheme.splits else 0.0,
+    )  # fmt: skip
+    B, Q = law.apart(every)
+    unit = np.stack([np.ones(len(at)), every], axis=1)
+    B = B * unit[:, :, None] / unit[:, None, :]
+    Q = Q * unit[:, :, None] * unit[:, None, :]
+    over = np.concatenate([np.broadcast_to(np.eye(2), B.shape), -B], axis=2)
+    seen = over @ moments @ over.transpose(0, 2, 1)
+    if scheme.full_rank or not np.all(every == 1):
+        det = Q[:, 0, 0] * Q[:, 1, 1] - Q[:, 0, 1] ** 2
+        thermal = (
+            Q[:, 1, 1] * seen[:, 0, 0] + Q[:, 0, 0] * seen[:, 1, 1] - 2 * Q[:, 0, 1] * seen[:, 0, 1]
+        ) / (2 * det)
+        value = 2 * np.log(thermal) + np.log(det) + 2
+    else:
+        # the position says what the momentum says
+        thermal = seen[:, 1, 1] / Q[:, 1, 1]
+        value = np.log(seen[:, 1, 1]) + 1
+    value = n / 2 * value
+    return np.where(np.isfinite(value), value, inf), np.asarray(thermal)
+
+
+def _starts(A: Floats, strides: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Log gamma h and log (h w)**2 (k, 2) of which a free map A of a frame has its decay and its turn, at
+    strides (k,); whole turns between frames leave several of a stride."""
+    det = min(max(float(np.linalg.det(A)), 1e-6), 1 - 1e-6)
+    half = float(np.trace(A)) / 2
+    out, every = [], []
+    for s in strides:
+        decay = det ** (1 / s)
+        if half * half < det or half < 0:
+            cosine = max(half / np.sqrt(det), -1.0)
+            angle, sine = float(np.arccos(cosine)), np.sqrt(1 - cosine * cosine)
+            # of half a turn, more or less, the frames may not tell which way it was
+            ways = [angle, 2 * np.pi - angle][:: 1 if A[0, 1] > 0 else -1][: 2 if sine < EITHER_WAY else 1]
+            angles = [angle] if s == 1 else [(x + 2 * np.pi * m) / s for m in range(s) for x in ways]
+            traces = [2 * np.sqrt(decay) * np.cos(x) for x in angles if x < np.pi]
+        else:
+            roots = half + np.array([1, -1]) * np.sqrt(half * half - det)
+            traces = [float(np.sum(np.maximum(roots, 1e-6) ** (1 / s)))]
+        for trace in traces or [0.0]:
+            turn = min(max(2 * (1 - trace / (1 + decay)), 1e-6), 3.9)
+            out.append(np.log([-np.log(decay), turn]))
+            every.append(s)
+    return np.array(out), np.array(every)
+
+
+def _descend(
+    of: Callable[[Floats, Floats], tuple[Floats, Floats]], at: Floats, every: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Minima of a function from starts (k, p) by Newton's method, its curvatures taken positive and damped:
+    where they are, its values (k,) and its second derivatives (k, p, p)."""
+    at, damping = at.copy(), np.full(len(at), 1e-3)
+    best, slope, curved = _derivatives(of, at, every)
+    going = np.isfinite(best)
+    for _ in range(TRIES):
+        rows = np.flatnonzero(going)
+        if not len(rows):
+            break
+        sizes, ways = np.linalg.eigh(curved[rows])
+        along = np.einsum("kij,ki->kj", ways, slope[rows])
+        sizes = np.abs(sizes) + damping[rows, None] * np.max(np.abs(sizes), axis=1, keepdims=True) + 1e-9
+        move = -np.einsum("kij,kj->ki", ways, along / sizes)
+        gain = np.sum(along**2 / sizes, axis=1) / 2
+        move /= np.maximum(np.max(np.abs(move), axis=1, keepdims=True), 1.0)
+        value, new_slope, new_curved = _derivatives(of, at[rows] + move, every[rows])
+        better = value < best[rows]
+        won = rows[better]
+        at[won] += move[better]
+        best[won], slope[won], curved[won] = value[better], new_slope[better], new_curved[better]
+        damping[rows] *= np.where(better, 0.1, 10)
+        # what is far off, and would be after ten such steps, is no minimum that counts
+        near = best[rows] - 10 * gain < np.min(best) + FAR
+        going[rows] = (gain > 1e-5) & (damping[rows] < 1e8) & near
+    return at, best, curved
+
+
+def _derivatives(
+    of: Callable[[Floats, Floats], tuple[Floats, Floats]], at: Floats, every: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Values (k,), slopes (k, p) and second derivatives (k, p, p) of a function, by differences."""
+    k, p = at.shape
+    step, unit = 1e-3, np.eye(p)
+    pairs = [(i, j) for i in range(p) for j in range(i)]
+    moves = [np.zeros(p), *unit, *-unit]
+    moves += [a * unit[i] + b * unit[j] for i, j in pairs for a in (1, -1) for b in (1, -1)]
+    points = at[:, None] + step * np.array(moves)
+    y = of(points.reshape(-1, p), np.repeat(every, len(moves)))[0].reshape(k, -1)
+    up, down, curved = y[:, 1 : p + 1], y[:, p + 1 : 2 * p + 1], np.empty((k, p, p))
+    for i in range(p):
+        curved[:, i, i] = up[:, i] - 2 * y[:, 0] + down[:, i]
+    for (i, j), four in zip(pairs, np.split(y[:, 2 * p + 1 :], max(len(pairs), 1), axis=1), strict=False):
+        curved[:, i, j] = curved[:, j, i] = (four[:, 0] - four[:, 1] - four[:, 2] + four[:, 3]) / 4
+    off, slope = ~np.isfinite(y).all(axis=1), (up - down) / (2 * step)
+    value = np.where(off, inf, y[:, 0])
+    slope[off], curved[off] = 0, 0
+    return value, slope, curved / step**2
+
+
+def _errors(
+    of: Callable[[Floats, Floats], tuple[Floats, Floats]], at: Floats, every: int, curved: Floats, own: float
+) -> Floats:
+    """Relative standard errors of exp(at), and of kT/m, whose variance is `own` where these are known."""
+    step, unit = 1e-3, np.eye(len(at))
+    heat = np.log(of(np.concatenate([at + step * unit, at - step * unit]), np.full(2 * len(at), every))[1])
+    slope = (heat[: len(at)] - heat[len(at) :]) / (2 * step)
+    try:
+        spread = np.linalg.inv(curved)
+    except np.linalg.LinAlgError:
+        return np.full(len(at) + 1, nan)
+    return np.asarray(np.sqrt(np.abs([*np.diag(spread), own + slope @ spread @ slope])))
 
 
 def _moments(q: Floats, v: Floats) -> tuple[Floats, int]:
@@ -153,25 +275,6 @@ def _moments(q: Floats, v: Floats) -> tuple[Floats, int]:
     return np.asarray(both @ both.T / n), n
 
 
-def _nats(A: Floats, Q: Floats, moments: Floats, n: int) -> float:
-    """Minus the logarithm of the likelihood of n frames of these moments, of map A and covariance Q."""
-    over = np.concatenate([np.eye(2), -A], axis=1)
-    seen = over @ moments @ over.T
-    value = np.log(np.linalg.det(Q)) + np.trace(np.linalg.solve(Q, seen))
-    return n / 2 * float(value) if np.isfinite(value) else 1e300
-
-
-def _errors(minus: Callable[[Floats], float], at: Floats) -> Floats:
-    """Standard errors by the curvature of a log-likelihood."""
-    step, n = 1e-3, len(at)
-    unit = np.eye(n) * step
-    curved = np.array(
-        [
-            [minus(at + e + g) - minus(at + e - g) - minus(at - e + g) + minus(at - e - g) for g in unit]
-            for e in unit
-        ]
-    ) / (4 * step * step)
-    try:
-        return np.asarray(np.sqrt(np.abs(np.diag(np.linalg.inv(curved)))))
-    except np.linalg.LinAlgError:
-        return np.full(n, nan)
+def _free(moments: Floats) -> Floats:
+    """The best map of a frame, of these moments."""
+    return np.asarray(moments[:2, 2:] @ np.linalg.inv(moments[2:, 2:]))

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, nan
+from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
 from springcheck.thermal.decays import GJ
-from springcheck.thermal.likelihood import ODDS, TWO, Candidate, likely, sparser
+from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 
 FEWEST = 200
 """Frames from which on states are asked for their draws."""
@@ -52,16 +53,14 @@ class Thermal:
     """How far it is from 0, over the size of the noise."""
     uniform: bool
     """Whether the draws are uniform rather than normal."""
-    sparser: tuple[str, int] | None = None
-    """A scheme of which every so many steps would do nearly as well as the best candidate."""
     known: bool = True
     """Whether what acts is known: one momentum shows no factor, but any change of it that ends a step."""
 
     @property
     def named(self) -> bool:
-        """Whether one scheme beats every other, and every other of smaller steps."""
+        """Whether one scheme beats every other, and every one of smaller steps."""
         best = bool(self.candidates) and all(x.nats > ODDS for x in self.candidates[1:])
-        return best and self.known and self.sparser is None
+        return best and self.known and self.candidates[0].strides == (1,)
 
 
 JOINED_FROM = 6.0
@@ -120,9 +119,8 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0])))
     if not all(map(_is_white, left)) or not even:
         return None
-    found = Thermal(candidates=tuple(likely(TWO, q, v, h)), free=(), misfit=nan, uniform=_is_uniform(left[1]))
-    found = replace(found, known=not bent)
-    return replace(found, sparser=sparser(found.candidates[0], q, v, h)) if found.named else found
+    found = tuple(likely_apart(q, v, h))
+    return Thermal(candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent)
 
 
 def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
@@ -208,7 +206,7 @@ def _of_one(
     elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
         # what a collision has left of the momentum, the rest of the step takes on without noise
         w = float(np.sqrt(2 * (1 + 1 / c)) / h)
-        known = {"omega": w, "omega_error": 0.0}
+        known: dict[str, Any] = {"omega": w, "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
         still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
         often = close > COARSE or float(np.quantile(still, 0.05)) > close * float(np.std(v))

@@ -35,7 +35,7 @@ class Stepper:
     """
 
     def __init__(
-        self, scheme: Thermostat, *, h: float, m: Reals, rate: float, thermal: float, width: Any,
+        self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
         absolute: bool = False, freedoms: int = 0,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
@@ -45,7 +45,7 @@ class Stepper:
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
             self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
         x = np.asarray(self.h * width(rate), width)
-        self.collision = float(-np.expm1(-x))
+        self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
         size = np.sqrt(self.m * width(thermal))
         shot = np.sqrt(2 * x) * size
         sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
