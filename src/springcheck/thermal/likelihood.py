@@ -36,7 +36,7 @@ LINEAR = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or
 EITHER_WAY = 0.5
 """Sine of the turn between two frames, below which it is taken both ways."""
 
-FAR = 200.0
+HOPELESS = 200.0
 """Nats above the best start's, from which on a start is left as soon as little is gained."""
 
 TRIES = 40
@@ -227,7 +227,7 @@ def _descend(
         best[won], slope[won], curved[won] = value[better], new_slope[better], new_curved[better]
         damping[rows] *= np.where(better, 0.1, 10)
         # what is far off, and would be after ten such steps, is no minimum that counts
-        near = best[rows] - 10 * gain < np.min(best) + FAR
+        near = best[rows] - 10 * gain < np.min(best) + HOPELESS
         going[rows] = (gain > 1e-5) & (damping[rows] < 1e8) & near
     return at, best, curved
 
