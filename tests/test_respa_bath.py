@@ -15,7 +15,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.studies.run.heat import heated_of
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.likelihood import FULL, likely
+from springcheck.thermal.likelihood import FULL_RANK, likely
 
 LABELS = ("own:baoab-respa2", "openmm:mts-langevin-2")
 
@@ -80,11 +80,11 @@ def test_a_file_of_it_is_told_with_its_share_of_fast_springs() -> None:
     scene = two_scales(steps=1000)
     run = driver.run(scene, LABELS[0], seed=3)
     for j, fast in enumerate([41 / 43.9, 17 / 18.1]):
-        found = likely(FULL, run.q[:, j], run.p[:, j] / scene.m[j], scene.step)
+        found = likely(FULL_RANK, run.q[:, j], run.p[:, j] / scene.m[j], scene.step)
         assert found[0].scheme == "baoab-respa2"
         assert found[1].nats > 13.8
         assert found[0].fast == pytest.approx(fast, abs=0.1)
     other = driver.run(scene, "own:obabo", seed=3)
-    found = likely(FULL, other.q[:, 0], other.p[:, 0] / scene.m[0], scene.step)
+    found = likely(FULL_RANK, other.q[:, 0], other.p[:, 0] / scene.m[0], scene.step)
     assert found[0].scheme == "obabo"
     assert {x.scheme: x.nats for x in found}["baoab-respa2"] > 13.8

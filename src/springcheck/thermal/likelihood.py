@@ -21,16 +21,16 @@ from springcheck.thermal.laws import Law
 ODDS = float(np.log(1e6))
 """Nats by which one scheme must beat every other to be named."""
 
-CHANCE = 25.0
+GAINED_BY_CHANCE = 25.0
 """Nats that seven free numbers of a map and a noise gain over three or four by chance once in 1e9 times."""
 
-STRIDES = (2, 3, 4, 5, 6, 8)
+STRIDES_TRIED = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
-FULL = tuple(name for name, one in THERMOSTATS.items() if one.full_rank)
+FULL_RANK = tuple(name for name, one in THERMOSTATS.items() if one.full_rank)
 """Schemes whose every step has noise of rank two."""
 
-LINEAR = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
+LINEAR_SCHEMES = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
 """Schemes whose several steps are one map and one normal noise."""
 
 EITHER_WAY = 0.5
@@ -39,7 +39,7 @@ EITHER_WAY = 0.5
 HOPELESS = 200.0
 """Nats above the best start's, from which on a start is left as soon as little is gained."""
 
-TRIES = 40
+NEWTON_STEPS = 40
 """Steps of Newton's method at most."""
 
 
@@ -82,7 +82,9 @@ def likely_apart(q: Floats, v: Floats, h: float) -> list[Candidate]:
     None as in `likely`.
     """
     found = [
-        y for name in LINEAR for y in _of_scheme(name, q, v, h, (1, *STRIDES) if name in FULL else STRIDES)
+        y
+        for name in LINEAR_SCHEMES
+        for y in _of_scheme(name, q, v, h, (1, *STRIDES_TRIED) if name in FULL_RANK else STRIDES_TRIED)
     ]
     kept: dict[str, Candidate] = {}
     for one in _compared(found, q, v):
@@ -101,7 +103,7 @@ def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = Fals
         moments, n = _moments(q, v)
         A = _free(moments)
         free = moments[:2, :2] - A @ moments[2:, :2]
-        if not best - n / 2 * (float(np.log(np.linalg.det(free))) + 2) < CHANCE:
+        if not best - n / 2 * (float(np.log(np.linalg.det(free))) + 2) < GAINED_BY_CHANCE:
             return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
@@ -210,7 +212,7 @@ def _descend(
     at, damping = at.copy(), np.full(len(at), 1e-3)
     best, slope, curved = _derivatives(of, at, every)
     going = np.isfinite(best)
-    for _ in range(TRIES):
+    for _ in range(NEWTON_STEPS):
         rows = np.flatnonzero(going)
         if not len(rows):
             break
