@@ -17,6 +17,7 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.thermal import THERMOSTATS, Law
+from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.states import identify_thermal
 
 pytestmark = pytest.mark.slow
@@ -172,3 +173,24 @@ def test_gromacs_sd_names_itself_in_single_precision() -> None:
     assert (found.verdict, found.scheme, found.velocity_offset) == ("named", "baoa", -0.5)
     assert found.omega[0] == pytest.approx(np.sqrt(20000 / 12.011), rel=2e-5)
     assert found.friction[0] == pytest.approx(10, rel=0.5)
+
+
+@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog"])
+def test_frames_without_a_collision_between_them_tell_the_spring_and_the_stride_to_rounding(
+    name: str,
+) -> None:
+    t, q, v = run(name, 4000)
+    found = identify_thermal(t[::4], q[::4], v[::4])
+    assert found is not None
+    (one,) = [x for x in found.candidates if x.scheme == name]
+    assert one.strides == (4,)
+    assert one.omega == pytest.approx(OMEGA, rel=1e-9)
+    assert abs(one.friction - RATE) < 5 * one.friction_error < 0.5 * RATE
+    assert abs(one.thermal - THERMAL / M) < 5 * one.thermal_error < 0.5
+
+
+def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:
+    t, q, v = run("obabo", 1000)
+    still = driver.run(replace(scene(1000), bath=None), "own:velocity-verlet")
+    q, v = np.concatenate([q, still.q[:, 0]]), np.concatenate([v, still.p[:, 0] / M])
+    assert between_collisions(q, v, float(t[1] - t[0])) == []

@@ -24,22 +24,22 @@ ODDS = float(np.log(1e6))
 GAINED_BY_CHANCE = 25.0
 """Nats that seven free numbers of a map and a noise gain over three or four by chance once in 1e9 times."""
 
-STRIDES_TRIED = (2, 3, 4, 5, 6, 8)
+STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
 FULL_RANK = tuple(name for name, one in THERMOSTATS.items() if one.full_rank)
 """Schemes whose every step has noise of rank two."""
 
-LINEAR_SCHEMES = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
+OF_ONE_MAP = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
 """Schemes whose several steps are one map and one normal noise."""
 
 EITHER_WAY = 0.5
 """Sine of the turn between two frames, below which it is taken both ways."""
 
-HOPELESS = 200.0
+FAR_ABOVE = 200.0
 """Nats above the best start's, from which on a start is left as soon as little is gained."""
 
-NEWTON_STEPS = 40
+MOST_NEWTON = 40
 """Steps of Newton's method at most."""
 
 
@@ -83,8 +83,8 @@ def likely_apart(q: Floats, v: Floats, h: float) -> list[Candidate]:
     """
     found = [
         y
-        for name in LINEAR_SCHEMES
-        for y in _of_scheme(name, q, v, h, (1, *STRIDES_TRIED) if name in FULL_RANK else STRIDES_TRIED)
+        for name in OF_ONE_MAP
+        for y in _of_scheme(name, q, v, h, (1, *STEPS_A_FRAME) if name in FULL_RANK else STEPS_A_FRAME)
     ]
     kept: dict[str, Candidate] = {}
     for one in _compared(found, q, v):
@@ -212,7 +212,7 @@ def _descend(
     at, damping = at.copy(), np.full(len(at), 1e-3)
     best, slope, curved = _derivatives(of, at, every)
     going = np.isfinite(best)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MOST_NEWTON):
         rows = np.flatnonzero(going)
         if not len(rows):
             break
@@ -229,7 +229,7 @@ def _descend(
         best[won], slope[won], curved[won] = value[better], new_slope[better], new_curved[better]
         damping[rows] *= np.where(better, 0.1, 10)
         # what is far off, and would be after ten such steps, is no minimum that counts
-        near = best[rows] - 10 * gain < np.min(best) + HOPELESS
+        near = best[rows] - 10 * gain < np.min(best) + FAR_ABOVE
         going[rows] = (gain > 1e-5) & (damping[rows] < 1e8) & near
     return at, best, curved
 

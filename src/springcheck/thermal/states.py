@@ -15,6 +15,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
+from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 
@@ -117,6 +118,8 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
         return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0])))
+    if collided := tuple(between_collisions(q, v, h)):
+        return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
     if not all(map(_is_white, left)) or not even:
         return None
     found = tuple(likely_apart(q, v, h))
