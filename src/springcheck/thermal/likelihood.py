@@ -39,7 +39,7 @@ EITHER_WAY = 0.5
 FAR_ABOVE = 200.0
 """Nats above the best start's, from which on a start is left as soon as little is gained."""
 
-MOST_NEWTON = 40
+STEPS_DOWNHILL = 40
 """Steps of Newton's method at most."""
 
 
@@ -212,7 +212,7 @@ def _descend(
     at, damping = at.copy(), np.full(len(at), 1e-3)
     best, slope, curved = _derivatives(of, at, every)
     going = np.isfinite(best)
-    for _ in range(MOST_NEWTON):
+    for _ in range(STEPS_DOWNHILL):
         rows = np.flatnonzero(going)
         if not len(rows):
             break
