@@ -64,13 +64,21 @@ def _atoms(text: str, lines: Lines, before: int | None) -> int:
 def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     """A text dump with id, positions (x or xu) and velocities (vx), and perhaps the mass."""
     steps: list[int] = []
+    clock: list[float] = []
     numbers = array("d")
     first: list[list[str]] = []
     names: list[str] = []
     n: int | None = None
     with _frames(path, "LAMMPS dump") as lines:
         for line in lines:
-            if not line.startswith("ITEM: TIMESTEP"):
+            # before the number of the step, as `dump_modify units yes time yes` asks for them
+            item = line
+            while item.startswith(("ITEM: UNITS", "ITEM: TIME")) and "STEP" not in item:
+                said = next(lines)
+                if item.startswith("ITEM: TIME"):
+                    clock.append(float(said))
+                item = next(lines)
+            if not item.startswith("ITEM: TIMESTEP"):
                 raise lines.wrong("ITEM: TIMESTEP is expected")
             steps.append(int(next(lines)))
             item, announced, edges = next(lines), 0, list[float]()
@@ -107,7 +115,9 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     q, v = table[:, :, :3], table[:, :, 3:6]
     mass = table[0, :, names.index("mass")] if "mass" in names else None
     # LAMMPS writes 6 digits unless dump_modify asks for more
-    return of_frames(path, times(path, steps, step), q, v, mass, roundoff(first, range(6)))
+    known = step is None and len(clock) == len(steps)
+    at = np.array(clock) if known else times(path, steps, step)
+    return of_frames(path, at, q, v, mass, roundoff(first, range(6)))
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:

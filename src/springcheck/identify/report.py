@@ -50,7 +50,7 @@ from springcheck.identify.search import (
 )  # fmt: skip
 from springcheck.identify.shortened import single_parameters
 from springcheck.identify.thermal import explained, of_bath
-from springcheck.identify.together import OF_A_PAIR, distance, of_a_bond, of_rotation
+from springcheck.identify.together import at_rest, distance, of_a_bond, of_a_pair, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import ELSEWHERE
@@ -124,12 +124,18 @@ def _of_record(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
     found = _of_coordinates(record, stiffness, friction, step)
-    if found.fits or stiffness is not None or (pair := distance(record)) is None:
+    named = found.fits and found.scheme is not None
+    if named and stiffness is None:
+        return at_rest(record, found)
+    if named or stiffness is not None or (pair := distance(record)) is None:
         return found
     other = _of_coordinates(pair, None, friction, step)
     # a coordinate of a pair is no oscillator, and what is said of it alone is wrong
     plainer = other.fits or other.defect_ulp < found.defect_ulp
-    return replace(other, notes=(*other.notes, OF_A_PAIR)) if plainer else found
+    if found.fits:
+        # in single precision a drift passes for a force that fits many schemes
+        plainer = other.fits and other.scheme is not None
+    return of_a_pair(record, other) if plainer else found
 
 
 def _of_coordinates(

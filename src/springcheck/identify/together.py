@@ -44,12 +44,43 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats, notes: list[str
     return np.asarray(stated * record.mass * (1 / masses[0][0] + 1 / masses[1][0]))
 
 
+def at_rest(record: Record, found: Identification) -> Identification:
+    """What was found of points in space that are two particles bound to each other, at rest as a whole, with
+    the stiffness of their bond: that of each coordinate is k m/mu, mu the reduced mass."""
+    n = record.q.shape[1]
+    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    one, other = moving[: len(moving) // 2], moving[len(moving) // 2 :]
+    # the coordinates of two points, and not two of one
+    if n % 3 or found.scheme is None or found.stiffness is None or len(one) != len(other) or not len(one):
+        return found
+    if np.any(one % 3 != other % 3) or np.any(one // 3 != one[0] // 3) or np.any(other // 3 == one[0] // 3):
+        return found
+    each = of_a_bond(record, moving.tolist(), np.ones(n), [])
+    if np.all(each == 1):
+        return found
+    stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
+    bond = f"{BOUND}, at rest as a whole: their bond has the stiffness {stiffness:.9g}"
+    return replace(found, notes=(*found.notes, bond))
+
+
 WANDERS = 1e-3
 """Part of its size by which the motion of two particles in single precision may leave their line, or their
 middle its place: roundings of 1e-7 that walk for 1e8 steps."""
 
 
-OF_A_PAIR = "two particles bound to each other, which swing along their line: their distance is judged"
+BOUND = "two particles bound to each other"
+OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
+
+
+def of_a_pair(record: Record, found: Identification) -> Identification:
+    """What was found of the distance of two particles, with what was judged, and the stiffness of their bond
+    where their masses are known."""
+    note = OF_A_PAIR
+    if record.mass is not None and found.scheme and found.omega:
+        moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
+        reduced = 1 / (1 / record.mass[moving[0]] + 1 / record.mass[moving[-1]])
+        note += f"; their bond has the stiffness {reduced * found.omega[0] ** 2:.9g}"
+    return replace(found, notes=(*found.notes, note))
 
 
 def distance(record: Record) -> Record | None:
