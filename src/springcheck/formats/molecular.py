@@ -116,8 +116,8 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     mass = table[0, :, names.index("mass")] if "mass" in names else None
     # LAMMPS writes 6 digits unless dump_modify asks for more
     known = step is None and len(clock) == len(steps)
-    at = np.array(clock) if known else times(path, steps, step)
-    return of_frames(path, at, q, v, mass, roundoff(first, range(6)))
+    when = np.array(clock) if known else times(path, steps, step)
+    return of_frames(path, when, q, v, mass, roundoff(first, range(6)))
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:
