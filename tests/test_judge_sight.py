@@ -74,7 +74,8 @@ def test_a_spring_whose_effect_drowns_in_the_references_rounding_has_its_own_lim
     scene = clean.scene(np.array([0.141, 0.039]), (walls, wells), *start, step=0.02, steps=15)
     scheme = schemes.SCHEMES["explicit-euler"]
     tried, wrong = detection.wrong(scene, scheme)
-    assert (tried, wrong) == (2, [])
+    assert wrong == []
+    assert tried == 2
     sees = checks.judge(scene, detection.planted(scene, scheme), [checks.step_defect])[0].sees
     assert sees.stiffness is not None
     assert 1e-3 < sees.stiffness < 2.0**-5

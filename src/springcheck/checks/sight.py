@@ -78,14 +78,15 @@ def limits(
         unknown = _largest(part((np.abs(right[0]) * ROUNDING, np.abs(right[1]) * ROUNDING)))
         for name in NAMES:
             sizes = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in motions(name)]
-            tried = [(size, change) for size in sizes]
-            if coarse is not None and any(size <= 8 * unknown for size in sizes):
+            least = [change / size for size in sizes if size > 8 * unknown]
+            if coarse is not None and len(least) < len(sizes):
                 again = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in coarse(name)]
-                tried = [
-                    (more, COARSER * change) if size <= 8 * unknown else (size, change)
+                # a whole bound is far above what a reference rounds, even where it is no wider than an engine
+                least += [
+                    COARSER * change / more
                     for size, more in zip(sizes, again, strict=True)
+                    if size <= 8 * unknown and more > min(8 * unknown, 1)
                 ]
-            least = [change / size for size, change in tried if size > 8 * unknown]
             found[name] = max((x for x in least if x < LARGEST), default=None)
             hidden += sum(not x < LARGEST for x in least)
     return Limits(**found), hidden
