@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1236,
     ("engines",): 2609,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4574,
+    ("checks",): 4575,
     ("identify",): 8110,
     ("formats", "store"): 5149,
     ("studies",): 1603,
