@@ -37,16 +37,8 @@ BLOCKS, IMAGE_ROWS = 100, 120
 chain."""
 
 WAVE_SHADES = (
-    "#2166ac",
-    "#4393c3",
-    "#92c5de",
-    "#d1e5f0",
-    "#f7f7f7",
-    "#fddbc7",
-    "#f4a582",
-    "#d6604d",
-    "#b2182b",
-)
+    "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b",
+)  # fmt: skip
 """Of displacements from the largest below rest to the largest above, by Brewer."""
 
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
@@ -77,7 +69,6 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
     chosen = sorted(strongest, key=lambda i: float(scene.system.modes.w2[i]))
     unit = np.where(start > 0, start, 1.0)[chosen]
     found = {run.label: _energies(scene, run.q, run.p)[:, chosen] / unit for run in runs.every}
-    dt, t_unit = runs.time_unit
     order = np.argsort(np.argsort(scene.system.modes.w2))
     longest = runs.longest
     true = _energies(scene, *exact.at(longest))[:, chosen] / unit if exact.known else None
@@ -101,7 +92,7 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
             Chart(
                 title=f"Energy of {name}.",
                 short=f"{name}, {100 * start[mode] / total:.2g} % of the energy",
-                x=Scale(name=with_unit("time t", t_unit), factor=dt, shown=xs.ends),
+                x=runs.time(xs),
                 y=Scale(name="energy / its start", log=ys.log, shown=ys.ends),
                 curves=[*([] if true is None else [exact_curve(longest.t, true[:, j])]), *curves],
                 labels=overlay.at_ends(runs.first(curves), xs, ys, height=2 * NAME_HIGH),

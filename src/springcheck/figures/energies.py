@@ -12,7 +12,6 @@ from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.motion import Exact, periods, true_motion
 from springcheck.figures.overlay import NAME_HIGH, Frame, Runs, exact_curve
 from springcheck.figures.portraits import extremes
-from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
 
@@ -73,7 +72,6 @@ def energy(runs: Runs, exact: Exact) -> Bank:
             return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
 
     found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
-    dt, t_unit = runs.time_unit
     lines = []
     true: Floats | None = None
     if changes and (truth := true_motion(scene, runs.every)) is not None:
@@ -89,13 +87,13 @@ def energy(runs: Runs, exact: Exact) -> Bank:
         return run.t[: len(y)], y
 
     curves = runs.curves(inside)
-    time = Scale(name=with_unit("time t", t_unit), factor=dt, shown=_times(runs).ends)
+    time = runs.time()
     upper = Chart(
         title="Energy over time.",
         x=time,
         y=Scale(name=f"energy / {of}", log=ys.log, shown=ys.ends),
         curves=[*lines, *curves],
-        labels=overlay.at_ends(runs.first(curves), _times(runs), ys, height=1.5 * NAME_HIGH),
+        labels=overlay.at_ends(runs.first(curves), runs.times, ys, height=1.5 * NAME_HIGH),
         note=runs.leaving(lambda run: ys.leaves(found[run.label])),
     )
     differences = {run.label: off(run) for run in runs.every}
@@ -109,11 +107,6 @@ def energy(runs: Runs, exact: Exact) -> Bank:
         size=(7.2, 4.2 if flat and len(lower) == 1 else 2.7),
         heading=f"{scene.title}: {runs.wrong}{said or 'energy'}",
     )  # fmt: skip
-
-
-def _times(runs: Runs) -> Frame:
-    ends = [float(run.t[i]) for run in runs.every for i in (0, -1)]
-    return Frame(min(ends), max(ends))
 
 
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
@@ -292,11 +285,8 @@ def _beyond(values: Floats, high: float) -> int | None:
 def error(runs: Runs, exact: Exact) -> Bank:
     """Distance from the exact solution over time, on a logarithmic scale."""
     found = {run.label: exact.error(run) for run in runs.every}
-    dt, unit = runs.time_unit
-    time = Scale(name=with_unit("time t", unit), factor=dt, shown=_times(runs).ends)
-    charts = decades(
-        runs, found, time, "error / initial energy norm", "Distance from the exact solution.", known=True
-    )
+    name, title = "error / initial energy norm", "Distance from the exact solution."
+    charts = decades(runs, found, runs.time(), name, title, known=True)
     largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
     said = extremes(some, "off the exact solution by at most {}", beyond=MOST) if some else "errors"
@@ -319,28 +309,22 @@ def means(runs: Runs, thermal: float) -> Bank:
     near = [x for x in found.values() if abs(x[-1] - usual) <= 3 * abs(usual)]
     later = [x[len(x) // 20 :] for x in near] or [np.array([usual])]
     ys = overlay.widened(min(map(np.min, later)), max(map(np.max, later)))
-    dt, unit = runs.time_unit
     some = {name: x for name, x in ends.items() if np.isfinite(x)}
     low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
     linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
     equal = linear and ys.low < scene.n < ys.high
-    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *_far(ys))))
-    xs = _times(runs)
+    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *ys.far)))
     chart = Chart(
         title="Mean energy up to each time, over kT.",
-        x=Scale(name=with_unit("time t", unit), factor=dt, shown=xs.ends),
+        x=runs.time(),
         y=Scale(name="mean energy so far / kT", shown=ys.ends),
         curves=curves,
         rules=[Rule(axis="y", at=float(scene.n), look="here")] if equal else [],
         note=f"dotted: equipartition, {scene.n} kT" if equal else "",
-        labels=overlay.at_ends(runs.first(curves), xs, ys),
+        labels=overlay.at_ends(runs.first(curves), runs.times, ys),
     )
     said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
     return Bank(
         name="energy", title="Methods drawn", charts=[chart], columns=1, size=(7.2, 4.2),
         heading=f"{scene.title}: {runs.wrong}{said}",
     )  # fmt: skip
-
-
-def _far(ys: Frame) -> tuple[float, float]:
-    return ys.centre - overlay.FAR_OFF * ys.half, ys.centre + overlay.FAR_OFF * ys.half

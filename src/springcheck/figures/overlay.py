@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from springcheck.figures import looks
-from springcheck.figures.charts import EXACTLY, GUIDE, REJECTED, Chart, Curve, Naming
-from springcheck.figures.views import units
+from springcheck.figures.charts import EXACTLY, GUIDE, REJECTED, Chart, Curve, Naming, Scale
+from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -90,6 +90,17 @@ class Runs:
         """Factor and unit of a readable axis of time."""
         last = max(abs(float(run.t[-1])) for run in self.every)
         return looks.prefixed(last, units(self.scene).t)
+
+    @property
+    def times(self) -> Frame:
+        """From the first of their times to the last."""
+        ends = [float(run.t[i]) for run in self.every for i in (0, -1)]
+        return Frame(min(ends), max(ends))
+
+    def time(self, span: Frame | None = None) -> Scale:
+        """An axis of time in a readable unit; left out: of all of it."""
+        factor, unit = self.time_unit
+        return Scale(name=with_unit("time t", unit), factor=factor, shown=(span or self.times).ends)
 
     @property
     def wrong(self) -> str:
@@ -185,6 +196,16 @@ class Frame:
         """From and to."""
         return self.low, self.high
 
+    def axis(self, name: str, unit: str) -> Scale:
+        """What it shows, in a readable unit."""
+        factor, readable = looks.prefixed(max(abs(self.low), abs(self.high)), unit)
+        return Scale(name=with_unit(name, readable), log=self.log, shown=self.ends, factor=factor)
+
+    @property
+    def far(self) -> tuple[float, float]:
+        """Ends as far off as lines are drawn."""
+        return self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half
+
     def parts(self, values: Sequence[float] | Floats) -> Floats:
         """Values as parts of the axis: 0 to 1 inside."""
         x, low, high = np.asarray(values, np.float64), self.low, self.high
@@ -204,7 +225,7 @@ class Frame:
         """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
         end = self.leaves(values)
         values = values if end is None else values[: end + 1]
-        return np.clip(values, self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half)
+        return np.clip(values, *self.far)
 
 
 def frame(runs: Sequence[Floats], truth: Floats | None, *, far: float | None = None) -> Frame:

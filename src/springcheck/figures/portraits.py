@@ -77,8 +77,6 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     xs, ys = _frames(list(picked.values()), true, view)
-    dx, x_unit = looks.prefixed(max(abs(xs.low), abs(xs.high)), view.x_unit)
-    dy, y_unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.y_unit)
 
     def near(x: Floats, y: Floats) -> State:
         return view.wrapped(*overlay.nearer(x, y, xs, ys))
@@ -104,8 +102,8 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     return Chart(
         title=f"{view.y_name} over {view.x_name}{f' of {view.title}' if view.title else ''}.".capitalize(),
         short="" if alone else view.title,
-        x=Scale(name=with_unit(view.x_name, x_unit), shown=xs.ends, factor=dx),
-        y=Scale(name=with_unit(view.y_name, y_unit), shown=ys.ends, factor=dy),
+        x=xs.axis(view.x_name, view.x_unit),
+        y=ys.axis(view.y_name, view.y_unit),
         curves=[*lines, *curves, begin],
         equal=square and (view.what == "path" or _equal(xs, ys)),
         labels=overlay.alone(named, xs, ys) if alone else (),
@@ -126,8 +124,6 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
         )
         for j in (0, 1)
     )
-    dx, x_unit = looks.prefixed(max(abs(xs.low), abs(xs.high)), view.x_unit)
-    dy, y_unit = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.y_unit)
     ring = [Curve(name="H = kT", group=GUIDE, x=x, y=y) for x, y in view.ring(xs.low, xs.high, thermal)]
     charts = []
     for group in groups:
@@ -136,8 +132,8 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
             Chart(
                 title=f"States of {group.title}.",
                 short=group.title,
-                x=Scale(name=with_unit(view.x_name, x_unit), shown=xs.ends, factor=dx),
-                y=Scale(name=with_unit(view.y_name, y_unit), shown=ys.ends, factor=dy),
+                x=xs.axis(view.x_name, view.x_unit),
+                y=ys.axis(view.y_name, view.y_unit),
                 curves=[*(replace(one, marks=False) for one in curves), *ring],
             )
         )
@@ -294,7 +290,6 @@ def _position(
     ys = overlay.frame(list(picked.values()), None if true is None else true[0])
     if truth is not None and true is not None:
         span = span[0], min(span[1], _settles(np.abs(truth[0]), true[0]))
-    dt, unit = runs.time_unit
     dy, unit_x = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
     of = np.abs if steep else np.asarray
 
@@ -325,7 +320,7 @@ def _position(
     return Chart(
         title=f"{view.x_name}{f' of {view.title}' if view.title else ''} over time.".capitalize(),
         short="" if alone else view.title,
-        x=Scale(name=with_unit("time t", unit), shown=xs.ends, factor=dt),
+        x=runs.time(xs),
         y=Scale(name=f"|{name}|" if steep else name, log=steep, shown=ys.ends, factor=dy),
         curves=[*lines, *curves],
         labels=overlay.at_ends(runs.first(curves), xs, ys, height=overlay.NAME_HIGH * (1 if alone else 2))

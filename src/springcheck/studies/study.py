@@ -21,6 +21,7 @@ from springcheck.studies.arguments import Argument, Progress
 if TYPE_CHECKING:
     from springcheck.figures.charts import Bank
     from springcheck.store import Summary
+    from springcheck.studies.choose import LeftOut
     from springcheck.text.lines import Lines
 
 
@@ -74,6 +75,17 @@ class Shown:
 
         with style():
             return study_of(self).pictures(self)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Studied(Shown):
+    """What every study says that is kept as a document."""
+
+    left_out: tuple[LeftOut, ...] = ()
+    resumed: int = 0
+    """Pieces that an interrupted call had finished."""
+    path: Path | None = None
+    """Where it was stored."""
 
 
 def study_of(found: object) -> Study:

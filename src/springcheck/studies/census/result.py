@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import nan
-from pathlib import Path
 from typing import Any, ClassVar
 
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
-from springcheck.studies.choose import LeftOut
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
@@ -78,15 +76,12 @@ ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal=
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Census(Shown):
+class Census(Studied):
     """The whole study; a row of its table is a method of an engine."""
 
     table_of: ClassVar[str] = "entries"
 
     entries: tuple[Entry, ...]
-    left_out: tuple[LeftOut, ...]
-    resumed: int = 0
-    path: Path | None = None
     changes: tuple[str, ...] | None = None
     """What is not as it was in an earlier census; None where none was named."""
     since: str = ""

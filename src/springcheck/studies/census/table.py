@@ -40,18 +40,9 @@ COLUMNS = {
 }
 
 WATCHED = (
-    "thermostat",
-    "axes",
-    "constraint",
-    "scheme",
-    "velocity",
-    "substeps",
-    "friction",
-    "det",
-    "precision",
-    "limit",
-    "amplitude",
-)
+    "thermostat", "axes", "constraint", "scheme", "velocity", "substeps", "friction", "det", "precision",
+    "limit", "amplitude",
+)  # fmt: skip
 """Columns of which a change is said; versions are named beside it."""
 
 MARK = '<meta name="generator" content="springcheck census">'

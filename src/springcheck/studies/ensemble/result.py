@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from springcheck.physics.scene import Scene
-from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Table, document, tables
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import Form
 from springcheck.text.wording import count
 
@@ -76,7 +74,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Ensemble(Shown):
+class Ensemble(Studied):
     """One scene over many parameters; a row of its table is a cell of a method."""
 
     scene: Scene
@@ -84,10 +82,6 @@ class Ensemble(Shown):
     """What was varied."""
     grid: bool
     tallies: tuple[Tally, ...]
-    left_out: tuple[LeftOut, ...]
-    resumed: int = 0
-    """Chunks that an interrupted call had finished."""
-    path: Path | None = None
     columns: Mapping[str, Columns] = field(default_factory=dict)
     """Where nothing was kept on disk: the cells of each method, in their order."""
 

@@ -55,6 +55,12 @@ class Cell:
     """Largest distance of a step from the scheme's own, in roundings; the global error for a solver."""
     bound: float
 
+    @property
+    def decade(self) -> int:
+        """Power of ten of the largest force at the start."""
+        # of the logarithms: the product itself may leave the range
+        return int(np.round(np.log10(self.parameters["k"]) + np.log10(self.parameters["q"])))
+
 
 def cell(
     label: Label, spec: Spec, outcome: Outcome, reason: str, value: float = np.nan, bound: float = np.nan,

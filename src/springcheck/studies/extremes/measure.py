@@ -23,7 +23,6 @@ from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
 from springcheck.studies.extremes import grid, running, solving
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.planes import decade
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, Piece, each
 from springcheck.studies.stability import propagators
@@ -190,7 +189,7 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
                 and cell.block == "force"
                 and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
             ):
-                calm.setdefault(decade(cell), []).append(cell.outcome in RIGHT)
+                calm.setdefault(cell.decade, []).append(cell.outcome in RIGHT)
         right = {x: all(calm[x]) for x in sorted(calm)}
         spans = [list(span) for whole, span in groupby(right, right.__getitem__) if whole]
         span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)

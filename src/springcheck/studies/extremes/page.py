@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
-from springcheck.studies.extremes.planes import Plane, planes
+from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.result import OUTCOMES, Atlas
 from springcheck.text.wording import count
 
@@ -32,7 +34,9 @@ def _filled(row: list[int]) -> list[int]:
 
 def banks(atlas: Atlas) -> list[Bank]:
     """A map for each method of fixed step."""
-    charts = [_chart(plane) for plane in planes(atlas.cells)]
+    methods = dict.fromkeys(cell.method for cell in atlas.cells)
+    planes = {x: [c for c in atlas.cells if c.method == x and c.block == "force"] for x in methods}
+    charts = [_chart(method, cells) for method, cells in planes.items() if _is_plane(cells)]
     if not charts:
         return []
     wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
@@ -43,17 +47,27 @@ def banks(atlas: Atlas) -> list[Bank]:
     return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
 
 
-def _chart(plane: Plane) -> Chart:
+def _is_plane(cells: Sequence[Cell]) -> bool:
+    """Whether cells are of a method of fixed step; a solver, whose step is its own, has no plane."""
+    steps, springs = ({cell.parameters[name] for cell in cells} for name in ("h", "k"))
+    return len(steps) == 1 and len(springs) > 1
+
+
+def _chart(method: str, cells: Sequence[Cell]) -> Chart:
+    """A row for each h w, a column for each decade of force; nothing where nothing was tried."""
+    # rounded: the same h w from another stiffness differs in its last digit
+    placed = {(round(float(np.log10(x.parameters["h_w"])), 3), x.decade): x for x in cells}
+    turns = {turn: cell.parameters["h_w"] for (turn, _), cell in reversed(placed.items())}
+    decades = sorted({decade for _, decade in placed})
+    rows = [[placed.get((turn, decade)) for decade in decades] for turn in sorted(turns)]
     return Chart(
-        title=plane.method,
-        short=plane.method,
-        x=Scale(name="log10 of the force", values=plane.decades),
-        y=Scale(name="h \N{GREEK SMALL LETTER OMEGA}", values=plane.turns),
+        title=method,
+        short=method,
+        x=Scale(name="log10 of the force", values=decades),
+        y=Scale(name="h \N{GREEK SMALL LETTER OMEGA}", values=[turns[turn] for turn in sorted(turns)]),
         tiles=Tiles(
             kinds=[(outcome, SHADES[outcome]) for outcome in OUTCOMES],
-            rows=[
-                _filled([-1 if x is None else OUTCOMES.index(x.outcome) for x in row]) for row in plane.cells
-            ],
-            notes=[["" if x is None else x.reason for x in row] for row in plane.cells],
+            rows=[_filled([-1 if x is None else OUTCOMES.index(x.outcome) for x in row]) for row in rows],
+            notes=[["" if x is None else x.reason for x in row] for row in rows],
         ),
     )

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from springcheck.studies.choose import LeftOut
 from springcheck.studies.extremes.judging import Cell, Outcome
 from springcheck.studies.keeper import document
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import Rows
 
 
@@ -28,18 +26,13 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Atlas(Shown):
+class Atlas(Studied):
     """All cells, the windows, and the methods that are not here; a row of its table is a cell."""
 
     table_of: ClassVar[str] = "cells"
 
     cells: tuple[Cell, ...]
     windows: tuple[Window, ...]
-    left_out: tuple[LeftOut, ...]
-    resumed: int = 0
-    """Methods that an interrupted call had finished."""
-    path: Path | None = None
-    """Where it was stored."""
 
     def __repr__(self) -> str:
         return f"Atlas({', '.join(f'{number} {outcome}' for outcome, number in self.counts().items())})"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from springcheck.studies.keeper import document
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import Documents, Rows
 from springcheck.text.wording import count
 
@@ -36,17 +35,13 @@ class Clean:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class FaultReport(Shown):
+class FaultReport(Studied):
     """The whole study; a row of its table is a fault."""
 
     table_of: ClassVar[str] = "faults"
 
     results: tuple[Result, ...]
     clean: Clean
-    resumed: int = 0
-    """Faults and clean runs that an interrupted call had finished."""
-    path: Path | None = None
-    """Where it was stored."""
 
     def __repr__(self) -> str:
         missed = sum(bool(result.missed_by) for result in self.results)

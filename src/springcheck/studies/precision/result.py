@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from springcheck.physics.scene import Scene
-from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Table, document
 from springcheck.studies.precision.fits import Condition
 from springcheck.studies.precision.points import Point
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.text.wording import count
 
 
@@ -63,7 +61,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class PrecisionStudy(Shown):
+class PrecisionStudy(Studied):
     """Everything that a study of precision has found on one scene; a row of its table is a point."""
 
     table_of: ClassVar[str] = "points"
@@ -79,11 +77,6 @@ class PrecisionStudy(Shown):
     machine: dict[str, str]
     tick: float
     """The smallest difference that the clock shows [s]."""
-    resumed: int = 0
-    """Points that an interrupted call had finished."""
-    left_out: tuple[LeftOut, ...] = ()
-    path: Path | None = None
-    """Where it was stored."""
 
     def __repr__(self) -> str:
         best = min((p.error for p in self.points if p.error > 0), default=np.nan)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
-from springcheck.studies.choose import LeftOut
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
@@ -68,15 +66,12 @@ SAMPLED: RecordForm[Sampled] = RecordForm(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Sampling(Shown):
+class Sampling(Studied):
     """The whole study; a row of its table is a thermostat."""
 
     table_of: ClassVar[str] = "methods"
 
     methods: tuple[Sampled, ...]
-    left_out: tuple[LeftOut, ...] = ()
-    resumed: int = 0
-    path: Path | None = None
 
     def __repr__(self) -> str:
         apart = sum(x.departs for x in self.methods)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from springcheck import engines, schemes
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
-from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits
 from springcheck.studies.stability.costs import Cost
@@ -20,7 +18,7 @@ from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.multipliers import Multiplier
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
-from springcheck.studies.study import Shown
+from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm, Rows
 from springcheck.text.wording import count
 
@@ -30,7 +28,7 @@ the decaying eigenvector in the fitted quarter of a run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Stability(Shown):
+class Stability(Studied):
     """All that was measured, and what was left out and why; a row of its table is a method's limit."""
 
     table_of: ClassVar[str] = "methods"
@@ -40,13 +38,8 @@ class Stability(Shown):
     regions: tuple[Region, ...]
     resonances: tuple[Resonance, ...]
     costs: tuple[Cost, ...]
-    left_out: tuple[LeftOut, ...]
     multipliers: tuple[Multiplier, ...] = ()
     """Of a spring of modulated stiffness."""
-    resumed: int = 0
-    """Limits, regions, resonances and costs that an interrupted call had finished."""
-    path: Path | None = None
-    """Where it was stored."""
 
     def __repr__(self) -> str:
         said = f"{len(self.failures)} not where theory puts them" if self.failures else "as theory has them"
