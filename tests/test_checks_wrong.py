@@ -23,7 +23,7 @@ from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import clean, steppers
 from springcheck.studies.precision import accuracy, fits
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.fits import Point
 from springcheck.studies.run.tally import Tally
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)

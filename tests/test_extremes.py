@@ -16,10 +16,9 @@ from springcheck import engines, store
 from springcheck.errors import SpringcheckError
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
-from springcheck.studies.extremes import STUDY, grid, judging, page, running, solving
+from springcheck.studies.extremes import STUDY, grid, judging, page, running
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.extremes import result as keeping
-from springcheck.studies.extremes.planes import planes
 
 Need = Callable[[str], None]
 METHODS = [
@@ -52,7 +51,7 @@ def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
 def test_a_long_run_is_judged_up_to_where_its_forces_leave_fixed_point(need: Need) -> None:
     need("openmm:euler@OpenCL-double")
     label = engines.parse("openmm:euler@OpenCL-double")
-    found = solving.last(label, grid.lengths(label, quick=True))
+    found = running.last(label, grid.lengths(label, quick=True))
     cells = [cell for cell in found if "overflows beyond 2**31" in cell.reason]
     assert {cell.parameters["h_w"] for cell in cells} == {1.0, 1.9}
     # growth is (1 + (h w)**2)**(1/2) a step and the first force 2**10: 42 steps, and 28, to 2**31
@@ -147,8 +146,7 @@ def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
 
 def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
     atlas = extremes.measure(["own:semi-implicit-euler"], quick=True)
-    (plane,) = planes(atlas.cells)
-    untold = next(cell for row in plane.cells for cell in row if cell)
+    untold = next(cell for cell in atlas.cells if cell.block == "force")
     cells = tuple(replace(cell, outcome="not measured") if cell is untold else cell for cell in atlas.cells)
     for shown, count in ((atlas, 0), (replace(atlas, cells=cells), 1)):
         drawn = render.picture(page.banks(shown)[0])
@@ -170,15 +168,16 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     fine = extremes.record(path, method, cells=800)
     assert 800 <= len(fine.cells) < 800 + 41
     assert set(map(repr, base.cells)) <= set(map(repr, fine.cells))
-    (plane,) = planes(fine.cells)
-    assert plane.decades == tuple(range(-20, 21))
-    assert len(plane.turns) > len(grid.TURNS)
-    assert all(None not in row for row in plane.cells)
+    ((plane,),) = (bank.charts for bank in page.banks(fine))
+    assert plane.tiles is not None
+    assert list(plane.x.values) == list(range(-20, 21))
+    assert len(plane.y.values) > len(grid.TURNS)
+    assert all(-1 not in row for row in plane.tiles.rows)
     assert not fine.wrong
     assert extremes.stored(path).counts() == fine.counts()
     # few more cells complete the rows that there are
     some = extremes.measure(method, cells=len(base.cells) + 1)
-    (plane,) = planes(some.cells)
-    assert (plane.decades, len(plane.turns)) == (tuple(range(-20, 21)), len(grid.TURNS))
+    ((plane,),) = (bank.charts for bank in page.banks(some))
+    assert (list(plane.x.values), len(plane.y.values)) == (list(range(-20, 21)), len(grid.TURNS))
     with pytest.raises(SpringcheckError, match="not both"):
         extremes.record(tmp_path / "no.h5", method, quick=True, cells=10)

@@ -17,8 +17,8 @@ import browser
 from browser import Browser
 from springcheck import schemes, store
 from springcheck.cli import main, page
+from springcheck.cli.page.content import Section
 from springcheck.cli.page.given import drawn
-from springcheck.cli.page.sections import Section
 from springcheck.errors import StoreError
 from springcheck.figures import charts, looks
 from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles

@@ -10,7 +10,7 @@ import pytest
 
 import browser
 from springcheck.cli import page
-from springcheck.cli.page.bath import bath
+from springcheck.cli.page.given import bath
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure
 from springcheck.studies.run import page as charts

@@ -20,7 +20,7 @@ from springcheck.schemes import SCHEMES
 from springcheck.studies.precision import STUDY, accuracy, fits, sweeps
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
-from springcheck.studies.precision.points import POINTS, Point
+from springcheck.studies.precision.fits import POINTS, Point
 
 pytestmark = pytest.mark.usefixtures("steady_clock")
 

@@ -77,7 +77,7 @@ def test_the_python_of_the_how_tos_runs(tmp_path: Path, monkeypatch: pytest.Monk
 def test_every_command_shows_examples_that_it_can_parse(capsys: pytest.CaptureFixture[str]) -> None:
     from springcheck.cli import _parser
     from springcheck.cli.commands import COMMANDS
-    from springcheck.cli.examples import EXAMPLES
+    from springcheck.cli.groups import EXAMPLES
     from springcheck.studies import STUDIES
 
     assert set(EXAMPLES) == {one.name for one in (*STUDIES, *COMMANDS)}

@@ -13,7 +13,7 @@ from springcheck.checks.seeds import SEEDED, by_engine, noise_map
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.studies.run.heat import heated_of
+from springcheck.studies.run.tally import heated_of
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.likelihood import FULL_RANK, likely
 

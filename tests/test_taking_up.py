@@ -23,7 +23,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.points import POINTS, points_of
+from springcheck.studies.precision.fits import POINTS, points_of
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability

@@ -22,7 +22,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.studies.run.heat import Heat
+from springcheck.studies.run.tally import Heat
 from springcheck.thermal import THERMOSTATS, chance
 
 pytestmark = pytest.mark.slow

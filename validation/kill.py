@@ -41,7 +41,7 @@ from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.store import adopt, parts, reading
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.points import POINTS
+from springcheck.studies.precision.fits import POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "collection")

@@ -20,7 +20,6 @@ import springcheck
 from springcheck import interrupts
 from springcheck.cli import groups, output, slips
 from springcheck.cli.commands import COMMANDS, Command
-from springcheck.cli.examples import EXAMPLES
 from springcheck.errors import SpringcheckError, StoreWarning, plain
 from springcheck.studies import STUDIES
 from springcheck.studies.arguments import REPORTING, REPORTS, reported
@@ -135,7 +134,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
                 # a study of one's own has none
                 [
                     "examples:",
-                    *(f"  springcheck {one.name} {x}".rstrip() for x in EXAMPLES.get(one.name, [""])),
+                    *(f"  springcheck {one.name} {x}".rstrip() for x in groups.EXAMPLES.get(one.name, [""])),
                 ]
             ),
             formatter_class=groups.Formatter,

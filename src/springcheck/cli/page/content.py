@@ -1,4 +1,4 @@
-"""What a report shows of a store, as plain data, in bounded memory however long its runs are."""
+"""What a report shows of a store and its studies, as plain data, in bounded memory however long its runs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from springcheck.checks import compare
 from springcheck.checks.compare import EXACT, Same
 from springcheck.cli import explain, inspect
 from springcheck.cli.page import given
-from springcheck.cli.page.sections import Section, sections
 from springcheck.errors import SpringcheckError
+from springcheck.figures import charts
 from springcheck.figures.charts import Bank
 from springcheck.figures.charts import plain as charts_as_data
 from springcheck.figures.views import MOST_PANELS
@@ -28,7 +28,42 @@ from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import of_runs, temperatures
+from springcheck.text.lines import Lines, TextTable
 from springcheck.text.wording import STATES_SHOW
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """What the page says of one study."""
+
+    name: str
+    title: str
+    blocks: Lines
+    """Lines of text, and tables."""
+    banks: tuple[str, ...]
+    """Names of its charts in the data of the page."""
+
+
+def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
+    """The studies of a store that are no trajectories, and the data of all their charts by name."""
+    found: list[Section] = []
+    data: dict[str, Any] = {}
+    for study, result in inspect.held(summary):
+        if study.trajectories:
+            continue
+        mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(study.banks(result))}
+        data |= mine
+        lines = study.lines(result, path=summary.path)
+        found.append(
+            Section(
+                name=study.name,
+                title=study.about[:1].upper() + study.about[1:],
+                blocks=[line for line in lines if isinstance(line, TextTable) or str(line).strip()],
+                banks=tuple(mine),
+            )
+        )
+    return found, data
+
 
 NUMBERS = 12_000
 """Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""

@@ -21,7 +21,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
-from springcheck.studies.extremes import grid, running, solving
+from springcheck.studies.extremes import grid, running
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, Piece, each
@@ -159,10 +159,10 @@ def stored(kept: keeper.Kept) -> Atlas:
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
     """All cells of one method."""
     if engines.method(label).adaptive:
-        return [solving.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
+        return [running.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
 
     found = [cell for specs in _groups(label, quick=quick) for cell in running.cells(label, specs)]
-    return found + solving.last(label, grid.lengths(label, quick=quick))
+    return found + running.last(label, grid.lengths(label, quick=quick))
 
 
 def _groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:

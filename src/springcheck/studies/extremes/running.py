@@ -1,19 +1,24 @@
-"""Running cells: many of one step in one run, as far as an engine that gives up lets them."""
+"""Running cells: many of one step in one run, as far as an engine that gives up lets them; those of adaptive
+solvers and of long runs one by one, each judged by its end against the motion that it claims."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from springcheck import engines
+from springcheck import checks, driver, engines
+from springcheck.checks.case import overflows
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
+from springcheck.physics import exact
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.extremes import grid, judging
 from springcheck.studies.extremes.grid import Spec
-from springcheck.studies.extremes.judging import Cell
+from springcheck.studies.extremes.judging import Cell, Outcome
 
 
 def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, str]:
@@ -61,3 +66,131 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         return cells(label, specs[:half]) + cells(label, specs[half:])
     rest = iter(cells(label, [spec for spec, done in zip(specs, over, strict=True) if not done]))
     return [cell if done else next(rest) for cell, done in zip(found, over, strict=True)]
+
+
+TIGHT = 1e-14
+"""A tolerance below this asks a step of a solver for less than a hundred roundings."""
+
+
+MOST = 20_000
+"""Internal steps that a cell may take: a tenth of a second."""
+
+
+def solve(label: Label, spec: Spec) -> Cell:
+    """One cell by an adaptive solver, judged at its end."""
+    scene = grid.scene([spec], label, frozenset())
+    solver = engines.internal_steps(label)
+    said, value, bound, whole, unmeasured = "", np.nan, np.nan, False, ""
+    with np.errstate(all="ignore"):
+        try:
+            done = solver(scene, engines.method(label), most=MOST)
+        except Stopped as stop:
+            said = f"; it says: {stop}"
+        else:
+            whole = abs(done.t) >= abs(scene.step * scene.steps)
+            said = "" if whole else f"; {MOST} internal steps end at t = {done.t:.3g}"
+            if whole:
+                value, bound, unmeasured = _distance(label, scene, done)
+        reason = _reason(scene, spec)
+    outcome: Outcome = "silently wrong"
+    why = f"off by {value:.3g} where {bound:.3g} is allowed"
+    if whole and value <= bound:
+        outcome, why = "right", ""
+    elif reason or not whole:
+        outcome, why = "engine's limit", (reason or "it gives up") + said
+    elif unmeasured:
+        outcome, why = "not measured", unmeasured
+    return judging.cell(label, spec, outcome, why, value, bound, tolerance=spec.tolerance)
+
+
+def _distance(label: Label, scene: Scene, done: Any) -> tuple[float, float, str]:
+    """Global error at the end and its bound, over the initial energy norm, and why there are none."""
+    q, p = np.stack([scene.q, done.q]), np.stack([scene.p, done.p])
+    if scene.p[0] == 0 and (scene.q[0] == 0 or not np.any(scene.system.rigidity)):
+        # nothing moves, and nothing may
+        return float(np.abs(q[1, 0] - q[0, 0]) + np.abs(p[1, 0])), scene.tolerance * abs(float(q[0, 0])), ""
+    ends = replace(scene, every=scene.steps)
+    run = judging.as_trajectory(label, ends, q, p, engines.arithmetic(label))
+    run = replace(run, tolerance=scene.tolerance, force_calls=done.force_calls)
+    found = checks.tolerance(checks.Case(trajectory=run, scene=ends))
+    return found.value, found.bound, found.why if found.passed is None else ""
+
+
+def _reason(scene: Scene, spec: Spec) -> str | None:
+    """What is outside of CVODE's numbers: a state, a weight, a rate, or a tolerance too tight."""
+    low, high = judging.RANGES["double"]
+    steps = np.arange(scene.steps + 1)
+    q, p = exact.true_motion(scene, steps, scene.step)
+    m, k = np.longdouble(spec.m), abs(np.longdouble(spec.k))
+    h = abs(np.longdouble(spec.h))
+    x, y = np.max(np.abs(q)), np.max(np.abs(p))
+    if not max(x, y) <= high:
+        return f"the motion itself leaves {high:.1e}"
+    parts = [x, y, k * x, y / m, 1 / m, k, k / m, h, h * scene.steps, k * x * x, y * y / m]
+    parts += [part * spec.tolerance for part in (x, y)]
+    parts += [1 / (part * spec.tolerance) for part in (x, y) if part > 0]
+    # the weighted norm squares rates over weights
+    parts += [(k * x / (y * spec.tolerance)) ** 2 if y > 0 else np.longdouble(0)]
+    parts += [(y / m / (x * spec.tolerance)) ** 2 if x > 0 else np.longdouble(0)]
+    sizes = np.array([part for part in parts if part > 0], dtype=np.longdouble)
+    if sizes.size and np.max(sizes) > high:
+        return f"its right-hand side or its weighted norm forms numbers beyond {high:.1e}"
+    if sizes.size and np.min(sizes) < low:
+        return f"its right-hand side or its weights are below {low:.1e}"
+    if spec.tolerance < TIGHT:
+        return f"a tolerance of {spec.tolerance:g} a step is too tight for double precision"
+    return None
+
+
+def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
+    """Cells of one long run each, judged by the closed form of the scheme's motion at ten frames."""
+    found = []
+    for spec in specs:
+        scene = grid.scene([spec], label, engines.method(label).requires)
+        with np.errstate(all="ignore"):
+            run = driver.run(scene, label)
+            case, limit = _within_range(checks.Case(trajectory=run, scene=scene))
+            verdict = checks.closed_form(case)
+            if verdict.passed is None and len(case.trajectory.t) > 1:
+                verdict = checks.step_defect(case)
+            growth = judging.growth_of(case, scene)[0]
+        unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
+        outcome: Outcome = "unstable, as theory says" if unstable else "right"
+        reason = limit
+        if limit and not unstable:
+            outcome = "engine's limit"
+        value, bound = verdict.value, verdict.bound
+        if run.outcome.status != "complete":
+            # the driver ends a run at the last finite frame; the next one is out of range by theory
+            high = judging.RANGES["double"][1]
+            most = (0.5 if engines.engine(label.engine).squares_lengths else 1) * np.log(high) - np.log(
+                max(abs(spec.q), abs(spec.p))
+            )
+            left = growth * (run.outcome.step + scene.every) > most
+            quantum = case.trajectory.arithmetic.overflow
+            gone = growth * run.outcome.step > np.log(quantum / spec.force) if np.isfinite(quantum) else False
+            reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"
+            if not (unstable and (left or gone)):
+                outcome, reason = "silently wrong", f"{run.outcome.status}: {run.outcome.message}"
+        judged = outcome != "silently wrong" and len(case.trajectory.t) > 1
+        if judged and verdict.passed is None:
+            outcome, reason = "not measured", verdict.why
+        elif judged and not value <= bound:
+            outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
+        found.append(judging.cell(label, spec, outcome, reason, value, bound, tolerance=spec.tolerance))
+    return found
+
+
+def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
+    """The frames before a force leaves the range of a fixed-point sum, and what it then says."""
+    run = case.trajectory
+    beyond = (
+        case.strongest >= run.arithmetic.overflow if np.isfinite(run.arithmetic.overflow) else np.zeros(0)
+    )
+    if not np.any(beyond):
+        return case, ""
+    held = slice(int(np.argmax(beyond)) + 1)
+    energy = None if run.energy is None else run.energy[held]
+    before = replace(run, t=run.t[held], q=run.q[held], p=run.p[held], energy=energy)
+    reason = f"grown out of range after step {case.steps[held][-1]}: {overflows(run.arithmetic)}"
+    return checks.Case(trajectory=before, scene=case.scene), reason

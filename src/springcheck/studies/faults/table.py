@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.physics.rods import Rods
-from springcheck.studies.faults import drives, rigid, seeded, space
+from springcheck.studies.faults import fields, rigid, seeded, space
 from springcheck.studies.faults.fields import FIELDS
 from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
 from springcheck.studies.faults.rigid import Rattle
@@ -215,19 +215,19 @@ AXES = (
 
 DRIVES = (
     Fault("late-drive", "the drive is taken later by a part of the step",
-          _MOTION_CHECKS, seeded.stepping(drives.late), size=1e-9, scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(fields.late), size=1e-9, scene="driven"),
     Fault("held-drive", "the drive of the step's start is held over its stages",
-          _MOTION_CHECKS, seeded.stepping(drives.held), scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(fields.held), scene="driven"),
     Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
-          _MOTION_CHECKS, seeded.stepping(lambda s, k, x: drives.late(s, k, -1.0)), scene="driven"),
+          _MOTION_CHECKS, seeded.stepping(lambda s, k, x: fields.late(s, k, -1.0)), scene="driven"),
     Fault("drive-phase", "the phase of the drive has the wrong sign",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, phase=-1)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, phase=-1)), scene="driven"),
     Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, amplitude=1 / s.m)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, amplitude=1 / s.m)), scene="driven"),
     Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, phase=np.pi / 180)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, phase=np.pi / 180)), scene="driven"),
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: drives.other(s, frequency=2 * np.pi)), scene="driven"),
+          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, frequency=2 * np.pi)), scene="driven"),
 )  # fmt: skip
 
 

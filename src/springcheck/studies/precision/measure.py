@@ -35,7 +35,7 @@ from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
-from springcheck.studies.precision.points import POINTS, Place, Point, points_of
+from springcheck.studies.precision.fits import POINTS, Place, Point, points_of
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, affordable, begin, blank, take, to_time
 from springcheck.studies.precision.timing import Clock, take_turns, tick

@@ -9,8 +9,7 @@ import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import Table, document
-from springcheck.studies.precision.fits import Condition
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.fits import Condition, Point
 from springcheck.studies.study import Studied
 from springcheck.text.wording import count
 

@@ -16,7 +16,7 @@ from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import FRAMES, Truth
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.fits import Point
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double

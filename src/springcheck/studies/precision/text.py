@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Sequence
 
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table

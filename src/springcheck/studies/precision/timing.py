@@ -10,7 +10,7 @@ from springcheck import driver
 from springcheck.engines.contract import Stopped
 from springcheck.errors import SpringcheckError
 from springcheck.physics.scene import Scene
-from springcheck.studies.precision.points import Point
+from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, repeats, warm_ups
 
 TICKS = 1000
