@@ -208,30 +208,25 @@ def coefficient(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
     return textbook(scene, replace(scheme, stages=((a, x), (b, wrong), *rest)))
 
 
-def skipped(every: int) -> Make:
-    """The last of so many steps is left out."""
+def repeated(every: int, times: int) -> Make:
+    """The last of so many steps is taken so often: not at all, or twice."""
 
     def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
         right = textbook(scene, scheme)
-        return lambda i, q, p: (q, p) if i % every == every - 1 else right(i, q, p)
+
+        def step(i: int, q: Floats, p: Floats) -> State:
+            for _ in range(times if i % every == every - 1 else 1):
+                q, p = right(i, q, p)
+            return q, p
+
+        return step
 
     return stepping(broken)
-
-
-def doubled(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """Every 1000th step is taken twice."""
-    right = textbook(scene, scheme)
-    return lambda i, q, p: right(i, *right(i, q, p)) if i % 1000 == 999 else right(i, q, p)
 
 
 def single(x: Reals) -> Floats:
     """Rounded to single precision."""
     return x.astype(np.float32).astype(np.float64)
-
-
-def single_state(scene: Scene, size: float, i: int, state: State) -> State:
-    """Both q and p rounded to single precision."""
-    return single(state[0]), single(state[1])
 
 
 def braked(scene: Scene, size: float, i: int, state: State) -> State:
@@ -270,11 +265,6 @@ def half_step(scene: Scene, sign: int, run: Trajectory) -> Trajectory:
     p = np.asarray(run.p + sign * scene.step / 2 * force, np.float64)
     p[0] = scene.p
     return replace(run, p=p)
-
-
-def delayed(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Momenta are one frame behind the positions."""
-    return replace(run, p=np.concatenate([run.p[:1], run.p[:-1]]))
 
 
 def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
