@@ -20,7 +20,7 @@ BUDGETS = {
     ("checks",): 4575,
     ("identify",): 8110,
     ("formats", "store"): 5149,
-    ("studies",): 1603,
+    ("studies",): 1615,
     ("studies/*",): 11138,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6837,
 }
