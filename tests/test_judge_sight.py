@@ -70,7 +70,7 @@ def test_a_spring_whose_effect_drowns_in_the_references_rounding_has_its_own_lim
     """A quartic beside a wall spring, so near their place that half a percent of it is a rounding."""
     walls = WallSpring(i=np.array([0, 1]), k=np.array([2.3e-4, 9.1e-4]), at=np.zeros(2))
     wells = Quartic(i=np.array([0, 1]), b=np.array([9.3e-6, 2.1e-6]), at=np.zeros(2))
-    start = np.array([1.3e-4, 6.7]), np.array([2e-6, 0.1])
+    start = np.array([2e-4, 6.7]), np.array([2e-6, 0.1])
     scene = clean.scene(np.array([0.141, 0.039]), (walls, wells), *start, step=0.02, steps=15)
     scheme = schemes.SCHEMES["explicit-euler"]
     tried, wrong = detection.wrong(scene, scheme)
