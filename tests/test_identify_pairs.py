@@ -65,6 +65,25 @@ def test_a_pair_whose_middle_walks_by_forces_that_are_cut_off_is_named_by_its_di
     assert named(t, q + 3e-16 * H * n * n / 2, v + 3e-16 * n).scheme == "velocity-verlet"
 
 
+def test_a_pair_whose_velocities_are_differences_of_positions_far_from_the_origin_is_named() -> None:
+    """They carry the rounding of the positions, not that of the distance: the scheme was called unknown."""
+    m, h = np.array(M)[:, None], 0.1
+    q = np.stack([-WAY * 0.4, WAY * 0.78])
+    v = np.array([[0.3, -0.15, 0.31], [0.3, -0.15, 0.31]])
+    rows = [(q, v)]
+    for _ in range(800):
+        d = q[1] - q[0]
+        r = np.sqrt(np.sum(d * d))
+        pull = K * (r - REST) / r * d
+        new = q + h * (v + h * np.stack([pull, -pull]) / m)
+        q, v = new, (new - q) / h
+        rows.append((q, v))
+    x, u = (np.array(y).reshape(len(rows), 6) for y in zip(*rows, strict=True))
+    found = named(h * np.arange(len(rows)), x, u)
+    assert found.scheme == "semi-implicit-euler"
+    assert any("rebuilt as a difference" in note for note in found.notes)
+
+
 def test_of_a_pair_that_no_scheme_explains_the_distance_is_spoken_of() -> None:
     """A coordinate of it swings about a place that moves, and is no oscillator."""
     found = named(*swing(drift=(0.031, -0.017, 0.023), late=True))

@@ -237,14 +237,15 @@ def _defects(
     turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
     flow = np.array([scheme.flow for scheme in schemes])
     size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
+    position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     if record.parts is not None:
         summed = np.stack(
             [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1
         )
         size += 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
+        position = summed[1:, 0] / float(found.size[0])
     # a velocity that is a difference of positions over the step carries their rounding, eps q / h
     ratio = float(found.size[0] / found.size[1]) * stride
-    position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     difference = np.zeros_like(size)
     difference[:, :, 1] = 2 * ratio[:, None] * position
     # substeps of one force round alike
