@@ -160,7 +160,8 @@ def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
         log_det = math.log(det) / s
         step = np.cos(phase)[:, None, None] * np.eye(2) + np.sin(phase)[:, None, None] * normal
         step = step * np.exp(log_det / 2)[:, None, None]
-        error *= (1 + 1 / math.sin(angle)) / math.sin(angle)
+        # relative to the root of the determinant: little is left of what dies down within a frame
+        error *= (1 + 1 / math.sin(angle)) / math.sin(angle) / min(math.sqrt(det), 1.0)
     else:
         values, vectors = np.linalg.eig(b)
         values, vectors = np.real(values), np.real(vectors)

@@ -177,6 +177,11 @@ def _of_coordinates(
         of_step = stride is None or x.stride == stride
         return of_step and (stated is None or not disagreements(record, moving, x, stated))
 
+    if stated is not None and explained and not (record.fine or any(map(agrees, explained))):
+        # a friction in the numbers of a coarse file is as plain as another spring than the stated one
+        joints = likely(compare(maps, base, distinct(damped=True), FEW))
+        more = _explained(record, moving, maps, [x for x in joints if agrees(x)], base)
+        explained = {**more, **explained}
     if all(x.stride not in FEW for x in explained):
         # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
         explained = {**_elsewhere(record, moving, maps, base, FEW), **explained}

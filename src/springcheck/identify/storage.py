@@ -108,7 +108,9 @@ def storage(x: Floats) -> Storage:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
     # text that is finer than the numbers around it says nothing: every number has such a decimal form
     binary = Storage(name=short or ("single" if single else "double"))
-    found = [text for text in found if np.all(text.quantum(sample) >= 2 * binary.quantum(sample))]
+    finer = [np.log2(text.quantum(sample) / binary.quantum(sample)) for text in found]
+    # whole numbers of few digits are of a short format as well, which is hardly finer
+    found = [x for x, y in zip(found, finer, strict=True) if np.all(y >= 1) or (short and np.mean(y) >= 1)]
     if found:
         # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
         # neighbours below it ten times as close as those above
