@@ -12,6 +12,7 @@ import pytest
 
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import EXPLICIT
+from springcheck.identify.storage import storage
 from springcheck.physics.arrays import Floats
 
 M, K = 3.7, 2.9
@@ -363,3 +364,52 @@ def test_a_stiffness_that_goes_up_and_down_in_nearly_two_frames_is_not_one_that_
     found = identify(8 * h * np.arange(51), x, v=u, mass=M)
     assert "changes in time" in found.statement
     assert "alternat" not in found.statement
+
+
+def test_whole_numbers_of_three_digits_are_text_and_not_half_precision() -> None:
+    """Half precision holds every whole number up to 2048; a scheme was refused for its finer rounding."""
+    v = np.array([943, -485, -925, 116, 798, 148, -612, -309, 409, 380, -221, -381, 65.5, 334])
+    assert storage(v).name == "text, 3 digits"
+    half = np.array([0.3337, 1.2345, 5.678, -2.221, 0.07777]).astype(np.float16)
+    assert storage(half.astype(np.float64)).name == "half"
+
+
+def test_implicit_euler_whose_motion_dies_within_a_frame_is_named_with_its_steps() -> None:
+    h, n, at, m, k = 0.007081539786574927, 12, -0.15481943848703078, 0.4792474570145283, 10427.38906692295
+    q, v = 0.0, 0.0
+    rows = [(q, v)]
+    for _ in range(100 * n):
+        v = (v - h * k / m * (q - at)) / (1 + h * h * k / m)
+        q += h * v
+        rows.append((q, v))
+    x, u = np.array(rows[::n]).T
+    found = identify(n * h * np.arange(101), x, v=u, mass=m, stiffness=k)
+    assert (found.scheme, found.stride) == ("implicit-euler", n)
+    assert "12 steps to a frame" in found.statement
+
+
+def test_of_a_motion_that_dies_in_single_precision_the_frames_that_move_are_counted() -> None:
+    """The rest know nothing of the map: its own error was taken for that of a hundred frames."""
+    h, n, at, m, k = 0.0032122717692289497, 11, -2.2450934674416985, 0.018485555892412693, 2792.489639874041
+    q, v = -0.9169573124511694, 1485.0215521944763
+    rows = [(q, v)]
+    for _ in range(100 * n):
+        v -= h / 2 * (k * (q - at) / m)
+        q += h / 2 * v
+        v *= np.exp(-0.2653462404143413)
+        q += h / 2 * v
+        v -= h / 2 * (k * (q - at) / m)
+        rows.append((q, v))
+    x, u = np.array(rows[::n]).T.astype(np.float32)
+    found = identify(n * h * np.arange(101), x, v=u, mass=m)
+    assert (found.scheme, found.stride) == ("langevin-middle", n)
+
+
+def test_a_friction_in_five_frames_is_plainer_than_another_spring_than_the_stated_one() -> None:
+    """It was Forest-Ruth on a spring 1.026 times as stiff."""
+    t = 0.022935556738542733 * np.arange(5)
+    q = [1.7841124534606934, 1.8429468870162964, 1.895219087600708, 1.940860390663147, 1.9798222780227661]
+    v = [2.707139015197754, 2.4227919578552246, 2.13501238822937, 1.8446813821792603, 1.5526764392852783]
+    found = identify(t, q, v=v, mass=12.785327484536777, stiffness=70.97025435286015)
+    assert "times as stiff" not in found.statement
+    assert "position-verlet" in names(found)

@@ -292,7 +292,7 @@ def _defects(
         missing = np.abs(signed)
         # roundings of many steps are random
         most = np.minimum(path, usual)[:, None, None]
-        # the map is itself known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
+        # the map is known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
         moving = np.count_nonzero(np.all(np.diff(z, axis=0) != 0, axis=1)) + 1
         half = (1 + 10 / np.sqrt(moving)) * half
         stored = _largest(missing, half + 2.0**-52 * size * most) <= 1

@@ -159,10 +159,18 @@ def _of_coordinates(
     joints, terms = find(record, maps, base, stride)
     fits_entries = bool(joints)
     explained = _explained(record, moving, maps, joints, terms)
-    if not explained and not record.fine:
+
+    def agrees(x: Joint) -> bool:
+        """Whether a scheme has the stated step and stiffness."""
+        of_step = stride is None or x.stride == stride
+        return of_step and (stated is None or not disagreements(record, moving, x, stated))
+
+    apart = maps
+    if not (record.fine or any(map(agrees, explained))):
         # an equilibrium beside 0 that a short or coarse file does not show may still be there
         both = zip(moving, maps, strict=True)
         apart = [x if np.any(x.centre) else fit(record, j, constant=True) for j, x in both]
+    if not explained and not record.fine:
         joints, terms = find(record, apart, base, stride)
         explained = _explained(record, moving, apart, joints, terms)
         maps = apart if explained else maps
@@ -172,16 +180,13 @@ def _of_coordinates(
             record, maps = later, maps_later
             notes.append("the first step has the friction of the first velocity: none is half a step old")
 
-    def agrees(x: Joint) -> bool:
-        """Whether a scheme has the stated step and stiffness."""
-        of_step = stride is None or x.stride == stride
-        return of_step and (stated is None or not disagreements(record, moving, x, stated))
-
-    if stated is not None and explained and not (record.fine or any(map(agrees, explained))):
-        # a friction in the numbers of a coarse file is as plain as another spring than the stated one
-        joints = likely(compare(maps, base, distinct(damped=True), FEW))
-        more = _explained(record, moving, maps, [x for x in joints if agrees(x)], base)
-        explained = {**more, **explained}
+    if explained and stated is not None and not (record.fine or any(map(agrees, explained))):
+        # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
+        for way, damped in ((x, y) for x in (maps, apart) for y in (False, True)):
+            joints = [x for x in compare(way, base, distinct(damped=damped), FEW) if agrees(x)]
+            if more := _explained(record, moving, way, likely(joints), base):
+                maps, explained = way, more
+                break
     if all(x.stride not in FEW for x in explained):
         # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
         explained = {**_elsewhere(record, moving, maps, base, FEW), **explained}
