@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2609,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4575,
-    ("identify",): 8110,
+    ("identify",): 8125,
     ("formats", "store"): 5149,
     ("studies",): 1615,
     ("studies/*",): 11138,
