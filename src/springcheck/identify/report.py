@@ -65,9 +65,6 @@ VELOCITY_OFFSET = {
 AS_NEAR = 1.5
 """Factor by which the residual of one scheme may exceed that of another for which a cause was found."""
 
-UNTOLD = "cannot tell"
-"""Arithmetic where the candidates' are several."""
-
 
 def identify_arrays(
     t: ArrayLike,
@@ -168,8 +165,7 @@ def _of_coordinates(
     apart = maps
     if not (record.fine or any(map(agrees, explained))):
         # an equilibrium beside 0 that a short or coarse file does not show may still be there
-        both = zip(moving, maps, strict=True)
-        apart = [x if np.any(x.centre) else fit(record, j, constant=True) for j, x in both]
+        apart = [x if np.any(x.centre) else fit(record, moving[i], constant=True) for i, x in enumerate(maps)]
     if not explained and not record.fine:
         joints, terms = find(record, apart, base, stride)
         explained = _explained(record, moving, apart, joints, terms)
@@ -179,7 +175,6 @@ def _of_coordinates(
         if explained := _explained(later, moving, maps_later, joints, base):
             record, maps = later, maps_later
             notes.append("the first step has the friction of the first velocity: none is half a step old")
-
     if explained and stated is not None and not (record.fine or any(map(agrees, explained))):
         # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
         for way, damped in ((x, y) for x in (maps, apart) for y in (False, True)):
@@ -200,11 +195,9 @@ def _of_coordinates(
             explained = {**(explained if right or not others else {}), **others}
     elif not record.fine:
         # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
-        least = min(x.stride for x in explained)
         alone = len({(x.scheme, x.stride) for x in explained}) == 1
-        strides = range(1, least) if alone else FEW
-        others = _elsewhere(record, moving, maps, base, strides) if strides else {}
-        others = {**explained, **others}
+        strides = range(1, min(x.stride for x in explained)) if alone else FEW
+        others = {**explained, **(_elsewhere(record, moving, maps, base, strides) if strides else {})}
         explained = {x: others[x] for x in likely(list(others))}
     if not explained:
         joints, remark = single_parameters(record, moving, maps, base, stride)
@@ -322,7 +315,7 @@ def _known(
     offset = common([VELOCITY_OFFSET.get(x.scheme, 0.0) for x in candidates])
     damped = any(joint.damped for joint in joints)
     first = candidates[0]
-    precision = common([d.precision for d in worst]) or UNTOLD
+    precision = common([d.precision for d in worst]) or "cannot tell"
     notes += all_remarks(record, moving, maps, joints, candidates, stated is not None)
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
