@@ -15,7 +15,7 @@ from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import WallSpring
+from springcheck.physics.terms import Spring, WallSpring
 from springcheck.thermal import THERMOSTATS, Law
 from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.states import identify_thermal
@@ -194,3 +194,25 @@ def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:
     still = driver.run(replace(scene(1000), bath=None), "own:velocity-verlet")
     q, v = np.concatenate([q, still.q[:, 0]]), np.concatenate([v, still.p[:, 0] / M])
     assert between_collisions(q, v, float(t[1] - t[0])) == []
+
+
+@pytest.mark.parametrize("name", ["baoa", "gj-iii", "lammps-langevin", "obabo"])
+def test_joined_particles_are_told_by_their_modes(name: str) -> None:
+    m, k, joint = np.array([0.7, 2.9]), np.array([1.3, 2.1]), 1.7
+    terms = (
+        WallSpring(i=np.arange(2), k=k, at=np.zeros(2)),
+        Spring(a=np.array([0]), b=np.array([1]), k=np.array([joint]), rest=np.zeros(1)),
+    )
+    pair = Scene(
+        m=m, q=np.array([0.4, -0.3]), p=np.array([0.2, 0.5]), terms=terms, step=0.3, steps=1000,
+        bath=Bath(temperature=0.8, friction=1.1), name="pair",
+    )  # fmt: skip
+    made = driver.run(pair, f"own:{name}", seed=5)
+    found = springcheck.identify(made.t, made.q, made.p, mass=m)
+    assert name in [one.scheme for one in found.candidates]
+    assert found.scheme in (None, name)
+    if name == "baoa":
+        K = np.diag(k) + joint * np.array([[1, -1], [-1, 1]])
+        omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(m, m))))
+        assert found.scheme == name
+        assert sorted(found.omega) == pytest.approx(omega, rel=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from springcheck.identify.factor import by_a_factor
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.modes import modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
@@ -39,10 +41,20 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
         identify_thermal(times, x, y, np.delete(positions, j, axis=1))
         for j, (x, y) in enumerate(zip(positions.T, u.T, strict=True))
     ]
-    if any(one is None for one in found):
+    h, joined = float(np.mean(np.diff(times))), None
+    if mass is not None and len(m) > 1 and not all(one and one.candidates for one in found):
+        joined = modes(positions, u, m)
+    if joined and (joined[1] or None not in found):
+        by_mode = zip(joined[0] @ positions.T, joined[0] @ u.T, strict=True)
+        apart = [identify_thermal(times, x, y, mixed=True) for x, y in by_mode]
+        if None not in apart:
+            # in a mode of sqrt(m) q the mass is 1
+            known = [replace(one, known=one.known and joined[1]) for one in apart if one is not None]
+            return _said(known, h, np.ones(len(m)), with_mass=True, joined=True)
+    if None in found:
         return None
-    known, h = [one for one in found if one is not None], float(np.mean(np.diff(times)))
-    return _said(known, h, None if mass is None and v is None else m, mass is not None)
+    known = [one for one in found if one is not None]
+    return _said(known, h, None if mass is None and v is None else m, with_mass=mass is not None)
 
 
 def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
@@ -63,7 +75,7 @@ def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, F
     return times, positions, u, m
 
 
-def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identification:
+def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bool = False) -> Identification:
     first = found[0]
     names = [y.scheme for y in first.candidates]
     schemes = [name for name in names if all(name in [y.scheme for y in one.candidates] for one in found)]
@@ -78,12 +90,14 @@ def _said(found: list[Thermal], h: float, m: Any, with_mass: bool) -> Identifica
             scheme=name, aliases=(), stride=every[name], step=h / every[name], turns=0,
             omega=tuple(y.omega for y in rows[name]),
             stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
-            if with_mass else None,
+            if with_mass and not joined else None,
             friction=tuple(y.friction for y in rows[name]), law="of the bath",
         )
         for name in kept
     )  # fmt: skip
     notes = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    if joined:
+        notes.append("joined particles: omega is that of each mode, and the numbers are those of the first")
     if first.uniform:
         notes.append("the draws are uniform, not normal")
     apart = any(s > 1 for one in found for y in one.candidates for s in y.strides)

@@ -68,8 +68,11 @@ JOINED_FROM = 6.0
 """Standard deviations of a correlation, from which on particles are joined: 2e-9 of those that are not."""
 
 
-def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = None) -> Thermal | None:
+def identify_thermal(
+    t: Floats, q: Floats, v: Floats, beside: Floats | None = None, *, mixed: bool = False
+) -> Thermal | None:
     """What thermostat made positions q and velocities v (f,) at times t (f,); None where none seems to have.
+    In a mode of several particles the draws are mixed, and how each is distributed does not show.
 
     Of a particle that follows those `beside` it (f, others) no scheme is told.  Deterministic motion, coupled
     or not, leaves no noise of which one frame says nothing to the next.
@@ -117,7 +120,7 @@ def identify_thermal(t: Floats, q: Floats, v: Floats, beside: Floats | None = No
         return clear(_of_one(q, v, h, free / free[0], misfit, left[1], even)) if free[0] and digits else None
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
-        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0])))
+        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0]), mixed))
     if collided := tuple(between_collisions(q, v, h)):
         return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
     if not all(map(_is_white, left)) or not even:
@@ -315,7 +318,7 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
     return ("brownian", "andersen-leapfrog")
 
 
-def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
+def _of_two_halves(q: Floats, h: float, misfit: float, mixed: bool) -> Thermal | None:
     """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
     half = np.diff(q) / h
     known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
@@ -328,7 +331,7 @@ def _of_two_halves(q: Floats, h: float, misfit: float) -> Thermal | None:
     # a force that is not linear leaves more than draws
     bent = _follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
     of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
-    uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise)
+    uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise) and not mixed
     found = []
     for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
         # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
