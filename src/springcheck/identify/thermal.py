@@ -12,7 +12,7 @@ from springcheck.identify.factor import by_a_factor
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.modes import modes
+from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
@@ -44,10 +44,11 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
     h, joined = float(np.mean(np.diff(times))), None
     if mass is not None and len(m) > 1 and not all(one and one.candidates for one in found):
         joined = modes(positions, u, m)
-    if joined and (joined[1] or None not in found):
+    if joined:
         by_mode = zip(joined[0] @ positions.T, joined[0] @ u.T, strict=True)
         apart = [identify_thermal(times, x, y, mixed=True) for x, y in by_mode]
-        if None not in apart:
+        # particles of which none shows its noise may take none, but for what modes say to rounding
+        if all(one and (None not in found or one.misfit < FREE_OF_NOISE) for one in apart):
             # in a mode of sqrt(m) q the mass is 1
             known = [replace(one, known=one.known and joined[1]) for one in apart if one is not None]
             return _said(known, h, np.ones(len(m)), with_mass=True, joined=True)

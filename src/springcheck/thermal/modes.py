@@ -16,7 +16,7 @@ def modes(q: Floats, v: Floats, m: Floats) -> tuple[Floats, bool] | None:
 
     Where n combinations of (q', v', q, v) are free of noise, and their matrices are no multiples of 1, these
     have them to rounding; else the best map of a frame, symmetric in sqrt(m) q, has them by statistics.  None
-    where neither does.
+    where nothing moves.
     """
     n, root = q.shape[1], np.sqrt(m)
     x, u = (q - np.mean(q, axis=0)) * root, (v - np.mean(v, axis=0)) * root
@@ -26,17 +26,20 @@ def modes(q: Floats, v: Floats, m: Floats) -> tuple[Floats, bool] | None:
     z = np.concatenate([x, u], axis=1) / scale
     frames = np.column_stack([z[1:], z[:-1], np.ones(len(z) - 1)])
     weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
-    exact = bool(weights[-n] < FREE_OF_NOISE * weights[-n - 1])
-    if exact:
-        free = turned[-n:, : 4 * n]
-        if np.linalg.cond(free[:, :n]) > 1 / FREE_OF_NOISE:
-            return None
-        blocks = np.split(np.linalg.solve(free[:, :n], free[:, n:]), 3, axis=1)
-    else:
-        A = np.linalg.lstsq(np.column_stack([z[:-1], np.ones(len(z) - 1)]), z[1:], rcond=None)[0][:-1].T
-        blocks = [part for row in np.split(A, 2) for part in np.split(row, 2, axis=1)]
-    apart = [np.linalg.norm(x - np.eye(n) * np.trace(x) / n) for x in blocks]
-    best = blocks[int(np.argmax(apart))]
-    if not max(apart) > np.sqrt(FREE_OF_NOISE):
-        return None
-    return np.asarray(np.linalg.eigh((best + best.T) / 2)[1].T * root), exact
+    free = turned[-n:, : 4 * n]
+    if weights[-n] < FREE_OF_NOISE * weights[-n - 1] and np.linalg.cond(free[:, :n]) < 1 / FREE_OF_NOISE:
+        best, apart = _least_alike(np.linalg.solve(free[:, :n], free[:, n:]))
+        if apart > np.sqrt(FREE_OF_NOISE):
+            return np.asarray(np.linalg.eigh(best + best.T)[1].T * root), True
+    A = np.linalg.lstsq(frames[:, 2 * n :], frames[:, : 2 * n], rcond=None)[0][: 2 * n].T
+    best, _ = _least_alike(np.concatenate(np.split(A, 2), axis=1))
+    return np.asarray(np.linalg.eigh(best + best.T)[1].T * root), False
+
+
+def _least_alike(blocks: Floats) -> tuple[Floats, float]:
+    """The one of some matrices (n, n) in a row (n, .. n) that is least a multiple of 1, and how much."""
+    n = len(blocks)
+    each = np.split(blocks, blocks.shape[1] // n, axis=1)
+    apart = [float(np.linalg.norm(x - np.eye(n) * np.trace(x) / n)) for x in each]
+    i = int(np.argmax(apart))
+    return each[i], apart[i]
