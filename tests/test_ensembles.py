@@ -95,6 +95,18 @@ def test_a_cell_that_explodes_leaves_the_others_alone(tmp_path: Path) -> None:
     assert np.all(columns["max_error"][[0, 2]] < 1)
 
 
+@pytest.mark.skipif(
+    bool(np.finfo(np.longdouble).max == np.finfo(np.float64).max), reason="no width holds the squares"
+)
+def test_energies_beyond_the_range_of_double_precision_are_those_of_the_states(tmp_path: Path) -> None:
+    """Of states that it holds; the energy of 1e300 was none, and that of 1e-300 was none lost."""
+    cells = vary.plan(["particle.0.position=1e-300:1e300:3:log"], text=text_of("spring"))
+    measure.record(scenefile.load_scene("spring"), cells, tmp_path / "e.h5", ["own:velocity-verlet"])
+    low, _, high = measure.stored(tmp_path / "e.h5").of("own:velocity-verlet")["energy_drift"]
+    assert low == pytest.approx(0.0025, rel=0.01)
+    assert high == pytest.approx(-0.0025, rel=0.01)
+
+
 def test_samples_come_from_their_seed_and_are_spread_as_asked(tmp_path: Path) -> None:
     given = ["spring.0.stiffness=1:100:log", "particle.0.mass=1:3"]
     one, again, other = (vary.plan(given, 30_000, seed) for seed in (5, 5, 6))

@@ -191,6 +191,10 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     """
     copies = len(chosen)
     energy = _energies(many, q, p, copies)
+    least, most = np.finfo(np.float64).smallest_normal / np.finfo(np.float64).eps, np.finfo(np.float64).max
+    if not np.all((np.abs(energy) > least) & (np.abs(energy) <= most)):
+        # squares beyond the range of double precision, which the states are within
+        energy = _energies(many, q.astype(np.longdouble), p.astype(np.longdouble), copies)
     right = np.broadcast_to(energy[0], energy.shape).copy()
     if not many.system.keeps_energy:
         steps = np.arange(len(q)) * many.every
