@@ -108,9 +108,10 @@ def test_chances_are_those_of_their_null() -> None:
     rng = np.random.default_rng(8)
     x = rng.standard_normal((2000, 60))
     for of in (chance.mean, chance.variance, chance.shape, chance.neighbours):
-        found = np.array([of(row) for row in x])
+        # a saddlepoint is sought for each, which takes a millisecond
+        found = np.array([of(row) for row in (x[:500] if of is chance.shape else x)])
         for level in (0.5, 0.1, 0.01):
-            assert np.mean(found <= level) < level + 5 * np.sqrt(level / len(x)), of.__name__
+            assert np.mean(found <= level) < level + 5 * np.sqrt(level / len(found)), of.__name__
     assert chance.shape(np.sqrt(12) * (rng.random(2000) - 0.5)) < 1e-15
     assert chance.shape(rng.standard_t(3, 2000)) < 1e-15
     assert chance.variance(1.01 * rng.standard_normal(1_000_000)) < 1e-30
