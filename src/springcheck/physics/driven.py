@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, Origin, Term, WithoutPotential
+from springcheck.physics.term import Column, LinearLaw, Origin, Term, WithoutPotential
 
 CLOCK = 2.0**-500
 """Mass of the clock [M], whose momentum is the same number: it moves by 1 a unit of time, and its energy is
@@ -67,6 +67,7 @@ class Drive(WithoutPotential, _Driven):
     formula: ClassVar[str] = "force amplitude cos(frequency t + phase)"
     columns: ClassVar[tuple[Column, ...]] = (Column("amplitude", "amplitude", single=False), *_TURNS)
     amplitude: Floats
+    scaled = Term.scaled
 
     def pull(self, q: Reals) -> Reals:
         return -self.amplitude * self.wave(q)
@@ -78,7 +79,7 @@ class Drive(WithoutPotential, _Driven):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ModulatedSpring(_Driven):
+class ModulatedSpring(LinearLaw, _Driven):
     """Springs from particles i to fixed points: V = k/2 (1 + depth cos(frequency t + phase)) (q - at)**2.
 
     k [M/T2], at [L].  Mathieu's equation; their energy is counted without the modulation, whose work it is
@@ -99,11 +100,7 @@ class ModulatedSpring(_Driven):
     at: Floats
 
     @staticmethod
-    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(0.5 * (k * u * u))
-
-    @staticmethod
-    def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:
+    def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:  # type: ignore[override]
         """At most: `curvature` is what it is at a time."""
         return np.asarray(np.abs(k) * (1 + np.abs(depth)))
 

@@ -46,10 +46,6 @@ class Magnetic(WithoutPotential):
             where: Any = (..., index)
             np.add.at(out, where, push)
 
-    def scaled(self, factor: float | Floats) -> Any:
-        """Itself: it is no part of the potential."""
-        return self
-
     def by_velocity(self, m: Floats) -> Floats:
         """Derivatives of the force by the momenta (n, n) [1/T]."""
         out = np.zeros((len(m), len(m)))

@@ -15,11 +15,11 @@ from typing import ClassVar, Self
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Integers, Reals
-from springcheck.physics.term import Column, Term
+from springcheck.physics.term import Column, LinearLaw, Term
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RadialSpring(Term):
+class RadialSpring(LinearLaw, Term):
     """Bonds between particles: V = k/2 (|q[b] - q[a]| - rest)**2, a row for each axis.
 
     k [M/T2], rest [L]; rows of one bond stand together and have one number.
@@ -39,23 +39,7 @@ class RadialSpring(Term):
     rest: Floats
     number: Floats
 
-    # of a row by itself, without a rest length: the energy of a bond is no sum over its axes
-
-    @staticmethod
-    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(0.5 * (k * u * u))
-
-    @staticmethod
-    def slope(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(k * u)
-
-    @staticmethod
-    def second(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(k)
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(k * size)
+    # the law is that of a row by itself, without a rest length: the energy of a bond is no sum over its axes
 
     @cached_property
     def _starts(self) -> Integers:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
-from springcheck.physics.term import Column, OnParticles, Origin, Term
+from springcheck.physics.term import Column, OnParticles, Origin, Term, WithoutPotential
 
 MOST_NEWTON = 60
 """Of Newton's method, which converges quadratically: far from a solution there is none."""
@@ -30,24 +30,11 @@ UNTRUE = 2.0**-46
 roundings, as numbers have that are written with all of their digits."""
 
 
-class _Rigid(Term):
+class _Rigid(WithoutPotential):
     """A term without energy or force, which keeps a length."""
 
     kind: ClassVar[Origin] = "constraint"
-
-    @staticmethod
-    def potential(u: Reals, length: Floats) -> Reals:
-        return np.zeros_like(u)
-
-    slope = second = potential
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, length: Floats) -> Reals:
-        return np.zeros_like(size)
-
-    def scaled(self, factor: float | Floats) -> Any:
-        """Itself: it is no part of the potential."""
-        return self
+    slope = rounding = staticmethod(WithoutPotential.potential)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

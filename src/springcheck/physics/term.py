@@ -260,8 +260,28 @@ class Term:
         return replace(record, **values)  # type: ignore[no-any-return]
 
 
+class LinearLaw:
+    """The law of a linear spring, of the first parameter alone."""
+
+    @staticmethod
+    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(0.5 * (k * u * u))
+
+    @staticmethod
+    def slope(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(k * u)
+
+    @staticmethod
+    def second(u: Reals, k: Floats, *_: Floats) -> Reals:
+        return k
+
+    @staticmethod
+    def rounding(size: Reals, u: Reals, k: Floats, *_: Floats) -> Reals:
+        return np.asarray(k * size)
+
+
 class WithoutPotential(Term):
-    """A term whose rows have no energy: friction, a field, a driving force."""
+    """A term whose rows have no energy: friction, a field, a driving force, a rod."""
 
     @staticmethod
     def potential(u: Reals, *_: Floats) -> Reals:
@@ -270,6 +290,10 @@ class WithoutPotential(Term):
     @staticmethod
     def second(u: Reals, strength: Floats, *_: Floats) -> Reals:
         return np.zeros_like(strength)
+
+    def scaled(self, factor: float | Floats) -> Self:
+        """Itself: it is no part of the potential."""
+        return self
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.radial import RadialSpring
 from springcheck.physics.rods import Rod, WallRod
-from springcheck.physics.term import Column, OnPairs, OnParticles, Origin, Term, WithoutPotential
+from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 from springcheck.physics.vanderpol import VanDerPol
 
 __all__ = [
@@ -28,24 +28,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Hooke:
-    """The law of a linear spring."""
-
-    @staticmethod
-    def potential(u: Reals, k: Floats) -> Reals:
-        return 0.5 * (k * u * u)
-
-    @staticmethod
-    def slope(u: Reals, k: Floats) -> Reals:
-        return k * u
-
-    @staticmethod
-    def second(u: Reals, k: Floats) -> Reals:
-        return k
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, k: Floats) -> Reals:
-        return k * size
+class Hooke(LinearLaw):
+    """Linear springs along an axis, whose force is added up before that of others."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -250,10 +234,6 @@ class Damping(WithoutPotential):
         self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
     ) -> None:
         Term.add_rounding(self, v, q, out, v)
-
-    def scaled(self, factor: float | Floats) -> Any:
-        """Itself: friction is no part of the potential."""
-        return self
 
 
 _KNOWN: dict[str, type[Term]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,7 +62,3 @@ class VanDerPol(WithoutPotential):
         x = (np.abs(np.take(q if near is None else near, self.i, axis=-1)) + np.abs(self.at)) / self.width
         # a rounding of the place is felt twice in its square
         self.scatter(self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1)), out)
-
-    def scaled(self, factor: float | Floats) -> Any:
-        """Itself: friction is no part of the potential."""
-        return self
