@@ -66,16 +66,15 @@ def uncertainty(scene: Scene, duration: float) -> float:
     system = scene.system
     if system.solution is None:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
-    dq, dp = system.solution.doubt(duration)
     with np.errstate(all="ignore"):
-        # the elongation of a spring is off by what both of its ends are
-        square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
-        known = energy_of_doubt(system, system.modes, np.longdouble(duration)) if system.has_modes else None
-        if known is not None:
-            # errors of all particles together, which are not all as large as each of them may be
-            square = known
-        for group in system.free_groups:
-            square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration) if duration else 0
+        # errors of all particles together are not all as large as each of them may be; a chain is held
+        square = energy_of_doubt(system, system.modes, np.longdouble(duration)) if system.has_modes else None
+        if square is None:
+            dq, dp = system.solution.doubt(duration)
+            # the elongation of a spring is off by what both of its ends are
+            square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
+            for group in system.free_groups if duration else ():
+                square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration)
         if square == 0 or system.norm.unit == 0:
             return 0.0
         found = float(np.sqrt(square) / system.norm.unit)

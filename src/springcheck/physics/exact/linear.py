@@ -127,9 +127,10 @@ def doubt(system: System[Any], found: Modes, t: np.longdouble) -> tuple[Extended
     What is not known of the equations themselves, y'' = -A y - r y' + g, is a force, and a force f moves y by
     |t f| min(t, 1/w) at most (variation of constants).
     """
-    reach, speed, phase, hold = reaches(found, t)
     if found.waves:
-        return _of_waves(system, found, t)[:2]
+        y, v, of_y, of_v = _of_waves(system, found, t)
+        return (found.spread(y) + of_y) / found.root_m, (found.spread(v) + of_v) * found.root_m
+    reach, speed, phase, hold = reaches(found, t)
     joined = found.vectors is not None
     last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
     y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
@@ -149,13 +150,18 @@ def doubt(system: System[Any], found: Modes, t: np.longdouble) -> tuple[Extended
 
 def energy_of_doubt(system: System[Any], found: Modes, t: np.longdouble) -> np.longdouble | None:
     """Bound of the energy of the error at time t [M L2/T2]; None where `doubt` says all that is known."""
-    return _of_waves(system, found, t)[2] if found.waves else None
+    if not found.waves:
+        return None
+    y, v, of_y, of_v = _of_waves(system, found, t)
+    w = np.sqrt(np.max(found.w2))
+    known: np.longdouble = (_length(np.hypot(np.sqrt(found.w2) * y, v)) + np.hypot(w * of_y, of_v)) ** 2 / 2
+    return known
 
 
 def _of_waves(
     system: System[Any], found: Modes, t: np.longdouble
-) -> tuple[Extended, Extended, np.longdouble]:
-    """The same of a uniform chain: bounds (n,) in q and p, and that of the energy of both.
+) -> tuple[Extended, Extended, Extended, Extended]:
+    """Of a uniform chain bounds (n,) of each wave's position and velocity, and what the transform adds.
 
     A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of the
     length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that
@@ -172,9 +178,7 @@ def _of_waves(
         driven * (whole_y + np.max(hold) * whole_v) + _length(found.centre()) + _length(reach)
     )
     of_v = transform * (driven * (whole_v + w * whole_y) + _length(speed))
-    energy = (_length(np.hypot(np.sqrt(found.w2) * y, v)) + np.hypot(w * of_y, of_v)) ** 2 / 2
-    q, p = (found.spread(y) + of_y) / found.root_m, (found.spread(v) + of_v) * found.root_m
-    return np.asarray(q), np.asarray(p), energy
+    return np.asarray(y), np.asarray(v), of_y, of_v
 
 
 def _length(x: Extended) -> Extended:
