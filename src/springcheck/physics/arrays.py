@@ -91,3 +91,26 @@ class Arithmetic:
         }
         plain = Arithmetic()
         return ", ".join(said for name, said in named.items() if getattr(self, name) != getattr(plain, name))
+
+
+MOST_NUMBERS = 1 << 21
+"""Numbers of rows of terms that are worked out at a time: 32 MB in extended precision."""
+
+
+def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[Reals, Reals], Reals]:
+    """A law of states (q, p, *more), each (..., n), with as many states at once as their rows of terms allow.
+
+    200 frames of 200,000 springs on one particle would else be 1.5 GB in the making.
+    """
+
+    def bounded(q: Reals, p: Reals) -> Reals:
+        given = (q, p, *more)
+        count = q.size // q.shape[-1]
+        if count == 1 or count * rows <= MOST_NUMBERS or any(x.shape != q.shape for x in given):
+            return law(*given)
+        each = max(1, MOST_NUMBERS // rows)
+        flat = [x.reshape(count, -1) for x in given]
+        found = np.concatenate([law(*(x[i : i + each] for x in flat)) for i in range(0, count, each)])
+        return found.reshape(*q.shape[:-1], *found.shape[1:])
+
+    return bounded

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Floats, Integers, Reals
-from springcheck.physics.term import Term, in_pieces
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals, in_pieces
+from springcheck.physics.term import Term
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
 """Below it squares lose digits to underflow."""

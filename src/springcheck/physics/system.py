@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
-from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals
+from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals, in_pieces
 from springcheck.physics.driven import with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.rods import Rods, rods_of
-from springcheck.physics.term import Term, in_pieces
+from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, VanDerPol
 
 Fields = TypeVar("Fields", bound=SceneFields)

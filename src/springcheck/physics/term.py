@@ -8,7 +8,7 @@ A formula is written once for every width of float, for one state and for a whol
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self, TypeAlias, cast
@@ -378,26 +378,3 @@ def _scatter(how: np.ufunc, out: Reals, place: tuple[Where, bool], values: Reals
         how.at(out, at, values)
     else:
         out[at] = how(out[at], values)
-
-
-MOST_NUMBERS = 1 << 21
-"""Numbers of rows of terms that are worked out at a time: 32 MB in extended precision."""
-
-
-def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[Reals, Reals], Reals]:
-    """A law of states (q, p, *more), each (..., n), with as many states at once as their rows of terms allow.
-
-    200 frames of 200,000 springs on one particle would else be 1.5 GB in the making.
-    """
-
-    def bounded(q: Reals, p: Reals) -> Reals:
-        given = (q, p, *more)
-        count = q.size // q.shape[-1]
-        if count == 1 or count * rows <= MOST_NUMBERS or any(x.shape != q.shape for x in given):
-            return law(*given)
-        each = max(1, MOST_NUMBERS // rows)
-        flat = [x.reshape(count, -1) for x in given]
-        found = np.concatenate([law(*(x[i : i + each] for x in flat)) for i in range(0, count, each)])
-        return found.reshape(*q.shape[:-1], *found.shape[1:])
-
-    return bounded
