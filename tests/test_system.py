@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, driver
-from springcheck.physics import graph, system, term
+from springcheck.physics import arrays, graph, system
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.builders import chain, spring
 from springcheck.physics.scene import Scene
@@ -190,7 +190,7 @@ def test_states_are_worked_out_in_pieces_to_the_last_bit(monkeypatch: pytest.Mon
         return [np.ascontiguousarray(x, np.float64).tobytes() for x in found]
 
     whole = everything()
-    monkeypatch.setattr(term, "MOST_NUMBERS", 8)
+    monkeypatch.setattr(arrays, "MOST_NUMBERS", 8)
     assert everything() == whole
 
 
