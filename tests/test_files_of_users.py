@@ -138,13 +138,20 @@ def test_plot_replaces_no_figure_but_its_own(
     assert Path("precious").read_text() == "mine"
 
 
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of a study, which is measured once."""
+    path = tmp_path_factory.mktemp("study") / "s.h5"
+    command = ["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", str(path)]
+    assert main(command) == 0
+    return path
+
+
 @pytest.mark.parametrize("name", ["/../../PWNED", "../PWNED", "a/PWNED", "PWNED\n\x1b[2J"])
-def test_the_scene_name_of_a_store_reaches_no_file_name(name: str, tmp_path: Path) -> None:
+def test_the_scene_name_of_a_store_reaches_no_file_name(name: str, study: Path, tmp_path: Path) -> None:
     import h5py
 
-    command = ["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "s.h5"]
-    assert main(command) == 0
-    shutil.copy("s.h5", "t.h5")
+    shutil.copy(study, "t.h5")
     with h5py.File("t.h5", "r+") as file:
         file.attrs["scene_name"] = name
     Path("in").mkdir()
