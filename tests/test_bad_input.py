@@ -237,6 +237,7 @@ def test_a_folder_in_which_nothing_can_be_made_is_said_to_be_that(
     refused(capsys, command, "no file can be made there" if os.geteuid() == 0 else "/proc")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [1, 3, 40])
 def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
     resource = pytest.importorskip("resource")

@@ -388,6 +388,7 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     assert "Temperatures over that of the bath" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_thermostat_whose_springs_diverge_says_so_in_place_of_temperatures() -> None:
     # its chain counts three degrees of freedom for each of a thousand springs that have one
     row = baths.entry(engines.parse("ase:nose-hoover"))

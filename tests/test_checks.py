@@ -39,6 +39,7 @@ def alarms(verdicts: list[Verdict]) -> list[str]:
     return [f"{v.check} {v.value:.3g} of {v.bound:.3g}" for v in verdicts if v.passed is False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLAIN)
 def test_no_check_rejects_the_textbook_step_on_random_scenes(name: str) -> None:
     for seed in range(12):
@@ -63,6 +64,7 @@ def part_of(run: Trajectory, rows: slice) -> Trajectory:
     return replace(run, t=run.t[rows], q=run.q[rows], p=run.p[rows], energy=run.energy[rows], outcome=outcome)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-euler", "rk4"])
 def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
     for seed in range(8):

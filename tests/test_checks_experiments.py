@@ -46,6 +46,7 @@ def plain(name: str) -> checks.Run:
     return lambda scene, label: steppers.record(scene, scheme, steppers.textbook(scene, scheme), label=label)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ruth3", "forest-ruth", "yoshida4", "rk2-heun", "rk4", "implicit-midpoint"])
 def test_schemes_of_every_order_pass_every_experiment(name: str) -> None:
     verdicts = checks.judge_thoroughly(scenes.load_scene("chain"), name, plain(name))

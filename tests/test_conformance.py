@@ -65,6 +65,7 @@ FAULTS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "old", "new"), FAULTS)
 def test_each_check_rejects_a_broken_engine(name: str, old: str, new: str) -> None:
     assert old in CODE
@@ -152,6 +153,7 @@ def test_a_wrong_trajectory_is_told_in_words() -> None:
         conformance.assert_right(scene, replace(run, scheme="rk4"))
 
 
+@pytest.mark.slow
 @conformance.parametrize_with_checks(engines.engine("ase"))
 def test_an_engine_of_ours(check: conformance.Check, need: Any) -> None:
     need("ase:velocity-verlet")

@@ -26,6 +26,7 @@ def text_of(name: str) -> str:
     return (scenefile.folder() / f"{name}.toml").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "given", "methods"),
     [

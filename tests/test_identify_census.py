@@ -77,6 +77,7 @@ def test_positions_at_rounded_times_are_named(case: corpus.Case) -> None:
     assert (found.verdict, found.fits) == ("named", True)
 
 
+@pytest.mark.slow
 def test_a_missing_frame_of_a_coarse_file_is_no_rounding_of_many_steps() -> None:
     (case,) = drawn("a frame of text is missing")
     found = corpus.said(case)

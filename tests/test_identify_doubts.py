@@ -177,6 +177,7 @@ def remembered(m: float, f: float, h: float, c: float = 0.0, count: int = 100) -
     return each[:, 0], each[:, 1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("h", [0.07, 1.3])
 @pytest.mark.parametrize(
     ("shares", "said"),

@@ -495,6 +495,7 @@ def written(x: np.ndarray, digits: int) -> np.ndarray:
     return np.array([float(f"{y:.{digits}g}") for y in x])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("substeps", "h", "frames", "digits"), [(3, 0.0678, 5, 3), (4, 0.05, 10, 3)])
 def test_few_frames_of_few_digits_do_not_tell_substeps_from_steps(substeps, h, frames, digits) -> None:
     rng, judged = np.random.default_rng(1), 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from springcheck.identify import identify
 
@@ -99,6 +100,7 @@ def test_a_pair_in_single_precision_away_from_the_origin_is_named_with_its_arith
     assert "single" in str(found)
 
 
+@pytest.mark.slow
 def test_a_force_from_outside_or_one_that_is_late_is_no_scheme() -> None:
     drift = (0.031, -0.017, 0.023)
     assert named(*swing(drift=drift, more=1e-3), step=H).scheme is None

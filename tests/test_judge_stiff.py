@@ -68,6 +68,7 @@ FAULTS: dict[str, Callable[[Floats], list[float] | Floats]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("ratio", [1e6, 1e7, 1e8, 1e9, 1e10])
 def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None:
@@ -113,6 +114,7 @@ def soft_body(rng: np.random.Generator, hw: float) -> Scene:
     return replace(made, step=hw / w, quantities=("q", "p"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["change of velocity", "positions first", "change of position"])
 def test_cloth_and_position_based_dynamics_pass_on_soft_bodies(form: str) -> None:
     """From h omega of 20 on the change of velocity adds up what the neighbours' momenta do to the force;
