@@ -92,7 +92,7 @@ THOROUGH: tuple[Experiment, ...] = (
 
 ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
 
-RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_length, rod_velocity)
 """Checks of a trajectory of a thermostat, which no law of a deterministic motion holds for."""
 
 

@@ -8,10 +8,14 @@ from springcheck import schemes
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.requires import MAP
+from springcheck.checks.thermal import reading
+from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.well import PI
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
+from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import PROJECT
 
 
 def _rods(case: Case) -> Rods:
@@ -20,39 +24,57 @@ def _rods(case: Case) -> Rods:
     return found
 
 
-@check("length", family="motion", requires=MAP | {"rods"})
+def _allowed(case: Case) -> tuple[int, Extended]:
+    """Roundings along a step, and one rounding of the momenta that it leads to (f-1, n); of the frames of a
+    thermostat the last, whose draws they tell."""
+    if not case.law.has("random"):
+        return case.roundings, case.allowance[1]
+    found = reading(case)
+    assert found.allowed is not None
+    return found.roundings, found.allowed[1]
+
+
+HELD_RIGID = frozenset({"named", "two-frames", "rods"})
+"""What a check of rods requires."""
+
+
+@check("length", family="motion", requires=HELD_RIGID)
 def rod_length(case: Case) -> Finding:
     """Every rod has its length at every frame, to rounding or to the tolerance that its engine declares."""
     rods, how = _rods(case), case.trajectory.arithmetic
     q = case.trajectory.q[1:].astype(np.longdouble)
+    roundings, _ = _allowed(case)
     with np.errstate(all="ignore"):
         off = np.abs(rods.strain(q))
-        bound = case.roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
+        bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
         worst = np.unravel_index(np.argmax(np.where(np.isfinite(off), off / bound, np.inf)), off.shape)
     why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
     if how.lengths:
         why += f", and the tolerance {how.lengths:g} of the engine's solver, which is not its error"
-    lost = ~np.isfinite(case.next_states[0]).all(axis=1)
+    lost = ~np.isfinite(case.next_states[0] if case.scheme.has("one-step") else q).all(axis=1)
     if np.any(lost):
         step = int(case.steps[int(np.argmax(lost))])
         why += f"; after step {step} a rod turns by h w of 1 or more, and no push along it keeps its length"
     return Finding(off[worst], bound[worst], "of the length", why)
 
 
-@check("along", family="motion", requires=MAP | {"rods"})
-def rod_velocity(case: Case) -> Finding:
+@check("along", family="motion", requires=HELD_RIGID)
+def rod_velocity(case: Case) -> Finding | str:
     """The ends of a rod have one velocity along it, to rounding."""
-    rods = _rods(case)
-    q, p = (x[1:].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
+    rods, bath = _rods(case), THERMOSTATS.get(case.trajectory.scheme)
+    if bath and bath.held[-1] != PROJECT:
+        return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
+    roundings, of_p = _allowed(case)
+    q, p = (x[-len(of_p) :].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
     with np.errstate(all="ignore"):
         r, m = rods.ways(q), case.judged.m
         off = np.abs(rods.dot(r, rods.apart(p / m)))
-        unit = rods.sum_of_sizes(r, case.allowance[1] / m)
+        unit = rods.sum_of_sizes(r, of_p / m)
         # where a step has no solution nothing is known of its momenta
         seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
-    return Finding(seen[worst], case.roundings, "roundings", why)
+    return Finding(seen[worst], roundings, "roundings", why)
 
 
 @check("turn", family="motion", requires=MAP | {"rods", "turning"})

@@ -18,8 +18,8 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.draws import IN_AND_OUT, LARGEST_DRAW, PER_ACT, law_of, one_rounding, read
-from springcheck.thermal.stepper import forces
+from springcheck.thermal.draws import LARGEST_DRAW, law_of, one_rounding, read, roundings_of
+from springcheck.thermal.stepper import Met, forces
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""
@@ -61,25 +61,24 @@ class Seeded:
 
     def stepper(self, scene: Scene, *, absolute: bool = False) -> Stepper:
         """The scheme's own step on a scene."""
-        assert scene.bath is not None
-        return Stepper(
-            self.scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal,
-            width=np.longdouble, absolute=absolute,
-            freedoms=self.scheme.freedoms(scene.n, scene.particles),
-        )  # fmt: skip
+        return Stepper.of(self.scheme, scene, absolute=absolute)
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
         """What a step from a frame of a run may be off by; `factor` is that of all momenta, if any."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
+        met: list[Met] = []
+        if self.scene.system.rods:
+            none = [np.zeros(self.scene.n)] * self.scheme.draws
+            self.stepper(self.scene)(*start, forces(self.scheme, self.scene.system), none, met=met)
         of_q, of_p = one_rounding(
             self.scene, self.stepper(self.scene, absolute=True), start, draws, factor, run.arithmetic,
-            run.rebuilds_velocity,
+            run.rebuilds_velocity, met,
         )  # fmt: skip
         if self.scheme.rescales_after:
             # the kinetic energy that the factor is of has the roundings of all that came before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
-        many = IN_AND_OUT + PER_ACT * len(self.scheme.acts)
+        many = roundings_of(self.scheme, self.scene)
         return many * of_q, many * of_p
 
 
@@ -148,6 +147,8 @@ def noise_size(subject: Seeded) -> Finding | str:
 
     Particles start at rest, or, where a factor acts on momenta, in motion that is scaled likewise.
     """
+    if subject.scene.system.rods:
+        return "a rod has its length, and no state is scaled"
     scheme, scene = subject.scheme, subject.scene if subject.scheme.rescales else subject.at_rest()
     if not scene.system.is_linear or np.any(scene.system.potential_force(0 * scene.q, 0 * scene.p)):
         return "a linear scene with its rest in 0 is needed"

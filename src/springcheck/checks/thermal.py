@@ -13,7 +13,7 @@ from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
-from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal import THERMOSTATS, chance, rigid
 from springcheck.thermal.draws import SMALLEST, Reading, law_of, read
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
@@ -33,7 +33,8 @@ def _reading(case: Case) -> Reading:
     skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
     q, p = run.q[skipped:], run.p[skipped:]
     with np.errstate(all="ignore"):
-        return read(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+        by = rigid.read if case.judged.system.rods else read
+        return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
 
 
 @check("across", family="noise", requires={"every-step"})
@@ -75,7 +76,7 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
     if not found.known:
         return HIDDEN
     scheme, x = THERMOSTATS[case.trajectory.scheme], found.draws
-    if scheme.uniform:
+    if scheme.uniform and not case.scene.system.rods:
         x = chance.normal_scores(x)
     if found.hits is not None:
         x = x[found.hits][:, None]
@@ -109,6 +110,8 @@ def draws_shape(case: Case) -> Chance | str:
 
     Judged by the fourth Legendre polynomial of their ranks, which no single draw decides.
     """
+    if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
+        return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
     return _of(case, chance.shape, lambda x: f"fourth moment {np.mean(x**4) / np.mean(x * x) ** 2:.4f}")
 
 

@@ -203,6 +203,10 @@ def _thermostat(name: str) -> Iterator[str]:
     scheme = THERMOSTATS[name]
     for act in scheme.acts:
         yield f"  {_ACTS[act.kind].format(c='c(x)' if callable(act.part) else act.part)}"
+    if scheme.held:
+        letters = {"kick": "B", "drift": "A", "exchange": "O"}
+        held = ", ".join(letters.get(act.kind, act.kind) for act in scheme.held)
+        yield f"  with rods: {held} (shake brings back lengths, project what moves ends apart)"
     if scheme.carried:
         yield "  the first draw xi of a step is the last of the step before"
     if scheme.rescales:

@@ -161,6 +161,15 @@ def in_space(scene: Scene, term: RadialSpring) -> Iterator[tuple[tuple[int, int]
         yield (int(of[a]), int(of[b])), k, rest
 
 
+def in_all_of_space(scene: Scene, label: Label) -> None:
+    """MethodError where noise along an axis that the scene leaves out would turn a rod that way."""
+    if scene.system.rods and scene.n < 3 * scene.particles:
+        raise MethodError(
+            f"{label}: its noise acts along x, y and z, and turns a rod; the scene's particles move along "
+            f"{' and '.join(scene.axes)}"
+        )
+
+
 def rods(joined: list[Joint], anchors: int) -> Iterator[Bond]:
     """Rods as bonds without a force, but for the third of a triangle; anchors are numbered from here on."""
     closing = {tuple(sorted(ends)) for ends, *_ in triangles(joined)}

@@ -303,6 +303,10 @@ class Rods:
         size = np.sqrt(self.dot(r, r))
         return np.asarray((size - length) / length)
 
+    def freedoms(self, q: Reals) -> int:
+        """Degrees of freedom that they leave at positions q (n,)."""
+        return len(self.m) - int(np.linalg.matrix_rank(self._matrix(r := self.ways(q), r)))
+
     def rates(self, q: Reals, p: Reals) -> Reals:
         """Angular velocity of each rod, its sign left out, at states (..., n) -> (..., c) [1/T]."""
         v, r = self.apart(p / self.m.astype(p.dtype)), self.ways(q)
@@ -330,10 +334,9 @@ class Rods:
         wrong = ~(off <= UNTRUE * (1 + self.magnitude(q)))
         if np.any(wrong):
             j = int(np.argmax(wrong))
-            is_now = float(np.sqrt(self.dot(r, r))[j])
             raise SceneError(
-                f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are {is_now!r} "
-                "apart at the start; leave the length out to keep that"
+                f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are "
+                f"{float(np.sqrt(self.dot(r, r))[j])!r} apart at the start; leave the length out to keep that"
             )
         wrong = ~(along <= UNTRUE * size)
         if np.any(wrong):

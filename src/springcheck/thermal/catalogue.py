@@ -51,9 +51,21 @@ class Act(NamedTuple):
         "rescale",
         "scale",
         "chain",
+        "shake",
+        "project",
     ]
     part: Part = ONE
     draw: int = 0
+
+
+PROJECT = Act("project")
+
+
+def rigidly(acts: tuple[Act, ...]) -> tuple[Act, ...]:
+    """Stages of a splitting with rods, which hold after each: RATTLE's two halves after a drift, and the
+    second after what acts on momenta (Leimkuhler & Matthews, Proc. R. Soc. A 472 (2016) 20160138)."""
+    shaken = ((act, *([Act("shake", act.part)] if act.kind == "drift" else []), PROJECT) for act in acts)
+    return sum(shaken, ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +88,9 @@ class Thermostat:
     """gamma h below which it is a thermostat: from there on its noise has no real size."""
     chain: Chain | None = None
     """The bath of a scheme that takes no draws."""
+    held: tuple[Act, ...] = ()
+    """Its stages where a scene has rods: with those that bring back lengths after a drift, and momenta to
+    what moves the ends of a rod alike along it; () where none are known."""
 
     def freedoms(self, n: int, particles: int) -> int:
         """Degrees of freedom that its chain counts, of n coordinates of so many particles."""
@@ -102,6 +117,12 @@ class Thermostat:
     def splits(self) -> bool:
         """Whether it kicks by slow and by fast terms apart."""
         return any(act.kind == "fast" for act in self.acts)
+
+    @property
+    def kinetic_of_rods(self) -> bool:
+        """Whether a free rod moves at the temperature of the bath, to every order in the step: a drift keeps
+        speeds and volumes of its phase space, and all else acts on momenta across the rod alone."""
+        return self.held[-1:] == (PROJECT,) and all(act.kind != "jump" for act in self.acts)
 
     @property
     def rescales_after(self) -> bool:
@@ -153,9 +174,12 @@ _SAID = {
 
 
 def _by_letters(letters: str) -> Thermostat:
+    acts, middle = splitting(letters), letters == "BAOA"
+    # LF-middle holds before it drifts and after it has: neither draws nor what it stores lie across the rod
+    held = (acts[0], PROJECT, *acts[1:], Act("shake")) if middle else rigidly(acts)
     return Thermostat(
-        name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=splitting(letters),
-        draws=letters.count("O"), synchronised=letters != "BAOA", source="Leimkuhler & Matthews 2013",
+        name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=acts, held=held,
+        draws=letters.count("O"), synchronised=not middle, source="Leimkuhler & Matthews 2013",
     )  # fmt: skip
 
 
@@ -230,6 +254,19 @@ _VEC_NOISE = (
     Act("noise", lambda x: -x / (4 * np.sqrt(3 * np.ones_like(x))), 1),
 )
 
+_VEC_PUSH = (_VEC_FRICTION, _VEC_KICK, *_VEC_NOISE)
+_VEC = (
+    (*_VEC_PUSH, Act("drift"), Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1)), _VEC_PUSH,
+)  # fmt: skip
+_LAMMPS = (
+    (
+        Act("damp", _of_x(0, 1)), Act("kick", HALF), Act("noise", HALF, 0), Act("undamp", _of_x(0, -HALF)),
+        Act("drift"),
+    ),
+    (Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 1)),
+)  # fmt: skip
+"""Up to where rods have their lengths again, and the rest."""
+
 _OTHERS = (
     _by_groups(2),
     Thermostat(
@@ -242,21 +279,13 @@ _OTHERS = (
     ),
     Thermostat(
         name="lammps-langevin", title="LAMMPS fix langevin with fix nve, friction of the half-step velocity",
-        acts=(
-            Act("damp", _of_x(0, 1)), Act("kick", HALF), Act("noise", HALF, 0),
-            Act("undamp", _of_x(0, -HALF)), Act("drift"),
-            Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 1),
-        ),
+        acts=(*_LAMMPS[0], *_LAMMPS[1]), held=(*_LAMMPS[0], Act("shake"), *_LAMMPS[1], PROJECT),
         draws=2, carried=1, uniform=True,
         source="Schneider & Stoll, Phys. Rev. B 17 (1978) 1302; as LAMMPS runs it",
     ),
     Thermostat(
         name="vanden-eijnden-ciccotti", title="Vanden-Eijnden & Ciccotti, eq. 23; ASE's Langevin",
-        acts=(
-            _VEC_FRICTION, _VEC_KICK, *_VEC_NOISE, Act("drift"),
-            Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1), _VEC_FRICTION, _VEC_KICK,
-            *_VEC_NOISE,
-        ),
+        acts=(*_VEC[0], *_VEC[1]), held=(*_VEC[0], Act("shake"), *_VEC[1], PROJECT),
         draws=2, source="Vanden-Eijnden & Ciccotti 2006",
     ),
     Thermostat(

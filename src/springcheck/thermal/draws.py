@@ -17,7 +17,7 @@ from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
 from springcheck.thermal.laws import Law
-from springcheck.thermal.stepper import Stepper, forces
+from springcheck.thermal.stepper import Met, Stepper, forces
 
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
@@ -54,6 +54,8 @@ class Reading:
     """Where collisions took place, (f-1, n)."""
     rescaled: Floats | None = None
     """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
+    allowed: tuple[Extended, Extended] | None = None
+    """Beside rods: one rounding of everything that a step adds up, of q and of p (f-1, n)."""
 
     @property
     def known(self) -> bool:
@@ -92,15 +94,25 @@ def read(
     return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
 
 
+def roundings_of(scheme: Thermostat, scene: Scene) -> int:
+    """Roundings along one step; those of rods as `schemes.roundings` counts them."""
+    acts = scheme.held if scene.system.rods else scheme.acts
+    return IN_AND_OUT + sum({"shake": 12, "project": 8}.get(act.kind, PER_ACT) for act in acts)
+
+
 def one_rounding(
     scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
-    how: Arithmetic, rebuilt: bool,
+    how: Arithmetic, rebuilt: bool, met: list[Met] | None = None,
 ) -> tuple[Extended, Extended]:  # fmt: skip
-    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n)."""
+    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n).
+
+    `met` is what rods have met in the step itself.
+    """
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
     sizes = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(terms=terms))
-    q, p = sizer(size, np.abs(start[1]), sizes, draws, hit)
+    loose = how.lengths / (unit * roundings_of(sizer.scheme, scene))
+    q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
     if how.cancels:
         # coefficients of all that is added to q, and of p
         lost = max(x, 1 / x) ** how.cancels
@@ -112,19 +124,10 @@ def one_rounding(
 
 class _Reader:
     def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
-        assert scene.bath is not None
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
-        about: dict[str, Any] = {
-            "h": scene.step,
-            "m": scene.m,
-            "rate": scene.bath.friction,
-            "thermal": scene.thermal,
-        }
-        about["freedoms"] = scheme.freedoms(scene.n, scene.particles)
-        self.stepper = Stepper(scheme, **about, width=np.longdouble)
-        self.sizer = Stepper(scheme, **about, width=np.longdouble, absolute=True)
+        self.stepper, self.sizer = Stepper.of(scheme, scene), Stepper.of(scheme, scene, absolute=True)
         self._force = forces(scheme, scene.system)
-        self.roundings = IN_AND_OUT + PER_ACT * len(scheme.acts)
+        self.roundings = roundings_of(scheme, scene)
         self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)
 
     def read(self, q: Floats, p: Floats) -> Reading:

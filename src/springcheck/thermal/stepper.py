@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
+from springcheck.physics.rods import Rods
+from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 from springcheck.thermal.catalogue import Thermostat, value_of
 from springcheck.thermal.decays import Decay
+
+Met: TypeAlias = tuple[Reals | None, Reals, Reals]
+"""What rods meet: where a drift began that they end, None where none did; and the state, its momenta not yet
+projected."""
 
 
 def forces(
@@ -30,13 +36,22 @@ class Stepper:
 
     `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
     on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
-    With `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the
-    roundings of a step, bounds its rounding.
+    Rods `hold` where the scheme says so.  With `absolute` every difference is taken as a sum of sizes: a unit
+    roundoff of these, times the roundings of a step, bounds its rounding.
     """
+
+    @classmethod
+    def of(cls, scheme: Thermostat, scene: Scene, *, width: Any = np.longdouble, **more: Any) -> Stepper:
+        """The steps of a scheme on a scene with a bath."""
+        assert scene.bath is not None
+        return cls(
+            scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=width,
+            freedoms=scheme.freedoms(scene.n, scene.particles), hold=scene.system.rods, **more,
+        )  # fmt: skip
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
-        absolute: bool = False, freedoms: int = 0,
+        absolute: bool = False, freedoms: int = 0, hold: Rods | None = None,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
         if scheme.chain:
@@ -44,15 +59,17 @@ class Stepper:
             Q = scheme.chain.masses(freedoms, width(thermal), width(rate))
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
             self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
+        self._hold, acts = hold, scheme.held if hold else scheme.acts
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
         size = np.sqrt(self.m * width(thermal))
         shot = np.sqrt(2 * x) * size
         sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
-        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
+        sizes["shake"] = self.h
+        moves = [act.kind in ("drift", "jump", "creep") for act in acts]
         self._moved = len(moves) - moves[::-1].index(True)
         self._acts, self._sign = [], 1 if absolute else -1
-        for kind, part, number in scheme.acts:
+        for kind, part, number in acts:
             c = value_of(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
             noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
@@ -70,14 +87,18 @@ class Stepper:
         draws: Sequence[Any],
         hit: Any = None,
         end: Reals | None = None,
+        met: list[Met] | None = None,
+        loose: float = 0.0,
     ) -> tuple[Reals, Reals]:
         """One step from (q, p), each (..., n), by what `forces` gives.
 
         `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place, or is
         the factor of all momenta, which else comes of the draws.  A force after the last drift is taken at
-        `end`, where it is known: draws of other particles act there.
+        `end`, where it is known: draws of other particles act there.  `met` takes what rods have met, which
+        a step of absolute values needs, with the tolerance `loose` of their lengths in roundings.
         """
-        m, h, last, q_old = self.m, self.h, p, q
+        m, h, last, q_old, held = self.m, self.h, p, q, q
+        way = iter(met or ())
         for i, (kind, c, noise, number) in enumerate(self._acts):
             if kind == "drift":
                 q = q + c * (p / m)
@@ -106,6 +127,17 @@ class Stepper:
                 p = p * np.expand_dims(factor, -1)
             elif kind in ("rescale", "scale", "chain"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
+            elif kind in ("shake", "project"):
+                assert self._hold is not None
+                if self._sign > 0:
+                    q, p = self._hold.sizes(*next(way), c, (q, p), loose)
+                    continue
+                if kind == "shake":
+                    q, p = self._hold.drifted(held, q, p, c)
+                if met is not None:
+                    met.append((held if kind == "shake" else None, q, p))
+                held = q
+                p = self._hold.projected(q, p) if kind == "project" else p
             elif kind == "rebuild":
                 p = m * ((q + self._sign * q_old) / h)
             else:

@@ -33,6 +33,11 @@ ENGINE = Engine(
             scripted=True, rebuilds_velocity=True,
         ),
         thermostat(
+            "langevin-rods", "vanden-eijnden-ciccotti",
+            "ase.md.langevin.Langevin with FixBondLengths, tolerance 1e-13", _DRAWS, EVERY_POTENTIAL | RODS,
+            scripted=True, rebuilds_velocity=True, requires=frozenset({Need.RODS}),
+        ),
+        thermostat(
             "langevin-baoab", "baoab", "ase.md.langevinbaoab.LangevinBAOAB", _DRAWS, EVERY_POTENTIAL,
             rebuilds_velocity=True,
         ),

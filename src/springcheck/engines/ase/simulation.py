@@ -19,7 +19,7 @@ from ase.calculators.calculator import Calculator, all_changes
 from ase.constraints import FixBondLengths
 from ase.md.verlet import VelocityVerlet
 
-from springcheck.engines.bonds import ANCHOR_MASS, off_axis
+from springcheck.engines.bonds import ANCHOR_MASS, in_all_of_space, off_axis
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
@@ -36,7 +36,7 @@ def version() -> dict[str, str]:
 
 def arithmetic(label: Label) -> Arithmetic:
     """NumPy's double precision; `compare_atoms` takes positions within 1e-15 of each other for the same."""
-    return Arithmetic(stale=1e-15, lengths=1e-13 if label.method == "rattle" else 0.0)
+    return Arithmetic(stale=1e-15, lengths=1e-13 if label.method in ("rattle", "langevin-rods") else 0.0)
 
 
 class Springs(Calculator):  # type: ignore[misc]
@@ -81,7 +81,7 @@ def _thermostat(
     rng = seed if hasattr(seed, "standard_normal") else np.random.default_rng(seed)
     rate = scene.bath.friction
     given: dict[str, Any] = {"timestep": step * time, "temperature_K": energy / ase.units.kB, "rng": rng}
-    if name == "langevin":
+    if name.startswith("langevin") and name != "langevin-baoab":
         from ase.md.langevin import Langevin
 
         return Langevin(atoms, friction=rate / time, fixcm=False, **given)
@@ -133,6 +133,7 @@ class _Dynamics:
             self._atoms.set_constraint(FixBondLengths(pairs, bondlengths=[x * length for _, x, _ in rods]))
         self._atoms.calc = Springs(scene.system, length, time)
         if method.generator:
+            in_all_of_space(scene, label)
             energy = scene.thermal * (length / time) ** 2
             self._dynamics = _thermostat(method.name, self._atoms, scene, step, time, energy, seed)
         else:

@@ -90,6 +90,11 @@ ENGINE = Engine(
             _ON_A_LINE, rebuilds_velocity=True,
         ),
         thermostat(
+            "langevin-middle-rods", "baoa",
+            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities", _DRAWS,
+            _ON_A_LINE | RODS, requires=frozenset({Need.RODS}), rebuilds_velocity=True,
+        ),
+        thermostat(
             "langevin-middle-synchronised", "baoab",
             "LangevinMiddleIntegrator, half a kick added to what is read", _DRAWS, _ON_A_LINE,
             rebuilds_velocity=True,

@@ -41,8 +41,13 @@ CUSTOM_EXCESS = 2.0**-32
 1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
 its forces are too large by 2.3e-10."""
 
-LENGTHS = {"verlet-rods": 1e-13, "verlet-rods-8": 1e-8, "verlet-rods-as-it-is": 1e-5}
-"""Relative tolerance of constraints by method; the last is the library's own."""
+LENGTHS = {
+    "verlet-rods": 1e-13,
+    "verlet-rods-8": 1e-8,
+    "verlet-rods-as-it-is": 1e-5,
+    "langevin-middle-rods": 1e-13,
+}
+"""Relative tolerance of constraints by method; that of `verlet-rods-as-it-is` is the library's own."""
 
 SHAKE = 2.0**-24
 """GPU-type platforms keep SHAKE's squared lengths and inverse masses in single precision in every mode

@@ -57,7 +57,10 @@ DRIVEN_ENERGY = {
 }
 """The same of what depends on the time, with the numbers in it that every platform keeps as double."""
 
-SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised", *LENGTHS})
+SHIFTED = frozenset(
+    {"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"}
+    | {name for name in LENGTHS if name.startswith("verlet")}
+)
 """Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
 
 
@@ -292,7 +295,10 @@ class _Context:
         origins = bonds.rests(scene, label) if method.generator else bonds.origins(scene, method.scheme)
         system, positions = _system(scene, origins)
         if method.generator:
+            bonds.in_all_of_space(scene, label)
             self._integrator = thermostat(scene, method.name, step, seed, system)
+            if scene.system.rods:
+                self._integrator.setConstraintTolerance(LENGTHS[method.name])
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
@@ -305,7 +311,8 @@ class _Context:
         self._force: Callable[..., Any] = lambda t, q, p: pull(q, p)
         if self._driven:
             self._force, _ = timed(scene.derived(terms=tuple(x for x in scene.terms if x.kind != "friction")))
-        self._rods = scene.system.rods
+        # a thermostat's momenta are read as they are stored
+        self._rods = None if method.generator else scene.system.rods
         self._on_a_line = not method.generator
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
         self._m = np.copysign(scene.m, step)

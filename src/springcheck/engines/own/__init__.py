@@ -99,7 +99,7 @@ ENGINE = Engine(
                 one.name,
                 one.title,
                 "NumPy, PCG64" if one.draws else NO_NUMBERS,
-                EVERY_POTENTIAL,
+                EVERY_POTENTIAL | (RODS if one.held else frozenset()),
                 scripted=one.draws > 0,
                 kinds=frozenset({"particles", "circuit", "rotor"}),
                 default=one.name in BY_DEFAULT,

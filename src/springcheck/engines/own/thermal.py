@@ -19,19 +19,10 @@ class Random:
     """A scene carried through the steps of a random scheme.  `seed` is a number, or a generator."""
 
     def __init__(self, scene: Scene, scheme: str, step: float, seed: Any) -> None:
-        assert scene.bath is not None
         self.force_calls = 0
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._scheme = THERMOSTATS[scheme]
-        self._step = Stepper(
-            self._scheme,
-            h=step,
-            m=scene.m,
-            rate=scene.bath.friction,
-            thermal=scene.thermal,
-            width=np.float64,
-            freedoms=self._scheme.freedoms(scene.n, scene.particles),
-        )
+        self._step = Stepper.of(self._scheme, scene.derived(step=step), width=np.float64)
         self._force = forces(self._scheme, scene.system)
         self._each = sum(act.kind in ("kick", "slow", "fast", "creep") for act in self._scheme.acts)
         scripted = hasattr(seed, "standard_normal")

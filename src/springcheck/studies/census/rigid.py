@@ -61,8 +61,9 @@ def split(scene: Scene) -> Scene:
 
 
 def is_rigid(label: Label) -> bool:
-    """Whether a method is for scenes with rods alone."""
-    return Need.RODS in engines.method(label).requires
+    """Whether a method is for scenes with rods alone, and moves a spring in two parts on a line: no noise."""
+    method = engines.method(label)
+    return Need.RODS in method.requires and not method.generator
 
 
 def is_hinge(label: Label) -> bool:

@@ -12,6 +12,7 @@ from springcheck import checks, schemes
 from springcheck.checks.seeds import SEEDED, Seeded
 from springcheck.physics.arrays import Floats, Force
 from springcheck.physics.bath import Bath
+from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
@@ -19,7 +20,7 @@ from springcheck.studies.faults import clean
 from springcheck.studies.faults.clean import walls
 from springcheck.studies.faults.seeded import Fault, Make
 from springcheck.studies.faults.steppers import trajectory
-from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
+from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.catalogue import HALF, ONE, Act
 from springcheck.thermal.stepper import forces
 
@@ -63,21 +64,23 @@ def broken(
     *,
     runs: str | Sequence[Act] = "",
     seed: Callable[[Any], Any] = lambda seed: seed,
+    hold: Callable[[Scene, float], Rods | None] = lambda scene, x: scene.system.rods,
     **numbers: Callable[[Scene, float], Any],
 ) -> Make:
-    """A thermostat with other draws, under another scheme (by name, or by its stages), from another seed, or
-    with other numbers: (scene, size) -> the factor of h, m, rate, thermal, k or collision."""
+    """A thermostat with other draws, under another scheme (by name, or by its stages), from another seed,
+    with other rods, or with other numbers: (scene, size) -> the factor of h, m, rate, thermal, k or
+    collision."""
 
     def make(scene: Scene, scheme: schemes.Scheme, size: float, start: Any = 1) -> Trajectory:
         assert scene.bath is not None
         claims = THERMOSTATS[scheme.name]
         of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else None
-        of = of or Thermostat(name="broken", title="", acts=tuple(runs))  # type: ignore[arg-type]
+        of = of or replace(claims, acts=tuple(runs), held=tuple(runs))  # type: ignore[arg-type]
         f = {name: factor(scene, size) for name, factor in numbers.items()}
         stepper = Stepper(
             replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
             rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
-            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles),
+            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles), hold=hold(scene, size),
         )  # fmt: skip
         # a script of draws stands for every generator
         source = start if hasattr(start, "standard_normal") else seed(start)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from springcheck.physics.rods import Rods
 from springcheck.studies.faults import baths
+from springcheck.studies.faults.rigid import Late
 from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import PROJECT, Act
 
 _DIRECTION, _MATRIX, _MAP = ("noise-direction",), ("noise-matrix",), ("noise-map",)
 _VARIANCE, _SHAPE, _SCALE = ("draws-variance",), ("draws-shape",), ("draws-variance", "noise-size")
@@ -112,4 +117,35 @@ THERMAL_STEPS = (
     _bath("bath-stiffness", "every force in a bath is too large", _DIRECTION,
           baths.broken(k=lambda s, x: 1 + x), size=1e-9),
     _bath("bath-masses", "all masses of the step are 1", _DIRECTION, baths.broken(m=lambda s, x: 1 / s.m)),
+)  # fmt: skip
+
+_BAOAB, _BAOA, _LAMMPS, _VEC = (
+    THERMOSTATS[name].held for name in ("baoab", "baoa", "lammps-langevin", "vanden-eijnden-ciccotti")
+)
+
+
+def _rod(name: str, about: str, by: tuple[str, ...], scheme: str = "baoab", **wrong: Any) -> Fault:
+    size = wrong.pop("size", None)
+    return _bath(
+        f"hot-rod-{name}", about, by, baths.broken(**wrong), scheme=scheme, size=size, scene="hot rod"
+    )
+
+
+RODS_IN_BATHS = (
+    _rod("not-projected", "momenta along a rod in a bath are left as its last drift leaves them",
+         ("rod-velocity",), runs=tuple(act for act in _BAOAB if act != PROJECT)),
+    _rod("held-once", "lengths are brought back after both halves of the drift, not after each", _DIRECTION,
+         runs=(*_BAOAB[:3], _BAOAB[5], _BAOAB[2], Act("shake"), *_BAOAB[-3:])),
+    _rod("after-drift", "a rod in a bath pushes along where it lies after the drift", _DIRECTION,
+         hold=lambda s, x: Late(s.m, s.places, s.terms)),
+    _rod("masses-alike", "a rod in a bath takes the masses of its ends for equal", _DIRECTION,
+         hold=lambda s, x: Rods(np.full(s.n, np.mean(s.m)), s.places, s.terms)),
+    _rod("length", "a rod in a bath is too long", ("rod-length",), size=1e-10, hold=lambda s, x: Rods(
+         s.m, s.places, [replace(one, length=one.length * (1 + x)) for one in s.terms])),
+    _rod("draws-projected", "draws along a rod are taken off", (*_VARIANCE, *_SHAPE), "baoa",
+         runs=(*_BAOA[:4], PROJECT, *_BAOA[4:])),
+    _rod("friction-on-site", "friction of the velocity on site, not of the half step before", _DIRECTION,
+         "lammps-langevin", runs=(_LAMMPS[6], *_LAMMPS[1:3], *_LAMMPS[4:])),
+    _rod("jump-not-held", "noise of positions is added after lengths are brought back", ("rod-length",),
+         "vanden-eijnden-ciccotti", runs=(*_VEC[:5], _VEC[6], _VEC[5], *_VEC[7:])),
 )  # fmt: skip

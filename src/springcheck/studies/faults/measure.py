@@ -30,7 +30,10 @@ from springcheck.studies.keeper import How, Keeper, Piece
 from springcheck.studies.tables import Documents
 from springcheck.thermal import THERMOSTATS
 
-SHIPPED = {"dumbbell": ("dumbbell", 200), "triangle": ("rigid-triangle", 40), "field": ("foucault", 200)}
+SHIPPED = {
+    "dumbbell": ("dumbbell", 200), "triangle": ("rigid-triangle", 40), "field": ("foucault", 200),
+    "hot rod": ("bath-dumbbell", 400),
+}  # fmt: skip
 """Scenes of the faults that are shipped ones, of so many steps."""
 
 
@@ -107,7 +110,7 @@ def probe(fault: Fault) -> Passed:
     @cache
     def subject(size: float | None) -> Any:
         if fault.random:
-            return baths.subject(fault, size)
+            return baths.subject(fault, size, where if where.system.rods else None)
         return checks.Bench(scene=where, label=fault.name, run=partial(fault.run, size=size))
 
     @cache

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -159,6 +159,13 @@ class OneByOne(Rods):
     def __init__(self, m: Floats, places: Integers | None, terms: Sequence[Term]) -> None:
         super().__init__(m, places, terms)
         self.share = False
+
+
+class Late(Rods):
+    """Ends are pushed along the way after the drift."""
+
+    def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
+        return super().drifted(q, q, p, x)
 
 
 class Once(Rods):

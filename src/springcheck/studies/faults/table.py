@@ -13,7 +13,7 @@ import numpy as np
 from springcheck.physics.rods import Rods
 from springcheck.studies.faults import fields, rigid, seeded, space
 from springcheck.studies.faults.fields import FIELDS
-from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
+from springcheck.studies.faults.heat import OF_NOISE, RODS_IN_BATHS, THERMAL_STEPS
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.seeded import Fault, Make
 
@@ -316,5 +316,5 @@ ADAPTIVE = (
 
 FAULTS: tuple[Fault, ...] = (
     *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *FIELDS, *ADAPTIVE,
-    *OF_NOISE, *THERMAL_STEPS,
+    *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
 )  # fmt: skip

@@ -166,7 +166,8 @@ def run(
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
-        rest = () if methods else others(scene, labels)
+        known = {one.method for one in left}
+        rest = () if methods else tuple(x for x in others(scene, labels) if x not in known)
         report = replace(report, faults={one.label: one.about for one in wrong}, others=rest)
         if thorough and scene.bath:
             for label in labels:

@@ -36,6 +36,8 @@ class Heat:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._law: Law | None = None
+        rods = scene.system.rods
+        self._freedoms = rods.freedoms(scene.q) if rods else scene.n
         self._sums = np.zeros((2, scene.n))
         self._frames = 0
         self._from = 0
@@ -55,7 +57,7 @@ class Heat:
             return
         q, p = (x[some].astype(np.longdouble) for x in (piece.q, piece.p))
         with np.errstate(all="ignore"):
-            if scene.system.has_modes:
+            if scene.system.has_modes and not scene.system.rods:
                 y, v = scene.system.modes.about_centres(q, p)
                 of_q, of_p = scene.system.modes.w2 * y * y, v * v
             else:
@@ -67,6 +69,9 @@ class Heat:
     def _begin(self, piece: Trajectory) -> None:
         scene, self._scheme, self._every = self._scene, piece.scheme, piece.every
         assert scene.bath is not None
+        if scene.system.rods:
+            self._from = round(SETTLED / (scene.bath.friction * piece.step))
+            return
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
             if not THERMOSTATS[piece.scheme].splits:
@@ -86,7 +91,8 @@ class Heat:
         """What was found."""
         nan = np.full(self._scene.n, np.nan)
         thermal = self._scene.thermal
-        held = any(term.kind == "potential" for term in self._scene.terms)
+        # what pushes along a rod is no part of a virial
+        held = any(term.kind == "potential" for term in self._scene.terms) and not self._scene.system.rods
         with np.errstate(all="ignore"):
             q, p = self._sums / (self._frames * thermal) if self._frames else (nan, nan)
             if self._law is None:
@@ -97,11 +103,27 @@ class Heat:
                 errors = several.T * np.stack(law)
         n = len(nan)
         error = np.sqrt(np.sum(errors**2, axis=1)) / n
+        if self._scene.system.rods:
+            law, error[1] = (nan, np.full(n, self._law_of_rods)), self._error_of_rods()
         return Heated(
             method=method, scheme=self._scheme, configurational=float(np.mean(q)) if held else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),
-            kinetic=float(np.mean(p)), kinetic_error=float(error[1]), kinetic_law=float(np.mean(law[1])),
+            kinetic=float(np.sum(p)) / self._freedoms, kinetic_error=float(error[1]),
+            kinetic_law=float(np.mean(law[1])),
         )  # fmt: skip
+
+    @property
+    def _law_of_rods(self) -> float:
+        """1 where rods move freely, each by itself, and all that acts on momenta acts across them."""
+        rods = self._scene.system.rods
+        free = rods and not rods.share and all(term.kind == "constraint" for term in self._scene.terms)
+        return 1.0 if free and THERMOSTATS[self._scheme].kinetic_of_rods else np.nan
+
+    def _error_of_rods(self) -> float:
+        """Standard error of squares of momenta that forget by exp(-friction h) a step."""
+        assert self._scene.bath is not None
+        square = np.exp(-2 * self._scene.bath.friction * self._scene.step * self._every)
+        return float(np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * self._freedoms)))
 
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps

@@ -188,9 +188,12 @@ def _temperatures(report: Report) -> Lines:
         for one in report.temperatures
     ]  # fmt: skip
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
+    scene, of = report.scene, ""
+    if scene.system.rods:
+        of = f", in {count(scene.system.rods.freedoms(scene.q), 'degree')} of freedom"
     return [
         plain(),
-        plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
+        plain(f"Temperatures over that of the bath{of}, exact for each scheme, and as measured:"),
         table(titles, rows, left=("method",)),
     ]
 

@@ -1,0 +1,126 @@
+"""The draws behind states of a scene with rods.
+
+Lengths that stay leave fewer numbers in a state than draws act on it, and every one of those acts on several:
+the draws of a step are found for all together, by Gauss and Newton's method, in roundings of the state.  What
+they do not explain is left over.
+
+Of draws x the positions q' know combinations V x, V orthonormal and given by the start of the step alone, and
+momenta p', which are affine in x once q' is given, further ones orthogonal to them: all are as independent,
+and of variance 1, as the draws themselves, whatever the turn of the step has mixed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
+from springcheck.physics.scene import Scene
+from springcheck.thermal.catalogue import Thermostat
+from springcheck.thermal.draws import Reading, one_rounding, roundings_of
+from springcheck.thermal.stepper import Met, Stepper, forces
+
+SMALL_DRAW = 1e-4
+"""By which a draw is changed to see what it does: a step bends by less than that part of it."""
+
+UNSEEN_DRAW = 1e-6
+"""Singular value over the largest below which a combination of draws does nothing: roundings over such a
+change, also where the reference is no wider than double, make 1e-8."""
+
+MOST_GAUSS_NEWTON = 8
+"""Of which each leaves about `SMALL_DRAW` of what was off."""
+
+
+def read(
+    scheme: Thermostat, scene: Scene, q: Floats, p: Floats, *, how: Arithmetic | None = None,
+    rebuilt: bool = False,
+) -> Reading:  # fmt: skip
+    """As `draws.read`, for a scene with rods: draws (f-1, r) are combinations of those of all coordinates."""
+    return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
+
+
+class _Reader:
+    def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
+        self._scheme, self._scene, self._how, self._rebuilt = scheme, scene, how, rebuilt
+        self._stepper, self._sizer = Stepper.of(scheme, scene), Stepper.of(scheme, scene, absolute=True)
+        self._force = forces(scheme, scene.system)
+
+    def _at(self, x: Extended, met: list[Met] | None = None) -> Extended:
+        """Where draws x (f, u n) lead to, (f, 2 n)."""
+        split = np.split(x, self._scheme.draws, axis=-1)
+        end = None if met is not None else self._end
+        return np.concatenate(self._stepper(*self._start, self._force, split, None, end, met), axis=-1)
+
+    def _allowed(self, x: Extended) -> Extended:
+        """One rounding of everything that the steps of these draws add up (f, 2 n)."""
+        met: list[Met] = []
+        self._at(x, met)
+        sizes = np.split(np.abs(x), self._scheme.draws, axis=-1)
+        of = one_rounding(
+            self._scene, self._sizer, self._start, sizes, None, self._how, self._rebuilt, met
+        )  # fmt: skip
+        return np.concatenate(of, axis=-1)
+
+    def read(self, q: Floats, p: Floats) -> Reading:
+        wide = q.astype(np.longdouble), p.astype(np.longdouble)
+        n, u = self._scene.n, self._scheme.draws
+        self._start, self._end = (wide[0][:-1], wide[1][:-1]), wide[0][1:]
+        target = np.concatenate([x[1:] for x in wide], axis=-1)
+        x = np.zeros((len(target), u * n), np.longdouble)
+        of = self._allowed(x)
+        for iteration in range(MOST_GAUSS_NEWTON):
+            now = self._at(x)
+            slopes = [(self._at(x + SMALL_DRAW * unit) - now) / SMALL_DRAW for unit in np.eye(u * n)]
+            J = _finite(np.stack(slopes, axis=-1) / of[..., None])
+            inverse = np.linalg.pinv(J, rcond=UNSEEN_DRAW)
+            change = (inverse @ _finite((target - now) / of)[..., None])[..., 0]
+            x = x + change
+            if iteration == 1:
+                of = self._allowed(x)
+            elif iteration and np.all(np.abs(change) <= 1e-15 * (1 + np.abs(x))):
+                break
+        of = self._allowed(x)
+        left = np.asarray(((target - self._at(x)) / of) ** 2, np.float64)
+        # of all draws those that were found leave the least, in the mean over the numbers of a state
+        across = np.sqrt(np.mean(left, axis=-1, keepdims=True))
+        position = J[:, :n]
+        first = np.linalg.pinv(position, rcond=UNSEEN_DRAW) @ position
+        second = inverse @ J - first
+        V = _carried(first), _carried(second)
+        roundings = roundings_of(self._scheme, self._scene)
+        c = self._scheme.carried
+        if c:
+            # what both steps beside a state say of the draw that acts in them, across the rods there
+            root, rods = np.sqrt(self._scene.m), self._scene.system.rods
+            assert rods is not None
+            one, other = (rods.projected(wide[0][1:-1], root * y) / root for y in (x[1:, :n], x[:-1, n:]))
+            unit = np.sum(np.abs(inverse), axis=-1)
+            sizes = (np.sqrt(np.sum(y**2, axis=-1)) for y in (one - other, unit[1:, :n], unit[:-1, n:]))
+            off, *units = sizes
+            across = np.maximum(across[1:], (off / sum(units))[:, None])
+        basis = V[1] if c else np.concatenate(V, axis=-1)
+        turned = np.swapaxes(basis, -1, -2)
+        error = roundings * np.sum(np.abs(turned @ inverse), axis=-1)
+        return Reading(
+            draws=(turned @ np.asarray(x, np.float64)[..., None])[..., 0], error=error,
+            across=np.asarray(across, np.float64) if u == 1 or c else None, roundings=roundings,
+            allowed=(of[:, :n], of[:, n:]),
+        )  # fmt: skip
+
+
+def _finite(values: Reals) -> Floats:
+    """In double precision; what is no number is 0, and shows in what is left over."""
+    return np.nan_to_num(np.asarray(values, np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _carried(projectors: Any) -> Floats:
+    """An orthonormal basis (f, k, r) of what each of these (f, k, k) projects on, each turned as little as
+    can be from the one before: it depends on nothing but them and those before."""
+    size, vectors = np.linalg.eigh(projectors[0])
+    basis = vectors[:, size > 0.5]
+    out = np.empty((len(projectors), *basis.shape))
+    for row, projector in zip(out, projectors, strict=True):
+        left, _, right = np.linalg.svd(projector @ basis, full_matrices=False)
+        basis = row[...] = left @ right
+    return out

@@ -1,0 +1,163 @@
+"""Rods in a heat bath, by every engine that has both: each step is the scheme's own and some draws.
+
+The law: lengths stay, momenta lie across the rods where a scheme projects them last, and what the draws of a
+step do not explain is rounding.  Draws are found for all coordinates together, and combinations of them, as
+many as a state knows, are independent normal numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from springcheck import checks, driver, engines
+from springcheck.cli import main
+from springcheck.errors import MethodError
+from springcheck.physics.arrays import Floats
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.scenefile import load_scene
+from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.run.tally import heated_of
+from springcheck.thermal import THERMOSTATS, Stepper
+from springcheck.thermal.rigid import read
+from springcheck.thermal.stepper import forces
+
+LABELS = (
+    "own:baoab", "own:baoa", "own:aboba", "own:obabo", "own:oabao", "own:lammps-langevin",
+    "openmm:langevin-middle-rods", "ase:langevin-rods", "lammps:rattle-langevin",
+)  # fmt: skip
+TOLD = {"own:baoab", "own:baoa", "own:aboba", "own:lammps-langevin", LABELS[6], LABELS[8]}
+"""Methods of which a state over-determines the draws."""
+
+
+def scenes(name: str) -> Scene:
+    """Unlike masses, nothing 1; a triangle that tumbles, and a pendulum in space beside it."""
+    if name == "dumbbell":
+        return replace(load_scene("bath-dumbbell"), steps=300)
+    bath = Bath(temperature=0.3, friction=1.9)
+    return replace(load_scene("rigid-triangle"), steps=80, step=0.03, bath=bath, quantities=("q", "p"))
+
+
+@pytest.mark.parametrize("name", ["dumbbell", "triangle"])
+@pytest.mark.parametrize("label", LABELS)
+def test_right_engines_pass(label: str, name: str, need: Callable[[str], None]) -> None:
+    need(label)
+    scene = scenes(name)
+    verdicts = checks.judge(scene, driver.run(scene, label, seed=11))
+    assert [v for v in verdicts if v.passed is False] == []
+    judged = {v.check for v in verdicts if v.passed}
+    assert {"rod-length", "draws-mean", "draws-variance"} <= judged
+    assert ("noise-direction" in judged) == (label in TOLD)
+    assert ("rod-velocity" in judged) == (
+        THERMOSTATS[engines.method(engines.parse(label)).scheme].synchronised
+    )
+
+
+def spoiled(run: Trajectory, scene: Scene, how: str) -> Trajectory:
+    """A run with one frame, or every frame, that is a little wrong."""
+    q, p, rods = run.q.copy(), run.p.copy(), scene.system.rods
+    assert rods is not None
+    r = rods.ways(q)
+    if how == "velocity along a rod":
+        p[50] += 1e-9 * np.asarray(rods.spread(r[50]))
+    elif how == "length":
+        q[50] += 1e-10 * np.asarray(rods.spread(r[50])) / scene.m
+    elif how == "swapped":
+        q[:, :6], p[:, :6] = np.roll(q[:, :6], 3, axis=1), np.roll(p[:, :6], 3, axis=1)
+    else:
+        # not along any rod
+        p[50, 0] += 1e-8
+        p[50] = rods.projected(q[50], p[50])
+    return replace(run, q=q, p=p)
+
+
+@pytest.mark.parametrize(
+    ("how", "seen"),
+    [("velocity along a rod", "rod-velocity"), ("length", "rod-length"), ("swapped", "start"),
+     ("momentum", "noise-direction")],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["dumbbell", "triangle"])
+def test_a_small_fault_of_a_frame_is_seen(name: str, how: str, seen: str) -> None:
+    scene = scenes(name)
+    run = driver.run(scene, "own:baoab", seed=3)
+    failed = {v.check for v in checks.judge(scene, spoiled(run, scene, how)) if v.passed is False}
+    assert seen in failed
+    assert "noise-direction" in failed
+
+
+def test_the_draws_that_are_found_are_those_of_the_generator() -> None:
+    """Of LF-middle's step a state knows all of them, along the rod too."""
+    scene = scenes("dumbbell")
+    run = driver.run(scene, "own:baoa", seed=5)
+    found = read(THERMOSTATS["baoa"], scene, run.q, run.p)
+    drawn = np.random.Generator(np.random.PCG64(5)).standard_normal((scene.steps, scene.n))
+    assert found.draws.shape == drawn.shape
+    # what they are turned by is a rotation
+    assert np.sum(found.draws**2, axis=1) == pytest.approx(np.sum(drawn**2, axis=1), rel=1e-8)
+    run = driver.run(scene, "own:baoab", seed=5)
+    tangential = read(THERMOSTATS["baoab"], scene, run.q, run.p)
+    assert tangential.draws.shape == (scene.steps, 5)
+
+
+def temperature(name: str, n: int = 20000, steps: int = 40) -> tuple[float, float]:
+    """Of free dumbbells side by side by one scheme over that of the bath, and its standard error: the turn of
+    a step is 0.15 at the thermal speed, where terms of second order would make 2e-2."""
+    scene = load_scene("bath-dumbbell")
+    rods = scene.system.rods
+    assert rods is not None
+    assert scene.bath is not None
+    h = 0.15 * float(rods.length[0]) / float(np.sqrt(scene.thermal * rods.inverse_mass[0]))
+    scene = replace(scene, step=h, bath=replace(scene.bath, friction=0.5 / h))
+    scheme, rng = THERMOSTATS[name], np.random.default_rng(8)
+    step = Stepper.of(scheme, scene, width=np.float64)
+    q: Floats = np.tile(scene.q, (n, 1))
+    p = rods.projected(q, np.sqrt(scene.m * scene.thermal) * rng.standard_normal(q.shape))
+    force, carried = forces(scheme, scene.system), [rng.standard_normal(q.shape)] * scheme.carried
+    for _ in range(steps):
+        draws = [*carried, *rng.standard_normal((scheme.fresh, *q.shape))]
+        q, p = (np.asarray(x) for x in step(q, p, force, draws))
+        carried = draws[len(draws) - scheme.carried :]
+    each = np.sum(p * p / scene.m, axis=1) / scene.thermal / rods.freedoms(scene.q)
+    return float(np.mean(each)), float(np.std(each) / np.sqrt(len(each)))
+
+
+@pytest.mark.parametrize("name", ["baoab", "obabo", "aoboa", "lammps-langevin"])
+def test_free_rods_have_the_temperature_of_the_bath_where_a_law_says_so(name: str) -> None:
+    assert THERMOSTATS[name].kinetic_of_rods
+    found, error = temperature(name)
+    assert abs(found - 1) < 5 * error < 0.025
+
+
+def test_what_openmm_stores_is_hotter_and_what_ase_runs_is_colder() -> None:
+    """The latter by too little to be seen here: see `validation/rod_bath_ase.py`."""
+    found, error = temperature("baoa")
+    assert found - 1 > 4 * error
+    assert not any(THERMOSTATS[name].kinetic_of_rods for name in ("baoa", "vanden-eijnden-ciccotti"))
+
+
+def test_the_table_counts_degrees_of_freedom() -> None:
+    scene = replace(load_scene("bath-dumbbell"), steps=8000)
+    line = heated_of(scene, [driver.run(scene, "own:baoab", seed=2)])
+    assert line.kinetic_law == 1.0
+    assert abs(line.kinetic - 1) < 5 * line.kinetic_error
+    # six of them would make it too cold by more than that error tells over a longer run
+    assert line.kinetic_error == pytest.approx(np.sqrt(2 / (7875 * np.tanh(0.04) * 5)), rel=0.01)
+
+
+def test_noise_in_space_moves_no_rod_of_a_plane(
+    tmp_path: object, capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+) -> None:
+    need("openmm:verlet")
+    plane = replace(load_scene("dumbbell"), bath=Bath(temperature=0.05, friction=0.8))
+    with pytest.raises(MethodError, match="its noise acts along x, y and z"):
+        driver.run(plane, "openmm:langevin-middle-rods", seed=1)
+    command = ["run", "dumbbell", "--temperature", "0.05", "--friction", "0.8", "--seed", "1"]
+    assert main([*command, "--steps", "60", "-o", f"{tmp_path}/a.h5"]) == 0
+    said = capsys.readouterr().out
+    assert "in 3 degrees of freedom" in said
+    assert "langevin-middle-rods: its noise acts along x, y and z, and turns a rod" in said
+    assert "not among the default methods" not in said or "langevin-middle-rods: not" not in said
