@@ -1,7 +1,7 @@
 """Parts of a computation in processes of their own, which end with the program, however that ends.
 
 Those of a `ProcessPoolExecutor` stay for ever where the program is killed, and what they are at runs on where
-it leaves early.
+it leaves early; on Python 3.11.2 it hangs where they die before they have read a part of 10 MB.
 """
 
 from __future__ import annotations

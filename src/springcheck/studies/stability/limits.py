@@ -53,7 +53,6 @@ class Limit:
     growth_below_predicted: float
     edge: float
     """Exponent of the growth in the number of steps at the limit itself; NaN where there is none."""
-    edge_predicted: float
     h_w: Floats
     """h w of the points drawn (j,)."""
     radius: Floats
@@ -79,7 +78,7 @@ def measure(label: Label) -> Limit:
     turn = _points(theory)
     springs = Springs(label=label, turn=turn)
     rounding = propagators.noise(label)
-    above = below = edge = np.nan, np.nan
+    above, below, edge = (np.nan, np.nan), (np.nan, np.nan), np.nan
     if theory == 0:
         above = _growth(label, ROUGH)
     elif np.isinf(theory):
@@ -98,8 +97,7 @@ def measure(label: Label) -> Limit:
         growth_predicted=above[1],
         growth_below=below[0],
         growth_below_predicted=below[1],
-        edge=edge[0],
-        edge_predicted=edge[1],
+        edge=edge,
         h_w=turn,
         radius=propagators.radius(propagators.measured(springs), rounding)[0],
         radius_predicted=propagators.radius(propagators.theory(springs), rounding)[0],
@@ -136,14 +134,14 @@ def _points(theory: float) -> Floats:
     return np.unique(np.concatenate([wide, near]))
 
 
-def _run(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats, Springs]:
+def _run(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats]:
     """A run of one spring, and its amplitude sqrt(x**2 + y**2) in scaled coordinates (f,)."""
     springs = Springs(label=label, turn=np.array([turn]))
     of_q, of_p = propagators.units(springs)
     # a thousandth of the scan's force leaves room to grow
     start = propagators.scene(springs, of_q * 1e-3, of_p * 0.7e-3, steps=steps)
     run = driver.run(start, label)
-    return run, np.hypot(run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0]), springs
+    return run, np.hypot(run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0])
 
 
 def _growth(label: Label, turn: float) -> tuple[float, float]:
@@ -160,7 +158,7 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     steps = 400
     if predicted != 0:
         steps = int(np.clip(16 / abs(predicted), 40, 400))
-    run, size, _ = _run(label, turn, steps)
+    run, size = _run(label, turn, steps)
     usable = np.flatnonzero(np.isfinite(size) & (size > 0))
     first = usable[-1] * 3 // 4
     n = np.arange(first, usable[-1] + 1)
@@ -176,16 +174,11 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     return line(n.astype(np.float64), logs).slope, predicted
 
 
-def _edge(label: Label, theory: float) -> tuple[float, float]:
+def _edge(label: Label, theory: float) -> float:
     """Exponent of growth with the number of steps at the limit: 1 where the two eigenvectors are one."""
     steps = 1000
-    _, size, springs = _run(label, theory, steps)
+    _, size = _run(label, theory, steps)
     n = np.arange(steps // 10, steps + 1)
-    matrix = propagators.theory(springs)[0]
-    half = (matrix[0, 0] + matrix[1, 1]) / 2
-    discriminant = half * half - (matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
-    rest = abs(matrix[0, 0] - half) + abs(matrix[0, 1]) + abs(matrix[1, 0])
-    defective = abs(discriminant) <= 1e-12 and rest > 1e-6
     if len(size) <= steps or np.any(size[n] <= 0):
-        return float("nan"), float(defective)
-    return line(np.log(n), np.log(size[n])).slope, float(defective)
+        return float("nan")
+    return line(np.log(n), np.log(size[n])).slope
