@@ -55,40 +55,15 @@ Check: TypeAlias = check.Check[Case]
 Experiment: TypeAlias = check.Check[Bench]
 
 CHECKS: tuple[Check, ...] = (
-    start,
-    times,
-    grid,
-    line,
-    step_defect,
-    arithmetic,
-    closed_form,
-    shadow_energy,
-    frequency,
-    momentum,
-    angular_momentum,
-    rod_length,
-    rod_velocity,
-    turn,
-    gyration,
-    energies,
-    tolerance,
-)
+    start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
+    angular_momentum, rod_length, rod_velocity, turn, gyration, energies, tolerance,
+)  # fmt: skip
 
 THOROUGH: tuple[Experiment, ...] = (
-    experiments.propagator,
-    experiments.determinant,
-    experiments.symplecticity,
-    experiments.reversibility,
-    experiments.mirror,
-    experiments.orientation,
-    experiments.repeatability,
-    experiments.company,
-    laws.order,
-    laws.order_anharmonic,
-    laws.rounding_bias,
-    laws.rounding_growth,
-    laws.convergence,
-)
+    experiments.propagator, experiments.determinant, experiments.symplecticity, experiments.reversibility,
+    experiments.mirror, experiments.orientation, experiments.repeatability, experiments.company, laws.order,
+    laws.order_anharmonic, laws.rounding_bias, laws.rounding_growth, laws.convergence,
+)  # fmt: skip
 
 ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
 

@@ -58,8 +58,8 @@ def _no_step(case: Case) -> str | None:
     return None if started else "its first frame is not the start"
 
 
-def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
-    """The scheme's matrix, the engine's departure from it, what rounding allows, and the scale (2n,).
+def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats]:
+    """The scheme's matrix, the engine's departure from it, and what rounding allows.
 
     On (q, p) in units in which a canonical pair has the action 1, (2n, 2n) each.
     """
@@ -81,7 +81,7 @@ def _matrices(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     departure = columns(case.trajectory.q[1] - q[0], case.trajectory.p[1] - p[0], -1)
     roundings = [case.roundings * x[0] for x in case.allowance]
     allowed = np.abs(columns(roundings[0], roundings[1], 1))
-    return scaled(ideal), scaled(departure), scaled(allowed), scale
+    return scaled(ideal), scaled(departure), scaled(allowed)
 
 
 @check("det", family="map", requires=MATRIX)
@@ -89,7 +89,7 @@ def determinant(bench: Bench) -> Finding | str:
     """The one-step matrix changes area by the scheme's factor, to rounding."""
     if why_no_step := _no_step(bench.copies[0]):
         return Finding(np.inf, 0.0, "relative", why_no_step)
-    ideal, departure, allowed, _ = _matrices(bench)
+    ideal, departure, allowed = _matrices(bench)
     try:
         inverse = np.linalg.inv(ideal)
     except np.linalg.LinAlgError:
@@ -117,7 +117,7 @@ def symplecticity(bench: Bench) -> Finding | str:
     """The one-step matrix keeps the symplectic form: M^T J M = J, to rounding."""
     if why_no_step := _no_step(bench.copies[0]):
         return Finding(np.inf, 0.0, "of an action", why_no_step)
-    ideal, departure, allowed, _ = _matrices(bench)
+    ideal, departure, allowed = _matrices(bench)
     n = bench.scene.n
     form = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
     one = ideal.T @ form @ departure

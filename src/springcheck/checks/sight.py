@@ -74,17 +74,20 @@ def limits(
     """
     found: dict[str, float | None] = {}
     hidden = 0
+
+    def effects(wrong: Sequence[States]) -> list[float]:
+        return [_largest(part((q - right[0], p - right[1]))) for q, p in wrong]
+
     with np.errstate(all="ignore"):
         unknown = _largest(part((np.abs(right[0]) * ROUNDING, np.abs(right[1]) * ROUNDING)))
         for name in NAMES:
-            sizes = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in motions(name)]
+            sizes = effects(motions(name))
             least = [change / size for size in sizes if size > 8 * unknown]
             if coarse is not None and len(least) < len(sizes):
-                again = [_largest(part((wrong[0] - right[0], wrong[1] - right[1]))) for wrong in coarse(name)]
                 # a whole bound is far above what a reference rounds, even where it is no wider than an engine
                 least += [
                     COARSER * change / more
-                    for size, more in zip(sizes, again, strict=True)
+                    for size, more in zip(sizes, effects(coarse(name)), strict=True)
                     if size <= 8 * unknown and more > min(8 * unknown, 1)
                 ]
             found[name] = max((x for x in least if x < LARGEST), default=None)
@@ -242,31 +245,23 @@ def _ends(case: Case, at: Integers) -> States:
 def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.floating]) -> Limits:
     """The limits of a check of normal modes: `part(rows, right, change)` says how many bounds a change of
     the closed-form motion about the centres is, in mode coordinates (r, n)."""
-    at, change, right, motions = case.once(_mode_motions if case.undriven is case else _driven_motions)
-
-    def known(name: str) -> list[States]:
-        return motions.get(name, [])
-
-    return limits(right, known, change, lambda off: part(at, right, off))[0]
-
-
-def _driven_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[States]]]:
-    """As `_mode_motions`, of driving forces alone: of a few, each by itself."""
-    at = rows(case, len(case.steps))
-    steps = case.steps[at]
-    change = change_of(int(steps[-1]))
-    motions = {
-        name: [changed(case, name, change, one).closed_at(steps) for one in every_row(case, name)[:MOST_ROWS]]
-        for name in OF_A_DRIVE
-    }
-    return at, change, case.closed_at(steps), motions
+    at, change, right, motions = case.once(_mode_motions)
+    return limits(right, lambda name: motions.get(name, []), change, lambda off: part(at, right, off))[0]
 
 
 def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[States]]]:
-    """Rows, relative change, the modes' motion there, and that with each parameter changed."""
+    """Rows, relative change, the modes' motion there, and that with each parameter changed: of a driven scene
+    those of driving forces alone, of a few, each by itself."""
     at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
+    if case.undriven is not case:
+        drives = {name: every_row(case, name)[:MOST_ROWS] for name in OF_A_DRIVE}
+        motions = {
+            name: [changed(case, name, change, one).closed_at(steps) for one in some]
+            for name, some in drives.items()
+        }
+        return at, change, case.closed_at(steps), motions
 
     def states(matrices: Extended) -> States:
         return schemes.propagate(matrices, *case.mode_start, steps, area_preserving=case.area_preserving)
@@ -287,7 +282,7 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[S
 
 def changed_matrices(case: Case, name: str, change: float) -> Extended | None:
     """One-step matrices of the modes with one parameter larger by a fraction; None where it is none."""
-    more = {key: 1 + np.longdouble(change if key == name else 0) for key in NAMES}
+    more = {key: 1 + np.longdouble(change if key == name else 0) for key in NAMES[:3]}
     modes = case.system.modes
     if not (name == "step" or np.any({"stiffness": modes.w2, "friction": modes.rate}[name] != 0)):
         return None
