@@ -414,3 +414,16 @@ def test_a_friction_in_five_frames_is_plainer_than_another_spring_than_the_state
     found = identify(t, q, v=v, mass=12.785327484536777, stiffness=70.97025435286015)
     assert "times as stiff" not in found.statement
     assert "position-verlet" in names(found)
+
+
+def test_a_velocity_that_is_a_multiple_of_the_position_is_told() -> None:
+    """A buffer that both share; it was said that areas turn over."""
+    h, q, v = 0.1, 0.31, 0.44
+    rows = [(q, v)]
+    for _ in range(80):
+        q += h * (v - h * K / M * q)
+        v = 0.8 * q
+        rows.append((q, v))
+    x, u = np.array(rows).T
+    found = identify(h * np.arange(81), x, v=u, mass=M)
+    assert "The velocity follows the position: from frame 1 on it is 0.8 times" in found.statement

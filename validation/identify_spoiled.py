@@ -152,7 +152,7 @@ def spoiled() -> None:
         "velocities of the other particle",
         q2,
         v2[:, ::-1],
-        "order|other particle|sorted|unsorted",
+        "order|other particle|other columns|sorted",
         ("coupled",),
         mass=[M, M],
     )

@@ -40,6 +40,16 @@ FEWEST_WITH_MEMORY = 12
 
 def misfit(e: Evidence) -> Explanation:
     """The class of a map that is no known scheme's, and how large the misfit is."""
+    q, v = e.found.z[1:].astype(np.float64).T
+    slope = float(q @ v / (q @ q)) if np.any(q) else 0.0
+    if slope and np.all(np.abs(v - slope * q) <= 8 * e.unit):
+        times = slope * float(e.found.size[1] / e.found.size[0] / e.record.interval)
+        return Explanation(
+            cause=f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
+            "from rest",
+            remedy="look for a buffer that both share, or a velocity that is made from the position",
+            misfit=float(np.max(np.abs(v - slope * q))),
+        )
     entries = e.found.entries.astype(np.float64)
     det = float(np.linalg.det(entries))
     joints = nearest([e.found], [e.terms], distinct(damped=False), range(1, 2))
