@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2619,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4601,
-    ("identify",): 8133,
+    ("identify",): 8143,
     ("formats", "store"): 5149,
     ("studies",): 1615,
     ("studies/*",): 11138,
