@@ -71,53 +71,68 @@ def built(source: Path, folder: Path) -> str:
     return f"'{program}' > trajectory.csv"
 
 
-PLOTS_NOTHING = """#!/bin/sh
-[ "$1" = plot ] || exec "{0}" -m springcheck "$@"
-"""
-"""Takes the place of springcheck in the examples after the first: half of their time would be pictures."""
-
-
-def judged(folder: Path, *, drawn: bool = True, **given: str) -> tuple[int, str, str]:
-    """The action's script in a folder: status, the summary's first sentence, standard error."""
+def shell() -> str:
     bash = shutil.which("bash")
     if bash is None or os.name == "nt":
         pytest.skip("no bash here")
+    return bash
+
+
+def judged(folder: Path, **given: str) -> tuple[int, str, str]:
+    """The action's script in a folder: status, the summary's first sentence, standard error."""
     summary, output = folder / "summary.md", folder / "output"
     variables = {f"JUDGE_{name.upper()}": value for name, value in given.items()}
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    if not drawn:
-        (folder / "bin").mkdir()
-        (folder / "bin" / "springcheck").write_text(PLOTS_NOTHING.format(sys.executable))
-        (folder / "bin" / "springcheck").chmod(0o755)
-        path = f"{folder / 'bin'}{os.pathsep}{path}"
     known = {**os.environ, "PATH": path, "GITHUB_STEP_SUMMARY": str(summary), "GITHUB_OUTPUT": str(output)}
     ran = subprocess.run(
-        [bash, str(ACTION / "judge.sh")], env={**known, **variables}, cwd=folder, check=False,
+        [shell(), str(ACTION / "judge.sh")], env={**known, **variables}, cwd=folder, check=False,
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert output.read_text() == f"status={ran.returncode}\n"
+    return ran.returncode, first_sentence(summary), ran.stderr
+
+
+def first_sentence(summary: Path) -> str:
     text = summary.read_text() if summary.exists() else ""
-    sentence = text.splitlines()[2] if text else ""
-    return ran.returncode, sentence.partition(". What to do")[0], ran.stderr
+    return text.splitlines()[2].partition(". What to do")[0] if text else ""
+
+
+def judged_here(
+    folder: Path, command: str, words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> tuple[int, str]:
+    """What the action's script calls, in this process and without its pictures: half of a second each."""
+    monkeypatch.chdir(folder)
+    subprocess.run([shell(), "-c", command], check=True)
+    Path("springcheck-report").mkdir()
+    reports = {"junit": "springcheck-report/junit.xml", "badge": "springcheck-report/badge.json"}
+    reports |= {"summary": "summary.md"}
+    status = main([*words, *(x for name, path in reports.items() for x in (f"--{name}", path))])
+    return status, first_sentence(Path("summary.md"))
 
 
 @pytest.mark.parametrize(("name", "scheme", "options", "cause"), BUGS)
 def test_the_first_sentence_of_the_summary_is_the_cause_of_a_real_bug(
-    name: str, scheme: str, options: str, cause: str, tmp_path: Path
+    name: str, scheme: str, options: str, cause: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    given = {"command": built(EXAMPLES / name, tmp_path), "trajectory": "trajectory.csv", "scheme": scheme}
-    if options.startswith("--"):
-        given["options"] = options
+    command, trajectory, error = built(EXAMPLES / name, tmp_path), "trajectory.csv", ""
+    # one by its numbers and one by its scene
+    by_action = name in (BUGS[0][0], "tmd_171.py")
+    if by_action:
+        given = {"command": command, "trajectory": trajectory, "scheme": scheme}
+        given |= {"options" if options.startswith("--") else "scene": options}
+        status, sentence, error = judged(tmp_path, **given)
     else:
-        given["scene"] = str(EXAMPLES / options) if options.endswith(".toml") else options
-    drawn = name == BUGS[0][0]
-    status, sentence, error = judged(tmp_path, drawn=drawn, **given)
+        scene = str(EXAMPLES / options) if options.endswith(".toml") else options
+        stated = options.startswith("--")
+        words = ["identify", trajectory] if stated else ["judge", trajectory, "--scene", scene]
+        words += ["--scheme", scheme] * bool(scheme) + (options.split() if stated else [])
+        status, sentence = judged_here(tmp_path, command, words, monkeypatch)
     assert status == 1, error
     assert cause in sentence
     reports = tmp_path / "springcheck-report"
     assert json.loads((reports / "badge.json").read_text())["message"].endswith(" failed")
     assert ElementTree.parse(reports / "junit.xml").find(".//failure") is not None
-    assert bool(list(reports.glob("*.png"))) == drawn
+    assert bool(list(reports.glob("*.png"))) == by_action
 
 
 def test_a_program_that_reads_a_scene_is_judged_in_half_a_minute(tmp_path: Path) -> None:

@@ -31,8 +31,8 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SERVED]:
 @pytest.mark.parametrize("kind", hostile.KINDS)
 def test_a_hostile_store_does_no_harm(kind: str, served: SERVED, monkeypatch: pytest.MonkeyPatch) -> None:
     place, server = served
-    # a short form: a twentieth of the text; each of two arrays above the memory allowed, and the file above what
-    # is checked before it is shown
+    # a short form: a twentieth of the text; each of two arrays above the memory allowed, and the file above
+    # what is checked before it is shown
     monkeypatch.setattr(hostile, "REPEATED", hostile.REPEATED // 20)
     monkeypatch.setattr(hostile, "VERDICTS", 10_000)
     monkeypatch.setattr(hostile, "SPARSE", max(2 * campaign.MEMORY, checking.LONGEST_CHECK) + (1 << 20))
