@@ -68,10 +68,6 @@ def _of(runs: Runs, shown: Sequence[View]) -> str:
     return f" of {title}" + (f" of {runs.scene.n}" if title.startswith("particle") else "") if title else ""
 
 
-def _equal(xs: Frame, ys: Frame) -> bool:
-    return max(xs.half, ys.half) <= ALIKE * min(xs.half, ys.half)
-
-
 def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
     """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
@@ -95,6 +91,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
     begin = Curve(name="start", group=BEGIN, x=start[0], y=start[1], line=False, marks=True)
+    sizes = xs.half, ys.half
     square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked, true) is None else ""
@@ -105,7 +102,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
         x=xs.axis(view.x_name, view.x_unit),
         y=ys.axis(view.y_name, view.y_unit),
         curves=[*lines, *curves, begin],
-        equal=square and (view.what == "path" or _equal(xs, ys)),
+        equal=square and (view.what == "path" or max(sizes) <= ALIKE * min(sizes)),
         labels=overlay.alone(named, xs, ys) if alone else (),
         note=note,
     )

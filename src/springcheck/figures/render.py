@@ -164,11 +164,9 @@ OTHER_LINES: dict[str, dict[str, Any]] = {
 
 
 def _kinds(charts: Sequence[Chart]) -> list[Patch]:
-    found = {kind for chart in charts if chart.tiles for kind in chart.tiles.kinds}
-    kinds = [chart.tiles.kinds[i] if i >= 0 else NO_KIND for chart in charts if chart.tiles
-             for row in chart.tiles.rows for i in row]  # fmt: skip
-    seen = dict.fromkeys(kinds) if found else {}
-    every = [kind for chart in charts if chart.tiles for kind in chart.tiles.kinds]
+    maps = [chart.tiles for chart in charts if chart.tiles]
+    seen = {one.kinds[i] if i >= 0 else NO_KIND for one in maps for row in one.rows for i in row}
+    every = [kind for one in maps for kind in one.kinds]
     return [
         Patch(facecolor=TILES_SHADED.get(shade, shade), edgecolor="#bbbbbb", linewidth=0.4, label=name)
         for name, shade in dict.fromkeys([*every, NO_KIND])

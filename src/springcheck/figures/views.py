@@ -135,7 +135,8 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
                 f"--particle {particle}: scene {scene.name} has particles 0 to {scene.n - 1}"
             )
         return [_single(scene, particle)]
-    if _is_pair(scene):
+    # two particles that hold on to each other and to nothing else
+    if scene.n == 2 and scene.terms and all(term.bodies == 2 for term in scene.terms):
         return [_bond(scene)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
 
@@ -160,11 +161,6 @@ def paths(scene: Scene) -> list[View]:
 
     found = [view(x, y) for x, y in ("xy", "yz", "xz") if x in of_axis and y in of_axis]
     return [replace(one, title="") for one in found] if len(found) == 1 else found
-
-
-def _is_pair(scene: Scene) -> bool:
-    """Whether two particles hold on to each other and to nothing else."""
-    return scene.n == 2 and bool(scene.terms) and all(term.bodies == 2 for term in scene.terms)
 
 
 def _single(scene: Scene, i: int) -> View:

@@ -162,9 +162,7 @@ def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
     return part()
 
 
-@cache
-def _here() -> dict[str, str]:
-    return provenance.versions()
+_here = cache(provenance.versions)
 
 
 def _answers(

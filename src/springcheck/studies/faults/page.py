@@ -54,7 +54,10 @@ def _map(part: Sequence[Result], *, many: bool) -> Chart:
         y=Scale(name="fault", names=[one.name for one in results]),
         tiles=Tiles(
             kinds=KINDS,
-            rows=[[_kind(one, name) for name in checks] for one in results],
+            rows=[
+                [2 if x in one.missed_by else 0 if x in one.rejected_by else 1 for x in checks]
+                for one in results
+            ],
             notes=[[_said(one, name) for name in checks] for one in results],
         ),
     )
@@ -102,10 +105,6 @@ def _limits(results: Sequence[Result]) -> Bank:
         "h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps"
     )
     return Bank(name="faults", title="Checks", charts=[chart], heading=heading)
-
-
-def _kind(one: Result, check: str) -> int:
-    return 2 if check in one.missed_by else 0 if check in one.rejected_by else 1
 
 
 def _said(one: Result, check: str) -> str:

@@ -235,7 +235,9 @@ def judge(
         judged_frames += max(len(piece.t) for piece in pieces.values())
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece, piece=True))
-            if name not in failed and any(_tells(v) for v in verdicts[name][-1]):
+            if name not in failed and any(
+                v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]
+            ):
                 failed[name] = piece
             tallies[name].add(piece)
             last[name] = piece
@@ -304,10 +306,6 @@ def _bridged(worst: Sequence[Verdict], pieces: Sequence[Sequence[Verdict]], fram
         else v
         for v in worst
     ]
-
-
-def _tells(verdict: Verdict) -> bool:
-    return verdict.passed is False and verdict.check in checks.TELLING
 
 
 def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str, Trajectory]]:
