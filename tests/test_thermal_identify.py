@@ -216,3 +216,13 @@ def test_joined_particles_are_told_by_their_modes(name: str) -> None:
         omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(m, m))))
         assert found.scheme == name
         assert sorted(found.omega) == pytest.approx(omega, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["bbk", "gj-iii-half"])
+def test_draws_that_are_carried_on_are_no_reason_to_be_silent(name: str) -> None:
+    every = 2 if name == "bbk" else 1
+    t, q, v = run(name, 1000 * every, 4)
+    found = identify_thermal(t[::every], q[::every], v[::every])
+    assert found is not None
+    assert not found.named
+    assert name in [one.scheme for one in found.candidates]

@@ -103,10 +103,10 @@ class Thermostat:
 
     @property
     def full_rank(self) -> bool:
-        """Whether the noise of every step has rank two, by a drift between new draws: no combination of
+        """Whether the noise of every step has rank two, by a drift between its draws: no combination of
         (q', p', q, p) is free of it."""
         drawn = [i for i, act in enumerate(self.acts) if act.kind in ("exchange", "noise")]
-        return self.fresh > 1 and any(act.kind == "drift" for act in self.acts[drawn[0] : drawn[-1]])
+        return self.draws > 1 and any(act.kind == "drift" for act in self.acts[drawn[0] : drawn[-1]])
 
     @property
     def collides(self) -> bool:

@@ -23,7 +23,8 @@ from springcheck.thermal.stepper import Stepper
 class Branch:
     """One affine map that a step may take: its probability, A (n, 2, 2) and G (n, 2, draws)."""
 
-    chance: float
+    chance: Any
+    """One, or (n, 1, 1)."""
     A: Extended
     G: Extended
 
@@ -42,9 +43,10 @@ class Law:
     fast: Reals | float = 0.0
 
     @cached_property
-    def collision(self) -> float:
-        """The chance of a collision a step, 1 - exp(-gamma h)."""
-        return float(-np.expm1(-self.rate * self.h))
+    def collision(self) -> Any:
+        """The chance of a collision a step, 1 - exp(-gamma h); (n, 1, 1) of so many rates."""
+        p = -np.expm1(-self.rate * self.h)
+        return np.reshape(p, (-1, 1, 1)) if np.ndim(p) else float(p)
 
     @cached_property
     def branches(self) -> tuple[Branch, ...]:
@@ -54,7 +56,7 @@ class Law:
         p = self.collision
         return self._branch(1 - p, hit=False), self._branch(p, hit=True)
 
-    def _branch(self, chance: float, *, hit: bool) -> Branch:
+    def _branch(self, chance: Any, *, hit: bool) -> Branch:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
         r, n = self.scheme.draws, len(m)
         q, p = np.zeros((2, 2 + r, n), np.longdouble)
@@ -74,7 +76,7 @@ class Law:
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(sum(np.longdouble(one.chance) * one.A for one in self.branches))
+        return np.asarray(sum(np.asarray(one.chance, np.longdouble) * one.A for one in self.branches))
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise
@@ -82,7 +84,7 @@ class Law:
         return self.branches[-1].G
 
     @cached_property
-    def _state(self) -> tuple[tuple[float, Floats, Floats], ...]:
+    def _state(self) -> tuple[tuple[Any, Floats, Floats], ...]:
         """The maps on (q, p, carried draws), with fresh draws alone."""
         d, r, c = 2, self.scheme.draws, self.scheme.carried
         out = []
@@ -107,7 +109,7 @@ class Law:
         right = np.zeros((n, d * d))
         for chance, _, G in self._state:
             g = G / scale[:, :, None]
-            right += chance * np.einsum("nij,nkj->nik", g, g).reshape(n, d * d)
+            right += (chance * np.einsum("nij,nkj->nik", g, g)).reshape(n, d * d)
         out = np.full((n, d, d), np.inf)
         i = self.growth < 1
         out[i] = np.linalg.solve(np.eye(d * d) - self._moments[i], right[i][..., None]).reshape(-1, d, d)
@@ -159,6 +161,10 @@ class Law:
         that are carried on into them that part which q and p say nothing of."""
         (_, A, G), every = self._state[0], np.asarray(steps)[:, None, None]
         W = G @ G.transpose(0, 2, 1)
+        if self.scheme.collides:
+            # no normal noise, but one of such second moments
+            A = np.asarray(sum(c * a for c, a, _ in self._state))
+            W = self.covariance - A @ self.covariance @ A.transpose(0, 2, 1)
         B, Q = A, W
         for j in range(1, int(np.max(every))):
             B = np.where(j < every, A @ B, B)

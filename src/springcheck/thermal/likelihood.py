@@ -27,11 +27,8 @@ GAINED_BY_CHANCE = 25.0
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
-FULL_RANK = tuple(name for name, one in THERMOSTATS.items() if one.full_rank)
-"""Schemes whose every step has noise of rank two."""
-
-OF_ONE_MAP = tuple(name for name, one in THERMOSTATS.items() if not (one.rescales or one.collides))
-"""Schemes whose several steps are one map and one normal noise."""
+FULL_RANK = tuple(name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried)
+"""Schemes whose every step has new noise of rank two."""
 
 EITHER_WAY = 0.5
 """Sine of the turn between two frames, below which it is taken both ways."""
@@ -75,17 +72,18 @@ def likely(
     return _compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank)
 
 
-def likely_apart(q: Floats, v: Floats, h: float) -> list[Candidate]:
+def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:
     """Schemes by their likelihood, the steps between two frames h apart unknown; such as fall short of the
-    best by more than `ODDS` at every stride are left out, but for those of every step.
+    best by more than `ODDS` at every stride are left out, but for those of every step.  What every step
+    leaves is white unless it carries draws on.
 
     None as in `likely`.
     """
-    found = [
-        y
-        for name in OF_ONE_MAP
-        for y in _of_scheme(name, q, v, h, (1, *STEPS_A_FRAME) if name in FULL_RANK else STEPS_A_FRAME)
-    ]
+    found: list[Candidate] = []
+    for name, scheme in THERMOSTATS.items():
+        if not scheme.rescales:
+            at_once = scheme.full_rank and white != bool(scheme.carried)
+            found += _of_scheme(name, q, v, h, (1,) * at_once + STEPS_A_FRAME)
     kept: dict[str, Candidate] = {}
     for one in _compared(found, q, v):
         before = kept.get(one.scheme)

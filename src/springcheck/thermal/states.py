@@ -117,16 +117,28 @@ def identify_thermal(
         # what digits leave of it is white but for neighbours, which share a frame
         digits = misfit < 1e-9 or _is_white(rest[::2])
         # of one draw the position and the momentum leave the same
-        return clear(_of_one(q, v, h, free / free[0], misfit, left[1], even)) if free[0] and digits else None
+        return (
+            clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, mixed))
+            if free[0] and digits
+            else None
+        )
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
         return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0]), mixed))
     if collided := tuple(between_collisions(q, v, h)):
         return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
-    if not all(map(_is_white, left)) or not even:
+    white = all(map(_is_white, left))
+    if not white:
+        # draws that are carried on into the next frame are in no other
+        halves = [x[i::2] for x in left for i in (0, 1)]
+        apart = min(map(_together, halves)) if all(map(_is_white, halves)) else 0.0
+        even = apart > EVEN and _is_even(sizes_left[1] * left[1], u[1:])
+    if not even:
         return None
-    found = tuple(likely_apart(q, v, h))
-    return Thermal(candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent)
+    found = tuple(likely_apart(q, v, h, white=white))
+    return Thermal(
+        candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent and white
+    )
 
 
 def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
@@ -178,7 +190,7 @@ def _is_uniform(x: Floats) -> bool:
 
 
 def _of_one(
-    q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats, even: bool
+    q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats, even: bool, mixed: bool
 ) -> Thermal | None:
     """Of a single draw a step: the schemes of whose null vector this is one."""
     _, b, c, d = free
@@ -224,7 +236,12 @@ def _of_one(
         found, left = [Candidate(scheme="bussi-after", **known)], np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         if near(b, -h):
-            found = [Candidate(scheme=name) for name in _of_no_memory(q, v, close)]
+            if not _is_white(left) and _is_correlated(left):
+                found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
+            else:
+                # of several particles' collisions each mode has a part
+                names = _of_no_memory(q, v, inf if mixed else close)
+                found = [Candidate(scheme=name) for name in names]
         elif -b < h and _is_correlated(left):
             roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
             rates = {n: _rate(root, -b / h) for n, root in roots.items()}
@@ -245,7 +262,7 @@ def _of_one(
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
         uniform=bool(len(left)) and _is_uniform(left),
-        known=[x.scheme for x in found] != ["bussi-after"] and bool(close <= COARSE),
+        known=[x.scheme for x in found] not in (["bussi-after"], ["gj-iii-half"]) and bool(close <= COARSE),
     )  # fmt: skip
 
 
