@@ -37,7 +37,7 @@ from springcheck.checks.motion import (
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.rods import rod_length, rod_velocity, turn
-from springcheck.checks.solver import tolerance, tolerance_bound
+from springcheck.checks.solver import energy_gain, replay, tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step_defect
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -56,7 +56,7 @@ Experiment: TypeAlias = check.Check[Bench]
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, gyration, energies, tolerance,
+    angular_momentum, rod_length, rod_velocity, turn, gyration, energies, tolerance, replay, energy_gain,
 )  # fmt: skip
 
 THOROUGH: tuple[Experiment, ...] = (

@@ -39,6 +39,23 @@ def tolerance(case: Case) -> Finding | str:
     )
 
 
+@check("replay", family="motion", requires={"rule", "two-frames"})
+def replay(case: Case) -> Finding | str:
+    """Each step between two frames is that of a fixed-step scheme, as long as the solver's rule says."""
+    # nobody else needs it
+    from springcheck.checks import replayed
+
+    return replayed.steps(case)
+
+
+@check("gain", family="motion", requires={"rule", "two-frames", "linear"})
+def energy_gain(case: Case) -> Finding | str:
+    """The energy changes by what the lengths of the steps make of it, and by nothing else."""
+    from springcheck.checks import replayed
+
+    return replayed.gain(case)
+
+
 def tolerance_bound(case: Case) -> float:
     """What an adaptive solver's errors may add up to, relative to the initial energy norm.
 

@@ -80,6 +80,11 @@ ENGINE = Engine(
             "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
         ),
         by_name(
+            "variable-verlet", "variable-verlet",
+            "VariableVerletIntegrator, stepTo each frame, its error tolerance that of the scene times its "
+            "amplitude", _TERMS, adaptive=True, rebuilds_velocity=True,
+        ),
+        by_name(
             "nose-hoover", "semi-implicit-euler",
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
         ),

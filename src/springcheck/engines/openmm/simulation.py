@@ -206,6 +206,8 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         made = mm.VerletIntegrator(step)
         made.setConstraintTolerance(LENGTHS.get(name, made.getConstraintTolerance()))
         return made
+    if name == "variable-verlet":
+        return mm.VariableVerletIntegrator(scene.tolerance)
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, 8)])
     if name == "nose-hoover":
@@ -322,7 +324,7 @@ class _Context:
         with np.errstate(all="ignore"):
             started = (scene.p - self._half_kick * self._force(0.0, scene.q, scene.p)) / self._m
         velocities.reshape(-1)[scene.where] = started
-        if not method.generator:
+        if not method.generator and not method.adaptive:
             # whose numbers begin with its first step
             _warm_up(self._context, self._integrator, positions)
         if self._driven and method.name in CUSTOM:
@@ -381,4 +383,10 @@ class _Context:
                 p[:] = self._rods.projected(q, p)
 
 
-start = _Context
+def start(scene: Scene, method: Method, label: Label, step: float, seed: int = 0) -> _Context:
+    """A context at the start of the scene."""
+    if method.adaptive:
+        from springcheck.engines.openmm.variable import Variable
+
+        return Variable(scene, method, label, step)
+    return _Context(scene, method, label, step, seed)

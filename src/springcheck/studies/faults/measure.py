@@ -69,6 +69,8 @@ def scene(where: Where) -> Scene:
     if where in SHIPPED:
         name, steps = SHIPPED[where]
         return replace(load_scene(name), steps=steps, name=where)
+    if where == "varying steps":
+        return replace(scene("spring"), steps=60, tolerance=1e-3, name=where)
     steps = 2100 if where == "long spring" else 200
     return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
 

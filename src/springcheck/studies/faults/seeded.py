@@ -22,7 +22,7 @@ from springcheck.studies.faults.steppers import State, Step, energies, record, t
 Make: TypeAlias = Callable[..., Trajectory]
 Where: TypeAlias = Literal[
     "spring", "chain", "long spring", "orbit", "driven", "box", "dumbbell", "triangle", "field", "bath",
-    "wide bath", "hot rod",
+    "wide bath", "hot rod", "varying steps",
 ]  # fmt: skip
 
 

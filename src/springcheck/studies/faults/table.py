@@ -16,6 +16,7 @@ from springcheck.studies.faults.fields import FIELDS
 from springcheck.studies.faults.heat import OF_NOISE, RODS_IN_BATHS, THERMAL_STEPS
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.studies.faults.varying import VARYING
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
@@ -316,5 +317,5 @@ ADAPTIVE = (
 
 FAULTS: tuple[Fault, ...] = (
     *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *FIELDS, *ADAPTIVE,
-    *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
+    *VARYING, *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
 )  # fmt: skip

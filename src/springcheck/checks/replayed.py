@@ -1,0 +1,179 @@
+"""A solver whose steps follow a rule, replayed from the recorded frames: each stretch from its own first one.
+
+Only the length of the step before goes on from one stretch to the next.  Where a step of velocity Verlet of
+length h ends, E' - E = (h**2/8) sum (F'**2 - F**2)/m of linear forces, exactly: it keeps the energy less
+(h**2/8) sum F**2/m, each step with its own h.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.checks.case import Case
+from springcheck.checks.check import Finding
+from springcheck.physics.arrays import ROUNDOFF, Extended
+from springcheck.schemes.variable import Taken, allowed, taken
+from springcheck.text.wording import count
+
+MOST_REPLAYED = 10_000
+"""Steps: two seconds."""
+
+Times: TypeAlias = tuple[float, float]
+
+
+class _Replayed(NamedTuple):
+    """Of each stretch: where its steps lead, one rounding of all that they add up, and what the roundings of
+    the time may do, (f-1, n) each; the energy that they add by their law, and what the time may do to it, how
+    many they are, and the shortest, (f-1,) each."""
+
+    ends: tuple[Extended, Extended]
+    bounds: tuple[Extended, Extended]
+    late: tuple[Extended, Extended]
+    gains: Extended
+    loose: Extended
+    counts: Extended
+    shortest: Extended
+
+
+def _follow(case: Case) -> _Replayed | None:
+    """None where the steps are too many."""
+    run, system, m = case.trajectory, case.system, case.judged.m.astype(np.longdouble)
+    if run.force_calls > MOST_REPLAYED:
+        return None
+    state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
+    rows: list[tuple[Any, ...]] = []
+    for i in range(len(run.t) - 1):
+        first = tuple(x[i].astype(np.longdouble) for x in (run.q, run.p))
+        times = float(case.steps[i] * run.step), float(case.steps[i + 1] * run.step)
+
+        def stretch(
+            before: float, at: tuple[Extended, Extended] = first, times: Times = times
+        ) -> list[Taken]:
+            allow = allowed(case.scene)
+            return list(taken(case.scheme, case.judged, at, before=before, times=times, tolerance=allow))
+
+        steps = stretch(before)
+        if sum(len(row[0]) for row in rows) > MOST_REPLAYED * len(m) or not steps:
+            return None
+        end, of_q, of_p = steps[-1].end, *_rounded(case, steps, before)
+        # the time is a sum of lengths, each rounded: what is left of it is the last step, and the next one
+        # follows from that
+        off = len(steps) * state * abs(np.longdouble(times[1]))
+        late = off * np.abs(end[1] / m), off * np.abs(system.force(*end))
+        gain, loose, last = _gain(case, steps), np.longdouble(0), abs(steps[-1].h)
+        if unsure:
+            other = stretch(before + unsure)
+            late = tuple(x + 2 * np.abs(y - z) for x, y, z in zip(late, other[-1].end, end, strict=True))
+            loose = 2 * np.abs(_gain(case, other) - gain)
+            # a step that is left over differs by all that the steps before it do
+            off += 2 * abs(abs(other[-1].h) - last)
+        before, unsure = last, float(off)
+        shortest = min(abs(step.h) for step in steps)
+        rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, (len(steps), shortest))))
+    found = [np.stack(column) for column in zip(*rows, strict=True)]
+    return _Replayed((found[0], found[1]), (found[2], found[3]), (found[4], found[5]), *found[6:])
+
+
+def _gain(case: Case, steps: list[Taken]) -> Extended:
+    """What steps add to the energy, of linear forces."""
+    total = np.longdouble(0)
+    for step in steps:
+        old, new = (np.sum(case.system.force(*x) ** 2 / case.judged.m) for x in (step.start, step.end))
+        total += np.longdouble(step.h) ** 2 / 8 * (new - old)
+    return np.asarray(total)
+
+
+def _rounded(case: Case, steps: list[Taken], before: float) -> tuple[Extended, Extended]:
+    """One rounding of all that these steps add up, each carried to the end by the steps after it (n,)."""
+    run, system, m = case.trajectory, case.system, case.judged.m
+    state = run.arithmetic.state + ROUNDOFF
+    q, p = steps[0].start
+    sizes, stiff = system.magnitude(None if system.is_linear else q), np.abs(system.hessian(q))
+    # the momentum was read half a step on
+    of_q, of_p = np.zeros_like(q), state * (np.abs(p) + before * sizes(np.abs(q) + case.origins, np.abs(p)))
+    for length, (q, p), (end, _) in steps:
+        h, reach = abs(length), np.abs(q) + np.abs(end) + case.origins
+        if not system.is_linear:
+            sizes, stiff = system.magnitude(q), np.abs(system.hessian(q))
+        pushed = state * (np.abs(p) + h * sizes(reach, np.abs(p)))
+        if run.rebuilds_velocity:
+            pushed = pushed + run.arithmetic.state * m * (reach + 2 * case.scene.periods) / h
+        one = of_q + h / m * (of_p + h / 2 * (stiff @ of_q)) + state * (reach + h * np.abs(p) / m)
+        of_p = of_p + h / 2 * (stiff @ (of_q + one)) + pushed
+        of_q = one
+    return np.asarray(of_q), np.asarray(of_p)
+
+
+def _roundings(case: Case) -> int:
+    return schemes.roundings(schemes.scheme(case.scheme.steps_of))
+
+
+TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed; the tolerance is judged"
+
+
+def steps(case: Case) -> Finding | str:
+    """How far the frames are from where the steps of the rule lead, in roundings."""
+    with np.errstate(all="ignore"):
+        found = case.once(_follow)
+        if found is None:
+            return TOO_MANY
+        run, number = case.trajectory, _roundings(case)
+        ratios, still = [], []
+        for at, end, one, late in zip((run.q, run.p), found.ends, found.bounds, found.late, strict=True):
+            unit = one + late / number
+            ratios.append(np.max(np.abs(at[1:] - end) / unit, axis=1))
+            still.append(np.max(np.abs(at[:-1] - end) / unit, axis=1))
+        seen = np.max(ratios, axis=0)
+        worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
+        if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
+            return "rounding may be as large as the way from frame to frame"
+    lengths = np.abs(np.diff(run.t)) / found.counts
+    return Finding(
+        seen[worst],
+        number,
+        "roundings",
+        f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
+        f"of the time; {int(np.sum(found.counts))} steps by the rule, {np.min(lengths):.3g} to "
+        f"{np.max(lengths):.3g} long in the mean between two frames",
+    )
+
+
+def gain(case: Case) -> Finding | str:
+    """How far the change of the energy is from the sum over the steps of the rule, over the energy."""
+    with np.errstate(all="ignore"):
+        found = case.once(_follow)
+        if found is None:
+            return TOO_MANY
+        run, number = case.trajectory, _roundings(case)
+        q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
+        energy = case.judged.system.energy(q, p).astype(np.longdouble)
+        force = case.system.force(q, p)
+        of_q, of_p = (number * one + late for one, late in zip(found.bounds, found.late, strict=True))
+        each = (
+            np.sum(np.abs(force[1:]) * of_q + (np.abs(p[1:]) + of_p) / case.judged.m * of_p, axis=1)
+            + found.loose
+        )
+        law = np.cumsum(found.gains)
+        off, bound = np.abs(energy[1:] - energy[0] - law), np.cumsum(each)
+        ratio = off / bound
+        worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+        drowned = ~(np.abs(law) > bound)
+        if ratio[worst] <= 1 and np.all(drowned):
+            return "rounding may be as large as all that the steps add"
+        told = ""
+        if bound[-1] > np.max(np.abs(law)):
+            told = (
+                f"; a step of {np.min(found.shortest):.1e} leaves a velocity rebuilt from positions no digit"
+            )
+    periods = abs(float(run.t[-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
+    grown, said = (float(x / energy[0] / periods) for x in (energy[-1] - energy[0], law[-1]))
+    return Finding(
+        off[worst] / energy[0],
+        bound[worst] / energy[0],
+        "of the energy",
+        f"(h**2/8) (F'**2 - F**2)/m at each step; a period of the fastest mode adds {grown:.6g} of the "
+        f"energy, by the sum over the steps {said:.6g}{told}",
+    )

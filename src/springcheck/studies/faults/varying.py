@@ -1,0 +1,73 @@
+"""What is wrong with engines that choose the lengths of their steps: another rule, or another state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+from springcheck.schemes.catalogue import Rule
+from springcheck.schemes.variable import allowed, taken
+from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.studies.faults.steppers import State, trajectory
+
+Other: TypeAlias = Callable[[Rule, float], Rule]
+"""(rule, size) -> the rule that the engine follows."""
+
+
+def right(rule: Rule, size: float) -> Rule:
+    """The rule as it is."""
+    return rule
+
+
+def looser(rule: Rule, size: float) -> Rule:
+    """Another tolerance."""
+    return lambda push, before, tolerance: rule(push, before, tolerance * (1 + size))
+
+
+def grows(rule: Rule, size: float) -> Rule:
+    """Steps grow by any little, and are not held."""
+    return lambda push, before, tolerance: min(rule(push, 0.0, tolerance), 2 * before or np.inf)
+
+
+def jumps(rule: Rule, size: float) -> Rule:
+    """After a short step the next one may be of any length."""
+    return lambda push, before, tolerance: max(rule(push, 0.0, tolerance), rule(push, before, tolerance))
+
+
+def varying(other: Other = right, after: Callable[[State, float], State] = lambda state, size: state) -> Make:
+    """Steps by another rule, and what is done to the state after each frame."""
+
+    def make(scene: Scene, scheme: schemes.Scheme, size: float) -> Trajectory:
+        assert scheme.rule is not None
+        broken, before, calls = replace(scheme, rule=other(scheme.rule, size)), 0.0, 0
+        state, states = (scene.q, scene.p), [(scene.q, scene.p)]
+        for i in range(scene.frames - 1):
+            times = float(i * scene.every * scene.step), float((i + 1) * scene.every * scene.step)
+            for step in taken(broken, scene, state, before=before, times=times, tolerance=allowed(scene)):
+                before, calls, end = abs(step.h), calls + 1, step.end
+            state = after((np.asarray(end[0], np.float64), np.asarray(end[1], np.float64)), size)
+            states.append(state)
+        q, p = np.array(states).swapaxes(0, 1)
+        return trajectory(scene, scheme, q, p, tolerance=scene.tolerance, calls=calls)
+
+    return make
+
+
+def _fault(name: str, about: str, make: Make, size: float | None = None) -> Fault:
+    checks = ("replay", "energy-gain")
+    return Fault(name, about, checks, make, scheme="variable-verlet", size=size, scene="varying steps")
+
+
+VARYING = (
+    _fault("rule-of-another-tolerance", "steps are chosen by too large a tolerance", varying(looser), 1e-9),
+    _fault("rule-that-holds-no-step", "steps grow by any little, where the rule holds them", varying(grows)),
+    _fault("rule-that-jumps", "a step may be longer than twice the one before", varying(jumps)),
+    _fault("varying-steps-with-friction", "momenta lose a fraction at every frame",
+           varying(after=lambda state, x: (state[0], state[1] * (1 - x))), 1e-9),
+)  # fmt: skip
