@@ -32,7 +32,7 @@ HOMES = {
         "figures",
         *(f"studies/{name}/figure.py" for name in STUDIES),
     ),
-    "openmm": ("engines/openmm/simulation.py", "engines/openmm/thermostats.py"),
+    "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats", "variable")),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
     "numba": ("engines/own",),

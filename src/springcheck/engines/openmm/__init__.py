@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
@@ -10,13 +12,17 @@ from springcheck.engines.contract import (
     NO_NUMBERS,
     RODS,
     Engine,
+    Label,
+    Method,
     Need,
+    Simulation,
     by_default,
     by_name,
     deferred,
     named,
     thermostat,
 )
+from springcheck.physics.scene import Scene
 
 _TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {"bond"}
 _DRIVEN = _TERMS | DRIVEN
@@ -25,6 +31,17 @@ _ON_A_LINE = _TERMS - {"morse"}
 """The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
 
 _DRAWS = "OpenMM, SFMT"
+
+_MODULE = deferred(f"{__name__}.simulation", "arithmetic", "convention")
+
+
+def _start(scene: Scene, method: Method, label: Label, step: float, **more: Any) -> Simulation:
+    if not method.adaptive:
+        return _MODULE["start"](scene, method, label, step, **more)  # type: ignore[no-any-return]
+    from springcheck.engines.openmm.variable import Variable
+
+    return Variable(scene, method, label, step)
+
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")
@@ -141,5 +158,5 @@ ENGINE = Engine(
     any_axis=True,
     periodic=True,
     squares_lengths=True,
-    **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
+    **_MODULE | {"start": _start},
 )  # fmt: skip

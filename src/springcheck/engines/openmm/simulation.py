@@ -383,10 +383,4 @@ class _Context:
                 p[:] = self._rods.projected(q, p)
 
 
-def start(scene: Scene, method: Method, label: Label, step: float, seed: int = 0) -> _Context:
-    """A context at the start of the scene."""
-    if method.adaptive:
-        from springcheck.engines.openmm.variable import Variable
-
-        return Variable(scene, method, label, step)
-    return _Context(scene, method, label, step, seed)
+start = _Context
