@@ -37,11 +37,12 @@ SCRIPTS = sorted(x for x in FOLDER.iterdir() if x.suffix in (".py", ".cjs", ".c"
 HARMLESS = "**harmless**"
 
 FEWER = {
+    "ase_nose_hoover_fixed": ("units.fs, 2000", "units.fs, 500"),
     "ase_andersen": ("N, M, K, H, T, P = 20_000", "N, M, K, H, T, P = 4_000"),
     "lammps_langevin": ("N, H, G, FRAMES = 30", "N, H, G, FRAMES = 20"),
     "openmm_andersen": ("N, T, H, RATE = 6000", "N, T, H, RATE = 1500"),
 }
-"""Particles of the statistical ones here: their effects are 8 standard errors and more with a quarter."""
+"""Particles of the statistical ones here, and steps of another: their effects are 8 standard errors and more with a quarter."""
 
 
 def command(script: Path, folder: Path) -> list[str]:
