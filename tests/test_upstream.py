@@ -42,7 +42,8 @@ FEWER = {
     "lammps_langevin": ("N, H, G, FRAMES = 30", "N, H, G, FRAMES = 20"),
     "openmm_andersen": ("N, T, H, RATE = 6000", "N, T, H, RATE = 1500"),
 }
-"""Particles of the statistical ones here, and steps of another: their effects are 8 standard errors and more with a quarter."""
+"""Particles of the statistical ones here, and steps of another: their effects are 8 standard errors and more
+with a quarter."""
 
 
 def command(script: Path, folder: Path) -> list[str]:
