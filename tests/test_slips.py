@@ -310,3 +310,19 @@ def test_run_says_which_methods_its_step_is_too_long_for(
     assert " here, 0.3468: own:respa8" in said
     main(["run", "spring", "--method", "own:euler", "-o", str(tmp_path / "b.h5")])
     assert "beyond" not in capsys.readouterr().out
+
+
+def test_a_value_that_begins_with_a_minus_is_asked_for_in_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for words in (["--temperature", "-5K"], ["--temperature"]):
+        with pytest.raises(SystemExit) as left:
+            main(["run", "spring", *words])
+        assert left.value.code == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "--temperature: a value is needed" in said
+        assert "--temperature=-" in said
+    # as it asks for, it is understood, and refused for what it is
+    assert main(["run", "spring", "--temperature=-5K"]) == 2
+    assert "temperature" in capsys.readouterr().err
