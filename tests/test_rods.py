@@ -22,6 +22,7 @@ from springcheck import checks, driver, engines, schemes, store
 from springcheck.checks import Case, stretch
 from springcheck.cli import main
 from springcheck.errors import MethodError, SceneError
+from springcheck.identify.files import rod_of
 from springcheck.physics import exact, scenefile
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
@@ -622,3 +623,22 @@ def test_a_trr_file_that_is_cut_off_is_one_line(tmp_path: Path, capsys: pytest.C
     (tmp_path / "x.trr").write_bytes(whole[:260] + bytes(8) + whole[268:])
     assert main(["identify", str(tmp_path / "x.trr")]) == 2
     assert "is no .trr file from byte 260 on" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["dumbbell-shake", "dumbbell-shake-as-it-is", "triangle-lincs-as-it-is"])
+def test_a_file_with_rods_is_said_to_have_them_where_schemes_are_asked_for(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(gromacs.FOLDER / f"{name}.trr")]) == 2
+    said = capsys.readouterr().err
+    assert "particles 0 and 1 turn and keep their distance, 0." in said
+    assert "judge it, with a --scene that has the [[rod]]" in said
+
+
+def test_neither_springs_nor_what_goes_straight_on_are_taken_for_rods() -> None:
+    t = np.arange(60) * 0.1
+    straight = np.outer(t, np.tile([1.0, 2.0], 2)) + [0, 0, 3, 4]
+    swinging = np.stack([np.cos(t), np.sin(t), 1.01 * np.cos(t + 3), np.sin(t + 3)], axis=1)
+    assert rod_of(straight) == rod_of(swinging) == rod_of(np.ones((9, 5))) == rod_of(None) == ""
+    swinging[:, 2] /= 1.01
+    assert rod_of(swinging).startswith("particles 0 and 1 turn")

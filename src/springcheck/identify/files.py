@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,10 @@ MOST_FAILED = 1000
 MOST_OSCILLATORS = 16
 """Moving coordinates that are looked at in a file of many particles."""
 
+RIGID, TURNED = 1e-3, 0.05
+"""Part by which a distance may change that is a rod's, programs' own tolerances being 1e-4, and by which the
+way has to turn for it to show."""
+
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
 """Lengths in nm and times in ps, by the names that H5MD files use."""
@@ -47,6 +52,8 @@ class FileStates:
     notes: tuple[str, ...]
     adaptive: str = ""
     """The title of the adaptive solver that one of our own stores says made them."""
+    whole: Floats | None = None
+    """Every coordinate of the file (f, N), those that were left out among them."""
 
 
 def read(
@@ -102,6 +109,7 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
         v=None if v is None else v[kept][:, chosen],
         mass=None if mass is None else mass[chosen],
         notes=remarks,
+        whole=found.q[kept],
     )
 
 
@@ -146,7 +154,7 @@ def _foreign(path: Path, wanted: str | None) -> Iterator[FileStates]:
         chosen, remarks = _chosen(q, np.zeros_like(q) if v is None else v, notes)
         yield FileStates(
             label=name, t=group.t, q=q[:, chosen], p=None, v=None if v is None else v[:, chosen],
-            mass=None if mass is None else mass[chosen], notes=remarks,
+            mass=None if mass is None else mass[chosen], notes=remarks, whole=q,
         )  # fmt: skip
 
 
@@ -171,6 +179,21 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
         notes = [*notes, f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
     chosen = moving[:MOST_OSCILLATORS] if len(moving) else np.arange(min(1, q.shape[1]))
     return np.asarray(chosen), tuple(notes)
+
+
+def rod_of(q: Floats | None) -> str:
+    """Two particles of positions q (f, N), in space or in a plane, that turn and keep their distance; or ""."""
+    for axes in (3, 2):
+        if q is None or q.shape[1] % axes:
+            continue
+        x = q[:, : axes * MOST_OSCILLATORS].reshape(len(q), -1, axes)
+        for a, b in combinations(range(x.shape[1]), 2):
+            way = x[:, b] - x[:, a]
+            size = np.linalg.norm(way, axis=1)
+            length, off = float(np.mean(size)), float(np.ptp(size))
+            if off <= RIGID * length and np.max(np.ptp(way, axis=0)) >= TURNED * length:
+                return f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
+    return ""
 
 
 def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:
@@ -215,7 +238,11 @@ def identify_file(
     found = {}
     for states in read(path, trajectory, columns, given.get("step")):
         try:
-            found[states.label] = identify_states(states, **given)
+            found[states.label] = told = identify_states(states, **given)
+            if told.verdict == "none" and (seen := rod_of(states.whole)):
+                raise IdentificationError(
+                    f"{seen}; schemes are told by springs: judge it, with a --scene that has the [[rod]]"
+                )
         except SpringcheckError as error:
             raise type(error)(f"{titled(path, states.label)}: {error}") from error
         except (ArithmeticError, ValueError) as error:
