@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,7 +150,7 @@ def test_the_table_counts_degrees_of_freedom() -> None:
 
 
 def test_noise_in_space_moves_no_rod_of_a_plane(
-    tmp_path: object, capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
 ) -> None:
     need("openmm:verlet")
     plane = replace(load_scene("dumbbell"), bath=Bath(temperature=0.05, friction=0.8))
@@ -161,3 +162,31 @@ def test_noise_in_space_moves_no_rod_of_a_plane(
     assert "in 3 degrees of freedom" in said
     assert "langevin-middle-rods: its noise acts along x, y and z, and turns a rod" in said
     assert "not among the default methods" not in said or "langevin-middle-rods: not" not in said
+
+
+def test_a_file_of_rods_in_a_bath_is_judged_and_of_a_scheme_without_rods_that_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = scenes("dumbbell")
+    file = driver.run(scene, "own:baoab", seed=4).save(tmp_path / "a.csv")
+    command = ["judge", str(file), "--scene", "bath-dumbbell", "--scheme"]
+    assert main([*command, "baoab"]) == 0
+    assert main([*command, "aboba"]) == 0  # without a force it is the same
+    assert main([*command, "baoa"]) == 1
+    capsys.readouterr()
+    assert main([*command, "bbk"]) == 2
+    assert (
+        "no stages of BBK, each random force used in two half kicks with rods are known"
+        in capsys.readouterr().out
+    )
+
+
+def test_faults_of_hot_rods_are_refused_or_right_where_nothing_is_rigid(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["run", "bath-spring", "--method", "own:baoab", "--steps", "20", "-o", f"{tmp_path}/a.h5"]
+    for name in ("hot-rod-length", "hot-rod-not-projected", "hot-rod-after-drift"):
+        assert main([*command, "--fault", name, "--force"]) == 0
+    command[1] = "bath-dumbbell"
+    assert main([*command, "--fault", "collision-chance", "--force"]) == 2
+    assert "no stages of Andersen: collision, then velocity Verlet with rods" in capsys.readouterr().err

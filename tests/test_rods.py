@@ -637,7 +637,7 @@ def test_a_file_with_rods_is_said_to_have_them_where_schemes_are_asked_for(
 
 def test_neither_springs_nor_what_goes_straight_on_are_taken_for_rods() -> None:
     t = np.arange(60) * 0.1
-    straight = np.outer(t, np.tile([1.0, 2.0], 2)) + [0, 0, 3, 4]
+    straight = np.outer(t, np.tile([1.0, 2.0], 2)) + np.array([0, 0, 3, 4])
     swinging = np.stack([np.cos(t), np.sin(t), 1.01 * np.cos(t + 3), np.sin(t + 3)], axis=1)
     assert rod_of(straight) == rod_of(swinging) == rod_of(np.ones((9, 5))) == rod_of(None) == ""
     swinging[:, 2] /= 1.01

@@ -62,7 +62,7 @@ def rod_length(case: Case) -> Finding:
 def rod_velocity(case: Case) -> Finding | str:
     """The ends of a rod have one velocity along it, to rounding."""
     rods, bath = _rods(case), THERMOSTATS.get(case.trajectory.scheme)
-    if bath and bath.held[-1] != PROJECT:
+    if bath and bath.held and bath.held[-1] != PROJECT:
         return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
     roundings, of_p = _allowed(case)
     q, p = (x[-len(of_p) :].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))

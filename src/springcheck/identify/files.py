@@ -182,7 +182,7 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
 
 
 def rod_of(q: Floats | None) -> str:
-    """Two particles of positions q (f, N), in space or in a plane, that turn and keep their distance; or ""."""
+    """Two particles of positions q (f, N), in space or a plane, that turn and keep their distance; or ""."""
     for axes in (3, 2):
         if q is None or q.shape[1] % axes:
             continue

@@ -75,12 +75,14 @@ def broken(
         assert scene.bath is not None
         claims = THERMOSTATS[scheme.name]
         of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else None
-        of = of or replace(claims, acts=tuple(runs), held=tuple(runs))  # type: ignore[arg-type]
+        free = tuple(act for act in runs if isinstance(act, Act) and act.kind not in ("shake", "project"))
+        of = of or replace(claims, acts=free, held=tuple(runs))  # type: ignore[arg-type]
         f = {name: factor(scene, size) for name, factor in numbers.items()}
         stepper = Stepper(
             replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
             rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
-            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles), hold=hold(scene, size),
+            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles), 
+            hold=hold(scene, size) if scene.system.rods else None,
         )  # fmt: skip
         # a script of draws stands for every generator
         source = start if hasattr(start, "standard_normal") else seed(start)

@@ -141,7 +141,8 @@ RODS_IN_BATHS = (
     _rod("masses-alike", "a rod in a bath takes the masses of its ends for equal", _DIRECTION,
          hold=lambda s, x: Rods(np.full(s.n, np.mean(s.m)), s.places, s.terms)),
     _rod("length", "a rod in a bath is too long", ("rod-length",), size=1e-10, hold=lambda s, x: Rods(
-         s.m, s.places, [replace(one, length=one.length * (1 + x)) for one in s.terms])),
+         s.m, s.places, [replace(one, length=one.length * (1 + x)) for one in s.terms
+                         if one.kind == "constraint"])),
     _rod("draws-projected", "draws along a rod are taken off", (*_VARIANCE, *_SHAPE), "baoa",
          runs=(*_BAOA[:4], PROJECT, *_BAOA[4:])),
     _rod("friction-on-site", "friction of the velocity on site, not of the half step before", _DIRECTION,
