@@ -81,7 +81,7 @@ def broken(
         stepper = Stepper(
             replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
             rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
-            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles), 
+            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles),
             hold=hold(scene, size) if scene.system.rods else None,
         )  # fmt: skip
         # a script of draws stands for every generator
