@@ -11,6 +11,7 @@ import numpy as np
 
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS, chance, rigid
@@ -29,6 +30,8 @@ def reading(case: Case) -> Reading:
 def _reading(case: Case) -> Reading:
     run = case.trajectory
     scheme = THERMOSTATS[run.scheme]
+    if case.judged.system.rods and not scheme.held:
+        raise MethodError(f"no stages of {scheme.title} with rods are known")
     # where a draw acts in two steps, that of the start is not in the record
     skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
     q, p = run.q[skipped:], run.p[skipped:]

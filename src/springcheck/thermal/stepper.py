@@ -7,7 +7,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.errors import MethodError
 from springcheck.physics.arrays import Force, Reals
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
@@ -37,8 +36,8 @@ class Stepper:
 
     `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
     on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
-    Rods `hold` where the scheme says so; MethodError where it does not.  With `absolute` every difference is
-    taken as a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
+    Rods `hold` where the scheme says so.  With `absolute` every difference is taken as a sum of sizes: a unit
+    roundoff of these, times the roundings of a step, bounds its rounding.
     """
 
     @classmethod
@@ -61,8 +60,6 @@ class Stepper:
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
             self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
         self._hold, acts = hold, scheme.held if hold else scheme.acts
-        if not acts:
-            raise MethodError(f"no stages of {scheme.title} with rods are known")
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
         size = np.sqrt(self.m * width(thermal))

@@ -10,6 +10,7 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.seeds import SEEDED, Seeded
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Force
 from springcheck.physics.bath import Bath
 from springcheck.physics.rods import Rods
@@ -77,6 +78,8 @@ def broken(
         of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else None
         free = tuple(act for act in runs if isinstance(act, Act) and act.kind not in ("shake", "project"))
         of = of or replace(claims, acts=free, held=tuple(runs))  # type: ignore[arg-type]
+        if scene.system.rods and not of.held:
+            raise MethodError(f"no stages of {of.title} with rods are known")
         f = {name: factor(scene, size) for name, factor in numbers.items()}
         stepper = Stepper(
             replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
