@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
@@ -205,21 +205,24 @@ def _chain(table: Any) -> Scene:
 
 def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from bodies.terms
-    yield from _springs(table.spring, bodies)
-    yield from _capacitors(table, bodies)
+    yield from _of_rows(_springs(table.spring, bodies))
+    yield from _of_rows(_capacitors(table, bodies))
     for key, (term, _) in tables.of_terms().items():
         yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
     yield from _by_columns(Damping, table.damping, bodies)
-    yield from _rods(table.rod, bodies)
-    yield from _bonds(table.bond, bodies)
-    yield from _magnetic(table.magnetic, bodies)
-    loops = [bodies.number(row.loop, f"resistor[{j}].loop") for j, row in enumerate(table.resistor)]
-    if loops:
-        yield Damping(i=np.array(loops), c=np.array([row.resistance for row in table.resistor]))
+    for read in (_rods(table.rod, bodies), _bonds(table.bond, bodies), _magnetic(table.magnetic, bodies)):
+        yield from _of_rows(read)
+    yield from _of_rows(
+        (Damping, False, (bodies.number(row.loop, f"resistor[{j}].loop"), row.resistance))
+        for j, row in enumerate(table.resistor)
+    )
 
 
-def _springs(springs: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
-    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
+_Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
+"""Of each row its term, whether it is fast, and its ends and columns."""
+
+
+def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
     for j, spring in enumerate(springs):
         field = f"spring[{j}].ends"
         numbers = [bodies.number(end, field) for end in spring.ends if end != "wall"]
@@ -237,14 +240,12 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
                 rest = spring.rest
         ends = bodies.along(field, spring.axis, *numbers)
         _one_axis(f"spring[{j}]", {"rest": spring.rest, "wall": spring.wall}, ends)
-        kind = rows.setdefault((WallSpring if len(numbers) == 1 else Spring, spring.fast), [])
-        kind += [(*one, spring.stiffness, rest) for one in ends]
-    yield from _of_rows(rows)
+        for at in ends:
+            yield WallSpring if len(at) == 1 else Spring, spring.fast, (*at, spring.stiffness, rest)
 
 
-def _rods(rods: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
     """A row for each axis of what a rod joins, and its length at the start where none is given."""
-    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, rod in enumerate(rods):
         field = f"rod[{j}].ends"
         if bodies.name not in ("particle", "chain"):
@@ -265,27 +266,23 @@ def _rods(rods: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
         length = rod.length or float(np.hypot.reduce(way))
         if length == 0:
             raise MistakeError(f"rod[{j}]: its ends are at one place, and a rod has a length")
-        kind = rows.setdefault((WallRod if len(numbers) == 1 else Rod, False), [])
-        kind += [(*at, length, *([x] if len(numbers) == 1 else [])) for at, x in zip(ends, wall, strict=True)]
-    yield from _of_rows(rows)
+        for at, x in zip(ends, wall, strict=True):
+            yield (WallRod, False, (*at, length, x)) if len(at) == 1 else (Rod, False, (*at, length))
 
 
-def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
     """A row for each axis of the two particles that a bond joins."""
-    rows: list[tuple[float, ...]] = []
     for j, bond in enumerate(bonds):
         if bodies.name not in ("particle", "chain"):
             raise MistakeError(f"bond[{j}]: a bond joins particles")
         one, other = bond.ends
         _two_ends(one, other, f"bond[{j}].ends")
-        ends = bodies.along(f"bond[{j}].ends", None, one, other)
-        rows += [(*at, bond.stiffness, bond.rest, j) for at in ends]
-    yield from _of_rows({(RadialSpring, False): rows} if rows else {})
+        for at in bodies.along(f"bond[{j}].ends", None, one, other):
+            yield RadialSpring, False, (*at, bond.stiffness, bond.rest, j)
 
 
-def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
+def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
     """The plane at right angles to each field, its two axes in their cyclic order."""
-    found: list[tuple[float, ...]] = []
     for j, row in enumerate(rows):
         field = f"magnetic[{j}].particle"
         plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
@@ -294,8 +291,7 @@ def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
                 f"{field}: a field along {row.axis} needs a particle along {plane[0]} and {plane[1]}"
             )
         (one,), (other,) = (bodies.along(field, axis, row.particle) for axis in plane)
-        found.append((*one, *other, row.strength))
-    yield from _of_rows({(Magnetic, False): found} if found else {})
+        yield Magnetic, False, (*one, *other, row.strength)
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:
@@ -308,9 +304,12 @@ def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, .
             )
 
 
-def _of_rows(rows: Mapping[tuple[type[Term], bool], Sequence[tuple[float, ...]]]) -> Iterator[Term]:
+def _of_rows(rows: _Rows) -> Iterator[Term]:
     """Terms, fast or not, of rows of their ends and columns."""
-    for (term, fast), several in rows.items():
+    found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
+    for term, fast, row in rows:
+        found.setdefault((term, fast), []).append(row)
+    for (term, fast), several in found.items():
         names = (*term.ends, *(column.field for column in term.columns))
         fields: Any = dict(zip(names, map(np.array, zip(*several, strict=True)), strict=True))
         yield term(**fields, **({"fast": True} if fast else {}))
@@ -321,18 +320,15 @@ def _two_ends(one: int, other: int, field: str) -> None:
         raise MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
 
 
-def _capacitors(table: Any, bodies: _Bodies) -> Iterator[Term]:
+def _capacitors(table: Any, bodies: _Bodies) -> _Rows:
     """A capacitor is a spring of stiffness 1/C: in one loop towards 0, between two towards each other."""
     if (table.capacitor or table.resistor) and bodies.name != "inductor":
         raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
-    rows: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for j, capacitor in enumerate(table.capacitor):
         loops = [bodies.number(loop, f"capacitor[{j}].loops") for loop in capacitor.loops]
         if len(loops) == 2:
             _two_ends(loops[0], loops[1], f"capacitor[{j}].loops")
-        kind = WallSpring if len(loops) == 1 else Spring
-        rows.setdefault((kind, False), []).append((*loops, 1 / capacitor.capacitance, 0.0))
-    yield from _of_rows(rows)
+        yield WallSpring if len(loops) == 1 else Spring, False, (*loops, 1 / capacitor.capacitance, 0.0)
 
 
 def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
