@@ -22,6 +22,9 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.faults import measure
+from springcheck.studies.faults.heat import RODS_IN_BATHS
+from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.run.tally import heated_of
 from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.rigid import read
@@ -190,3 +193,12 @@ def test_faults_of_hot_rods_are_refused_or_right_where_nothing_is_rigid(
     command[1] = "bath-dumbbell"
     assert main([*command, "--fault", "collision-chance", "--force"]) == 2
     assert "no stages of Andersen: collision, then velocity Verlet with rods" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fault", RODS_IN_BATHS, ids=lambda fault: fault.name)
+def test_a_fault_is_rejected_at_another_step_and_other_masses(fault: Fault) -> None:
+    right = measure.scene("hot rod")
+    factors = np.repeat([0.3, 7.0], 3)
+    scene = replace(right.derived(m=right.m * factors, p=right.p * factors), step=0.6 * right.step, steps=60)
+    failed = {v.check for v in checks.judge(scene, fault.run(scene)) if v.passed is False}
+    assert failed >= set(fault.caught_by)

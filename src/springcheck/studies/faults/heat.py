@@ -143,7 +143,7 @@ RODS_IN_BATHS = (
     _rod("length", "a rod in a bath is too long", ("rod-length",), size=1e-10, hold=lambda s, x: Rods(
          s.m, s.places, [replace(one, length=one.length * (1 + x)) for one in s.terms
                          if one.kind == "constraint"])),
-    _rod("draws-projected", "draws along a rod are taken off", (*_VARIANCE, *_SHAPE), "baoa",
+    _rod("draws-projected", "momenta along a rod are taken off amid its drift", _DIRECTION, "baoa",
          runs=(*_BAOA[:4], PROJECT, *_BAOA[4:])),
     _rod("friction-on-site", "friction of the velocity on site, not of the half step before", _DIRECTION,
          "lammps-langevin", runs=(_LAMMPS[6], *_LAMMPS[1:3], *_LAMMPS[4:])),
