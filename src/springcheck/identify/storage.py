@@ -108,9 +108,13 @@ def storage(x: Floats) -> Storage:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
     # text that is finer than the numbers around it says nothing: every number has such a decimal form
     binary = Storage(name=short or ("single" if single else "double"))
-    finer = [np.log2(text.quantum(sample) / binary.quantum(sample)) for text in found]
+    with np.errstate(over="ignore"):
+        finer = [text.quantum(sample) / (2 * binary.quantum(sample)) for text in found]
     # whole numbers of few digits are of a short format as well, which is hardly finer
-    found = [x for x, y in zip(found, finer, strict=True) if np.all(y >= 1) or (short and np.mean(y) >= 1)]
+    found = [
+        x for x, y in zip(found, finer, strict=True)
+        if np.all(y >= 1) or (short and np.all(y > 0) and np.sum(np.log(y)) >= 0)
+    ]  # fmt: skip
     if found:
         # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
         # neighbours below it ten times as close as those above

@@ -187,6 +187,8 @@ def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> F
     whole = 1 - m + (1 - f) * a * beta
     last = -np.array([a, (1 - f) * a, m + (1 - f) * a * (0.5 - beta)]) / whole
     rows = np.array([[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [0, 0, 0]]) + np.outer([beta, gamma, 1], last)
+    if not np.all(np.isfinite(rows)):
+        return np.full(4, np.inf)
     values, left = np.linalg.eig(rows.T)
     # the acceleration that is left once the third motion has died
     dead = left[:, np.argmin(np.abs(values))].real
@@ -221,14 +223,18 @@ def _remembering(e: Evidence) -> str:
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
     ratio = float(found.size[1] / found.size[0])
     error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14
-    turn, stated, out = -entries[2] / entries[1], _stated(e), []
+    turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, _stated(e), []
     for name, entries_of in WITH_MEMORY.items():
         starts = [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]
 
         def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
-            return (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
+            # beyond the parameters that a scheme can have
+            with np.errstate(all="ignore"):
+                return np.asarray((of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error)
 
         for start in starts if turn > 0 else []:
+            if not np.all(np.isfinite(left(np.array(start)))):
+                continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
             other = stated is not None and abs(best.x[0] * turn / stated - 1) > READ
             if np.max(np.abs(best.fun)) > 1 or other:
