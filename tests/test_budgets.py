@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2619,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4772,
-    ("identify",): 8170,
+    ("identify",): 8180,
     ("formats", "store"): 5149,
     ("studies",): 1615,
     ("studies/*",): 11138,
