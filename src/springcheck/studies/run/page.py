@@ -146,7 +146,8 @@ def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
             )
         )
     heading = f"{runs.scene.title}: {_farthest(found)}"
-    return [Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=2)]
+    many = len(charts)
+    return [Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=many)]
 
 
 def _farthest(found: Sequence[Heated]) -> str:
