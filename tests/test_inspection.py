@@ -335,7 +335,7 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StoreError, match="No space left"):
+    with pytest.raises(StoreError, match="the disk is full"):
         save(figure, tmp_path, "picture")
     assert png.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"picture.png", "picture.svg"}
