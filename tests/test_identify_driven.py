@@ -108,7 +108,7 @@ def test_springs_that_couple_two_axes_are_no_field() -> None:
         ("foucault", "own:euler", "a magnetic field across the plane"),
         ("foucault", "own:semi-implicit-euler", "a magnetic field across the plane"),
         ("foucault", "own:rk4", "a magnetic field across the plane"),
-        ("two-scales", "own:semi-implicit-euler", "normal modes"),
+        ("two-scales", "own:semi-implicit-euler", "Semi-implicit Euler, kick-drift"),
     ],
 )
 def test_explicit_schemes_in_a_field_and_stiff_modes_are_no_friction_drive_or_noise(

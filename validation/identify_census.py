@@ -54,8 +54,8 @@ false fit; 2 none (4004816, 4010827) and 1 WRONG CAUSE (4005498, a wobble of 9.5
 steps); these three and 3100228 are mended since.
 For 5000000 to 5020999, after those mends (20,931): no false fit, no WRONG CAUSE; 12658 named; 2640 undecided;
 2470 not told apart; 2383 error seen; 638 cause named; 115 error within rounding; 22 refused; 1 none
-(5012182); 2 WRONG NAME (5006605, a step in single precision; 5014475, 5 frames); 2 LISTED WITHOUT IT
-(5009346 and 5013672, 5 frames).
+(5012182); 2 WRONG NAME (5006605, a step in single precision; 5014475, 5 frames) and 2 LISTED WITHOUT IT
+(5009346 and 5013672, 5 frames), which are mended since.
 """
 
 from __future__ import annotations

@@ -23,7 +23,10 @@ REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
 
 
-REBUILT_NOTE = "velocities carry the rounding of positions over the step: rebuilt as a difference of them"
+REBUILT_NOTE = (
+    "velocities carry the rounding of positions over the step: rebuilt as a difference of them, or of a "
+    "stiff spring's force"
+)
 
 STORED = "double, stored in single"
 EITHER = "single, or double stored in single"

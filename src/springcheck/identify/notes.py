@@ -27,10 +27,10 @@ may take five away."""
 MOST_DIGITS = 9
 """More digits than single precision has short of double: what needs more, digits do not tell."""
 
-FEWEST_OF_TEXT, DIGITS_OF_TEXT = 12, 40.0
-"""Frames of text that show the motion, and digits of it in all of them, below which a scheme is not told from
-others for certain: some 24 frames of 3 digits.  A map, its equilibrium and a start have seven unknowns, and
-roundings of few digits are large beside a short motion."""
+FEWEST_OF_TEXT, FEWEST_DIGITS = 12, 40.0
+"""Frames of text that show the motion, and digits of it in all frames, text or single precision, below which
+a scheme is not told from others for certain: some 24 frames of 3 digits, or 6 of 7.  A map, its equilibrium
+and a start have seven unknowns, and roundings of few digits are large beside a short motion."""
 
 CERTAIN_STEPS = 12
 """Steps to a frame above which coarse numbers name no scheme: their errors are small, and many lie near."""
@@ -58,7 +58,7 @@ def separation(maps: list[Map], one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """What was found, where few frames of text, or hardly any of single precision, exclude no other scheme.
+    """What was found, where few frames of text or single precision exclude no other scheme.
 
     Raises IdentificationError where no scheme fits so few.
     """
@@ -71,9 +71,9 @@ def of_few(record: Record, found: Identification) -> Identification:
     seen = [np.max(np.clip(x, 1.0, 1e99), axis=1).astype(np.float64) for x in shown]
     frames = min(int(np.count_nonzero(x > 1)) for x in seen)
     digits = min(float(np.sum(np.log10(x))) for x in seen)
-    if frames >= fewest and (digits >= DIGITS_OF_TEXT or not record.text):
+    if frames >= fewest and digits >= FEWEST_DIGITS:
         return found
-    fewest = max(fewest, math.ceil(DIGITS_OF_TEXT * frames / max(digits, 1.0)) if record.text else 0)
+    fewest = max(fewest, math.ceil(FEWEST_DIGITS * frames / max(digits, 1.0)))
     more = f"give {fewest} frames or more that show it, or more digits"
     if not found.candidates:
         raise IdentificationError(

@@ -199,10 +199,12 @@ def _of_coordinates(
         strides = range(1, min(x.stride for x in explained)) if alone else FEW
         others = {**explained, **(_elsewhere(record, moving, maps, base, strides) if strides else {})}
         explained = {x: others[x] for x in likely(list(others))}
-    if not explained:
+    if all(x.stride not in FEW for x in explained):
+        # few steps, one of them rounded, are plainer than many
         joints, remark = single_parameters(record, moving, maps, base, stride)
-        explained = _explained(record, moving, maps, joints, base)
-        notes += [remark] if explained else []
+        rounded = _explained(record, moving, maps, joints, base)
+        notes += [remark] if rounded else []
+        explained = rounded or explained
     if not explained:
         return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
     joints = list(explained)

@@ -111,8 +111,11 @@ class Law:
             g = G / scale[:, :, None]
             right += (chance * np.einsum("nij,nkj->nik", g, g)).reshape(n, d * d)
         out = np.full((n, d, d), np.inf)
-        i = self.growth < 1
-        out[i] = np.linalg.solve(np.eye(d * d) - self._moments[i], right[i][..., None]).reshape(-1, d, d)
+        left = np.eye(d * d) - self._moments
+        # a growth of 1, rounded to less
+        i = np.flatnonzero(self.growth < 1)
+        i = i[np.linalg.det(left[i]) != 0]
+        out[i] = np.linalg.solve(left[i], right[i][..., None]).reshape(-1, d, d)
         return np.asarray(out * scale[:, :, None] * scale[:, None, :])
 
     @cached_property

@@ -39,6 +39,9 @@ FAR_ABOVE = 200.0
 STEPS_DOWNHILL = 40
 """Steps of Newton's method at most."""
 
+STARTS_HALVED = 3
+"""Times that the friction of a start is halved at most."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
@@ -209,6 +212,12 @@ def _descend(
     where they are, its values (k,) and its second derivatives (k, p, p)."""
     at, damping = at.copy(), np.full(len(at), 1e-3)
     best, slope, curved = _derivatives(of, at, every)
+    for _ in range(STARTS_HALVED):
+        # a decay in a frame may be of more friction than a scheme has a motion for
+        if not len(lost := np.flatnonzero(~np.isfinite(best))):
+            break
+        at[lost, 0] -= np.log(2)
+        best[lost], slope[lost], curved[lost] = _derivatives(of, at[lost], every[lost])
     going = np.isfinite(best)
     for _ in range(STEPS_DOWNHILL):
         rows = np.flatnonzero(going)
