@@ -190,6 +190,32 @@ def test_frames_without_a_collision_between_them_tell_the_spring_and_the_stride_
     assert abs(one.thermal - THERMAL / M) < 5 * one.thermal_error < 0.5
 
 
+@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog"])
+def test_steps_that_turn_little_are_counted_as_well(name: str) -> None:
+    few = replace(scene(10000), step=0.002 / OMEGA, every=5, bath=Bath(temperature=THERMAL, friction=8.0))
+    made = driver.run(few, f"own:{name}", seed=3)
+    (one, *_) = between_collisions(made.q[:, 0], made.p[:, 0] / M, 5 * few.step)
+    assert (one.scheme, one.strides) == (name, (5,))
+    # digits leave open how many steps a frame has
+    short = [np.round(x, 7) for x in (made.q[:, 0], made.p[:, 0] / M)]
+    (one, *_) = between_collisions(*short, 5 * few.step)
+    assert {4, 5, 6} <= set(one.strides)
+
+
+@pytest.mark.parametrize("name", ["obabo", "baoab"])
+@pytest.mark.parametrize(("length", "time"), [(1e-10, 1e-13), (1e-80, 1.0), (1e60, 1e-6)])
+def test_a_unit_is_of_no_account(name: str, length: float, time: float) -> None:
+    t, q, v = run(name, 1000)
+    wanted, found = identify_thermal(t, q, v), identify_thermal(t * time, q * length, v * length / time)
+    assert wanted is not None
+    assert found is not None
+    assert [x.scheme for x in found.candidates] == [x.scheme for x in wanted.candidates]
+    assert len(found.candidates) > 0
+    for x, y in zip(found.candidates, wanted.candidates, strict=True):
+        assert (x.omega * time, x.friction * time) == pytest.approx((y.omega, y.friction), rel=1e-6)
+        assert x.thermal * (time / length) ** 2 == pytest.approx(y.thermal, rel=1e-6, nan_ok=True)
+
+
 def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:
     t, q, v = run("obabo", 1000)
     still = driver.run(replace(scene(1000), bath=None), "own:velocity-verlet")

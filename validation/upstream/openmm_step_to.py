@@ -1,4 +1,4 @@
-"""OpenMM's VariableVerletIntegrator loses velocities in the shortest steps of stepTo.  pip install openmm numpy"""
+"""OpenMM's VariableVerletIntegrator loses velocities in stepTo's shortest steps.  pip install openmm numpy"""
 
 import numpy as np
 import openmm as mm
@@ -9,7 +9,9 @@ spring.addGlobalParameter("k", K)
 system.addParticle(M)
 spring.addParticle(0, [])
 system.addForce(spring)
-context = mm.Context(system, mm.VariableVerletIntegrator(TOLERANCE), mm.Platform.getPlatformByName("Reference"))
+context = mm.Context(
+    system, mm.VariableVerletIntegrator(TOLERANCE), mm.Platform.getPlatformByName("Reference")
+)
 context.setPositions([(X, 0, 0)])
 h, t, x, v = 0.0, 0.0, X, 0.0
 for end in (frame * EVERY for frame in range(1, FRAMES + 1)):

@@ -3,6 +3,8 @@ leapfrog, to rounding, and so tell the spring and the number of steps; their sha
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from springcheck.physics.arrays import Floats
@@ -19,6 +21,9 @@ NO_COLLISION = 1e-7
 
 FEWEST_OF_EACH = 10
 """Frames with and without a collision, of which there must be so many: three of them make the map."""
+
+TIMES_LEFT_OVER = 10.0
+"""Times what a map leaves over, on the average, that is allowed for its entries."""
 
 TOGETHER_BY_CHANCE = 1e-9
 """Chance below which frames with a collision stand together, as a part that moves otherwise does."""
@@ -46,24 +51,42 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     spread = (still - share) / np.sqrt(share * (1 - share))
     if not chance.neighbours(spread[:, None]) > TOGETHER_BY_CHANCE:
         return []
-    A = np.linalg.lstsq(known[still], after[still], rcond=None)[0][:2].T * sizes[:, None] / sizes
+    entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
+    off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
+    A = entries[:2].T
     if not (abs(np.linalg.det(A) - 1) < NO_COLLISION and A[0, 1] * A[1, 0] < 0):
         return []
-    verlet = abs(A[0, 0] - A[1, 1]) < NO_COLLISION
-    names = [name for name, one in THERMOSTATS.items() if one.collides and verlet == one.synchronised]
-    return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)))]
+    # both ends of a step of leapfrog are unlike by (h w)**2, which few digits may hide
+    apart, least = abs(A[0, 0] - A[1, 1]), -A[0, 1] * A[1, 0] / MOST_A_FRAME
+    alike = (
+        {True}
+        if apart <= TIMES_LEFT_OVER * off < least
+        else {False}
+        if apart > TIMES_LEFT_OVER * off
+        else {True, False}
+    )
+    names = [name for name, one in THERMOSTATS.items() if one.collides and one.synchronised in alike]
+    close = TIMES_LEFT_OVER * off * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
+    A = A * sizes[:, None] / sizes
+    return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
 
 
-def _of_scheme(name: str, A: Floats, h: float, share: float, n: int, size: float) -> list[Candidate]:
-    """What a scheme means by a map A of so many steps, of whose frames a share has none with a collision."""
+def _of_scheme(
+    name: str, A: Floats, h: float, share: float, n: int, size: float, close: float
+) -> list[Candidate]:
+    """What a scheme means by a map A of frames, a share of them without a collision, and every number of
+    steps that it leaves open: its entries are known to `close` of themselves."""
     found: list[Candidate] = []
-    turned, frequency = float(np.arccos(np.trace(A) / 2)), float(np.sqrt(-A[1, 0] / A[0, 1]))
+    # the sine of a small angle is known better than its cosine
+    sine = np.sqrt(max(-A[0, 1] * A[1, 0] - (A[0, 0] - A[1, 1]) ** 2 / 4, 0.0))
+    turned, frequency = float(np.arctan2(sine, np.trace(A) / 2)), float(np.sqrt(-A[1, 0] / A[0, 1]))
     for steps in range(1, MOST_A_FRAME + 1):
         angles = np.concatenate([2 * np.pi * np.arange(steps) + x for x in (turned, -turned)]) / steps
         angles = angles[(angles > 0) & (angles < np.pi)]
         # of Verlet A01 = h sin(n y) / sin y and A10 = -sin(n y) sin y / h; of leapfrog 2 sin(y/2) for sin y
         of_step = np.sin(angles) if THERMOSTATS[name].synchronised else 2 * np.sin(angles / 2)
-        fits = (np.abs(of_step - frequency * h / steps) < 1e-6) & (np.sin(steps * angles) * A[0, 1] > 0)
+        near = np.abs(of_step - frequency * h / steps) < close * (frequency * h + sine) / steps
+        fits = near & (np.sin(steps * angles) * A[0, 1] > 0)
         for angle in angles[fits]:
             w, rate = 2 * np.sin(angle / 2) * steps / h, -np.log(share) / h
             law = Law(
@@ -78,4 +101,4 @@ def _of_scheme(name: str, A: Floats, h: float, share: float, n: int, size: float
                     thermal_error=heat * float(law.error_of_variances(n, steps)[0, 1]), strides=(steps,),
                 )
             )  # fmt: skip
-    return found[:1]
+    return [replace(found[0], strides=tuple(sorted({s for y in found for s in y.strides})))] if found else []

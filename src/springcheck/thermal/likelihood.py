@@ -71,8 +71,9 @@ def likely(
 
     None where every one falls short of a free map and a free noise by more than chance allows.
     """
+    q, v, unit = _scaled(q, v, h)
     found = [y for name in names for y in _of_scheme(name, q, v, h, (1,), turn)]
-    return _compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank)
+    return _in_units(_compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank), unit)
 
 
 def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:
@@ -83,6 +84,7 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
     None as in `likely`.
     """
     found: list[Candidate] = []
+    q, v, unit = _scaled(q, v, h)
     for name, scheme in THERMOSTATS.items():
         if not scheme.rescales:
             at_once = scheme.full_rank and white != bool(scheme.carried)
@@ -94,7 +96,21 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
             kept[one.scheme] = one
         elif one.nats < ODDS:
             kept[one.scheme] = replace(before, strides=(*before.strides, *one.strides))
-    return [one for one in kept.values() if one.nats < ODDS or one.strides == (1,)]
+    return _in_units([one for one in kept.values() if one.nats < ODDS or one.strides == (1,)], unit)
+
+
+def _scaled(q: Floats, v: Floats, h: float) -> tuple[Floats, Floats, float]:
+    """Positions and velocities in a unit of length near their own, a power of 2: no square underflows."""
+    unit = float(2.0 ** np.round(np.log2(max(np.std(q), h * np.std(v)))))
+    return np.asarray(q / unit), np.asarray(v / unit), unit
+
+
+def _in_units(found: list[Candidate], unit: float) -> list[Candidate]:
+    """Candidates of states in units of a length."""
+    return [
+        replace(y, thermal=y.thermal * unit * unit, thermal_error=y.thermal_error * unit * unit)
+        for y in found
+    ]
 
 
 def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = False) -> list[Candidate]:
@@ -274,7 +290,8 @@ def _errors(
         spread = np.linalg.inv(curved)
     except np.linalg.LinAlgError:
         return np.full(len(at) + 1, nan)
-    return np.asarray(np.sqrt(np.abs([*np.diag(spread), own + slope @ spread @ slope])))
+    variances = np.array([*np.diag(spread), own + slope @ spread @ slope])
+    return np.sqrt(np.where(variances >= 0, variances, nan))
 
 
 def _moments(q: Floats, v: Floats) -> tuple[Floats, int]:

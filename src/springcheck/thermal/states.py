@@ -287,7 +287,8 @@ def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     """Of the best linear map the determinant, that of the decay of momenta, (h w)**2 as its trace has it, and
     what either is off by at most: five standard errors, and 20/n, as far as a root near 1 is underestimated
     (Dickey & Fuller, J. Am. Stat. Assoc. 74 (1979) 427)."""
-    z = np.stack([q - np.mean(q), v - np.mean(v)])
+    # neither is small beside the other
+    z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
     A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
     decay = float(np.linalg.det(A))
     error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + 20 / n
