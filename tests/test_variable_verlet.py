@@ -11,11 +11,14 @@ import pytest
 import springcheck
 import variable_verlet
 from springcheck import checks, schemes
+from springcheck.checks import replayed
+from springcheck.engines.contract import Label, Stopped
 from springcheck.engines.openmm import ENGINE
+from springcheck.engines.openmm.variable import Variable
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.schemes.variable import allowed, taken
 
 
@@ -123,3 +126,131 @@ def test_the_method_is_run_by_name_alone_and_known_as_adaptive() -> None:
     assert method.adaptive
     assert not method.default
     assert schemes.scheme(method.scheme).has("adaptive")
+
+
+def saddle(p: float, q: float = 0.5) -> Scene:
+    """E = 0 for p = 0 and q = 1."""
+    return Scene(
+        m=[1.7, 1.7], q=[1.0, q], p=[p, 0.0], step=0.1, steps=20, tolerance=1e-3,
+        terms=(WallSpring(i=[0, 1], k=[-1.0, 1.0], at=[0.0, 0.0]),),
+    )  # fmt: skip
+
+
+def test_a_gain_is_a_part_of_a_size_of_the_energy_where_the_energy_is_negative() -> None:
+    scene = replace(scenefile.load_scene("inverted"), steps=60, tolerance=1e-3)
+    for right in (scene, saddle(0.0), saddle(float(np.sqrt(0.75 * 1.7)))):
+        found = judged(right)["energy-gain"]
+        assert found.passed is True
+        assert 0 < found.bound < 1e-6
+    run = springcheck.simulate(saddle(0.0), LABEL)
+    p = run.p.copy()
+    p[6:] *= 1 + 1e-3
+    assert [v.passed for v in checks.judge(saddle(0.0), replace(run, p=p)) if v.check == "energy-gain"] == [
+        False
+    ]
+
+
+def test_nothing_that_moves_has_no_gain_and_openmm_takes_no_part_of_no_amplitude() -> None:
+    still = replace(saddle(0.0), q=np.zeros(2))
+    for scene in (still, saddle(0.0, 1.0)):
+        with pytest.raises(MethodError, match="energy of the start is 0"):
+            springcheck.simulate(scene, LABEL)
+
+
+def test_where_the_step_before_the_first_frame_is_not_known_none_is_replayed() -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=40, tolerance=3e-3, step=0.5)
+    run = springcheck.simulate(scene, LABEL)
+    late = replace(run, t=run.t[7:], q=run.q[7:], p=run.p[7:], energy=None)
+    found = {v.check: v for v in checks.judge(scene, late, piece=True)}
+    for name in ("replay", "energy-gain"):
+        assert found[name].passed is None
+        assert "before its first frame" in found[name].why
+
+
+def test_a_motion_that_escapes_in_finite_time_is_refused_and_one_that_stays_is_run() -> None:
+    falls = Scene(
+        m=[1.0],
+        q=[1.0],
+        p=[2.0],
+        step=0.1,
+        steps=100,
+        tolerance=1e-3,
+        terms=(Quartic(i=[0], b=[-1.0], at=[0.0]),),
+    )
+    with pytest.raises(MethodError, match="escapes to infinity"):
+        springcheck.simulate(falls, LABEL)
+    with np.errstate(all="ignore"):
+        steps = list(taken(
+            schemes.SCHEMES["variable-verlet"], falls, (np.array([1e200]), np.array([2.0])),
+            before=0.0, times=(1.0, 2.0), tolerance=1e-3,
+        ))  # fmt: skip
+    assert not steps
+    held = replace(
+        falls,
+        q=[0.3],
+        p=[0.2],
+        terms=(WallSpring(i=[0], k=[1.3], at=[0.0]), Quartic(i=[0], b=[-1.0], at=[0.0])),
+    )
+    assert judged(held)["replay"].passed is True
+
+
+def test_what_openmm_gives_up_is_a_run_that_stopped_with_the_frames_before() -> None:
+    import openmm
+
+    scene = replace(scenefile.load_scene("spring-uneven"), tolerance=1e-3)
+    moving = Variable(
+        scene, ENGINE.methods["variable-verlet"], Label(engine="openmm", method="variable-verlet"), scene.step
+    )
+    right, calls = moving._integrator.stepTo, []
+
+    def once(time: float) -> None:
+        calls.append(time)
+        if len(calls) > 2:
+            raise openmm.OpenMMException("Particle coordinate is NaN")
+        right(time)
+
+    moving._integrator.stepTo = once
+    q, p = (np.zeros((4, scene.n)) for _ in "qp")
+    with pytest.raises(Stopped, match="NaN") as stop:
+        moving.advance(1, q, p)
+    assert stop.value.rows == 2
+    whole = springcheck.simulate(replace(scene, steps=2), LABEL)
+    assert np.array_equal(p[:2], whole.p[1:3])
+
+
+def test_a_file_that_claims_few_force_calls_is_replayed_no_longer_than_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=3, step=2.0, tolerance=1e-4)
+    run = replace(springcheck.simulate(scene, LABEL), force_calls=0)
+    met: list[Any] = []
+
+    def counted(*state: Any, **given: Any) -> Any:
+        for step in taken(*state, **given):
+            met.append(step)
+            yield step
+
+    monkeypatch.setattr(replayed, "taken", counted)
+    monkeypatch.setattr(replayed, "MOST_REPLAYED", 200)
+    found = {v.check: v for v in checks.judge(scene, run)}["replay"]
+    assert found.passed is None
+    assert "not replayed" in found.why
+    assert len(met) <= 3 * 201
+
+
+def test_what_a_step_before_may_be_off_is_tried_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=4, tolerance=1e-3)
+    run = springcheck.simulate(scene, LABEL)
+    before: list[float] = []
+
+    def seen(*state: Any, **given: Any) -> Any:
+        before.append(given["before"])
+        return taken(*state, **given)
+
+    monkeypatch.setattr(replayed, "taken", seen)
+    checks.judge(scene, run)
+    first, *others = before
+    assert first == 0
+    assert len(others) == 3 * 3
+    for right, more, less in zip(*(others[i::3] for i in range(3)), strict=True):
+        assert less < right < more

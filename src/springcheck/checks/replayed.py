@@ -7,6 +7,7 @@ length h ends, E' - E = (h**2/8) sum (F'**2 - F**2)/m of linear forces, exactly:
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -38,38 +39,48 @@ class _Replayed(NamedTuple):
     shortest: Extended
 
 
-def _follow(case: Case) -> _Replayed | None:
-    """None where the steps are too many."""
+def _follow(case: Case) -> _Replayed | str:
+    """Or the reason why the steps are not replayed."""
     run, system, m = case.trajectory, case.system, case.judged.m.astype(np.longdouble)
     if run.force_calls > MOST_REPLAYED:
-        return None
+        return TOO_MANY
+    if case.steps[0] != 0:
+        return "the length of the step before its first frame is not recorded"
     state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
+    left = MOST_REPLAYED
     rows: list[tuple[Any, ...]] = []
     for i in range(len(run.t) - 1):
         first = tuple(x[i].astype(np.longdouble) for x in (run.q, run.p))
         times = float(case.steps[i] * run.step), float(case.steps[i + 1] * run.step)
 
         def stretch(
-            before: float, at: tuple[Extended, Extended] = first, times: Times = times
+            before: float, at: tuple[Extended, Extended] = first, times: Times = times, most: int = left + 1
         ) -> list[Taken]:
             allow = allowed(case.scene)
-            return list(taken(case.scheme, case.judged, at, before=before, times=times, tolerance=allow))
+            steps = taken(case.scheme, case.judged, at, before=before, times=times, tolerance=allow)
+            return list(islice(steps, most))
 
         steps = stretch(before)
-        if sum(len(row[0]) for row in rows) > MOST_REPLAYED * len(m) or not steps:
-            return None
+        # the rule jumps where it holds a step: either side may leave it
+        sides = (before + unsure, before - unsure) if unsure else ()
+        others = [stretch(side) for side in sides if side > 0]
+        if not steps:
+            return "two of its frames lie at one time"
+        if max(map(len, (steps, *others))) > left:
+            return TOO_MANY
+        left -= len(steps)
         end, of_q, of_p = steps[-1].end, *_rounded(case, steps, before)
         # the time is a sum of lengths, each rounded: what is left of it is the last step, and the next one
         # follows from that
         off = len(steps) * state * abs(np.longdouble(times[1]))
         late = off * np.abs(end[1] / m), off * np.abs(system.force(*end))
         gain, loose, last = _gain(case, steps), np.longdouble(0), abs(steps[-1].h)
-        if unsure:
-            other = stretch(before + unsure)
-            late = tuple(x + 2 * np.abs(y - z) for x, y, z in zip(late, other[-1].end, end, strict=True))
-            loose = 2 * np.abs(_gain(case, other) - gain)
+        if others:
+            apart = [np.max([np.abs(x[-1].end[i] - end[i]) for x in others], axis=0) for i in range(2)]
+            late = late[0] + 2 * apart[0], late[1] + 2 * apart[1]
+            loose = 2 * np.max([np.abs(_gain(case, x) - gain) for x in others])
             # a step that is left over differs by all that the steps before it do
-            off += 2 * abs(abs(other[-1].h) - last)
+            off += 2 * max(abs(abs(x[-1].h) - last) for x in others)
         before, unsure = last, float(off)
         shortest = min(abs(step.h) for step in steps)
         rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, (len(steps), shortest))))
@@ -111,15 +122,15 @@ def _roundings(case: Case) -> int:
     return schemes.roundings(schemes.scheme(case.scheme.steps_of))
 
 
-TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed; the tolerance is judged"
+TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed"
 
 
 def steps(case: Case) -> Finding | str:
     """How far the frames are from where the steps of the rule lead, in roundings."""
     with np.errstate(all="ignore"):
         found = case.once(_follow)
-        if found is None:
-            return TOO_MANY
+        if isinstance(found, str):
+            return found
         run, number = case.trajectory, _roundings(case)
         ratios, still = [], []
         for at, end, one, late in zip((run.q, run.p), found.ends, found.bounds, found.late, strict=True):
@@ -145,11 +156,18 @@ def gain(case: Case) -> Finding | str:
     """How far the change of the energy is from the sum over the steps of the rule, over the energy."""
     with np.errstate(all="ignore"):
         found = case.once(_follow)
-        if found is None:
-            return TOO_MANY
+        if isinstance(found, str):
+            return found
         run, number = case.trajectory, _roundings(case)
         q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
         energy = case.judged.system.energy(q, p).astype(np.longdouble)
+        size = energy[0]
+        if not size > 0:
+            # hilltops and weights: what moves has either part of it somewhere
+            moves = np.sum(p * p / 2 / case.judged.m, axis=1)
+            size = np.max(moves + np.abs(energy - moves))
+        if size == 0:
+            return "nothing moves"
         force = case.system.force(q, p)
         of_q, of_p = (number * one + late for one, late in zip(found.bounds, found.late, strict=True))
         each = (
@@ -168,12 +186,13 @@ def gain(case: Case) -> Finding | str:
             told = (
                 f"; a step of {np.min(found.shortest):.1e} leaves a velocity rebuilt from positions no digit"
             )
-    periods = abs(float(run.t[-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
-    grown, said = (float(x / energy[0] / periods) for x in (energy[-1] - energy[0], law[-1]))
+    turns = abs(float(run.t[-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
+    span = "a period of the fastest mode" if turns > 0 else "the run"
+    grown, said = (float(x / size / (turns or 1)) for x in (energy[-1] - energy[0], law[-1]))
     return Finding(
-        off[worst] / energy[0],
-        bound[worst] / energy[0],
+        off[worst] / size,
+        bound[worst] / size,
         "of the energy",
-        f"(h**2/8) (F'**2 - F**2)/m at each step; a period of the fastest mode adds {grown:.6g} of the "
+        f"(h**2/8) (F'**2 - F**2)/m at each step; {span} adds {grown:.6g} of the "
         f"energy, by the sum over the steps {said:.6g}{told}",
     )

@@ -46,6 +46,9 @@ def taken(
         push = np.sqrt(np.sum((force / scene.m) ** 2) / (3 * scene.particles))
         h, left = scheme.rule(float(push), before, tolerance), end - clock
         last = not h < left
+        if not last and clock + h == clock:
+            # the motion escapes in finite time, and no step ends there
+            return
         before = left if last else h
         clock += before
         after = replace(law, h=sign * before).step(*state)

@@ -6,16 +6,41 @@ import numpy as np
 import openmm as mm
 
 from springcheck.engines import bonds
-from springcheck.engines.contract import Label, Method
+from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.engines.openmm.rounding import arithmetic
 from springcheck.engines.openmm.simulation import _Context
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.schemes.variable import allowed
+from springcheck.physics.terms import Quartic
+from springcheck.schemes import SCHEMES
+from springcheck.schemes.variable import allowed, taken
 
 MOST_STEPS = 1e8
 """A minute of one particle."""
+
+MOST_TRIED, ESCAPED = 10_000, 30
+"""Steps that are tried where a motion may escape, two seconds; amplitudes beyond which it has: of a well
+within a negative quartic potential it reaches sqrt(2) at most."""
+
+
+def _stays(scene: Scene, label: Label, step: float) -> None:
+    """MethodError where a motion reaches infinity within the run, or may: OpenMM's steps grow shorter there
+    without end.  No other potential falls faster than a parabola."""
+    if not any(isinstance(term, Quartic) and np.any(term.b < 0) for term in scene.terms):
+        return
+    farthest, start = ESCAPED * float(np.max(scene.system.amplitudes[0])), (scene.q, scene.p)
+    tried = taken(
+        SCHEMES["variable-verlet"], scene, start, before=0.0, times=(0.0, step * scene.steps),
+        tolerance=allowed(scene),
+    )  # fmt: skip
+    with np.errstate(all="ignore"):
+        for number, one in enumerate(tried):
+            if not np.all(np.abs(one.end[0] - scene.q) <= farthest) or number >= MOST_TRIED:
+                raise MethodError(
+                    f"{label}: its steps have no end where a motion escapes to infinity, as it does here or "
+                    f"may after {number} steps; --set time.steps asks for a shorter run"
+                )
 
 
 class Variable(_Context):
@@ -33,22 +58,35 @@ class Variable(_Context):
                 f"{label}: a tolerance of {scene.tolerance:g} takes some {steps:.0e} steps, and at most "
                 f"{MOST_STEPS:.0e} are taken; --set time.tolerance=1e-6 asks for fewer"
             )
+        if not allowed(scene) > 0:
+            raise MethodError(
+                f"{label}: its tolerance is a part of the amplitude, and the energy of the start is 0; "
+                "start it away from rest"
+            )
+        _stays(scene, label, step)
         super().__init__(scene, method, label, step)
         # the mean is over all particles, anchors among them
         count = self._context.getSystem().getNumParticles()
         self._integrator.setErrorTolerance(allowed(scene) * np.sqrt(scene.particles / count))
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
-        halves = np.zeros((len(q), 1))
-        for row in range(len(q)):
-            self._done += every
-            self._integrator.stepTo(self._done * abs(self._step))
-            halves[row] = self._integrator.getStepSize()._value / 2
-            state = self._context.getState(positions=True, velocities=True)
-            state._getVectorAsNumpy(mm.State.Positions, self._x)
-            state._getVectorAsNumpy(mm.State.Velocities, self._v)
-            q[row], p[row] = (x.reshape(-1)[self._where] for x in (self._x, self._v))
-            self.off_axis = max(self.off_axis, bonds.off_axis(self._x, self._elsewhere))
-        self._synchronise(every, q, p)
-        p += np.copysign(halves, self._step) * self._force(0.0, q, p)
-        self.force_calls = self._context.getStepCount()
+        halves, row = np.zeros((len(q), 1)), 0
+        try:
+            while row < len(q):
+                self._integrator.stepTo((self._done + every) * abs(self._step))
+                halves[row] = self._integrator.getStepSize()._value / 2
+                state = self._context.getState(positions=True, velocities=True)
+                state._getVectorAsNumpy(mm.State.Positions, self._x)
+                state._getVectorAsNumpy(mm.State.Velocities, self._v)
+                q[row], p[row] = (x.reshape(-1)[self._where] for x in (self._x, self._v))
+                self.off_axis = max(self.off_axis, bonds.off_axis(self._x, self._elsewhere))
+                self._done += every
+                row += 1
+        except mm.OpenMMException as error:
+            raise Stopped(row, str(error)) from error
+        finally:
+            q, p = q[:row], p[:row]
+            self._synchronise(every, q, p)
+            with np.errstate(over="ignore", invalid="ignore"):
+                p += np.copysign(halves[:row], self._step) * self._force(0.0, q, p)
+            self.force_calls = self._context.getStepCount()
