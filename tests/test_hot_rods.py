@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, driver, engines
+from springcheck.checks.rods import rod_velocity
 from springcheck.cli import main
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -202,3 +203,24 @@ def test_a_fault_is_rejected_at_another_step_and_other_masses(fault: Fault) -> N
     scene = replace(right.derived(m=right.m * factors, p=right.p * factors), step=0.6 * right.step, steps=60)
     failed = {v.check for v in checks.judge(scene, fault.run(scene)) if v.passed is False}
     assert failed >= set(fault.caught_by)
+
+
+@pytest.mark.parametrize(("steps", "every"), [(1, 1), (400, 100)])
+def test_frames_that_tell_no_draw_leave_the_lengths_to_judge_and_no_velocity_along_a_rod(
+    steps: int, every: int
+) -> None:
+    scene = replace(load_scene("bath-dumbbell"), steps=steps, every=every)
+    run = driver.run(scene, "own:lammps-langevin", seed=11)
+    found = {v.check: v for v in checks.judge(scene, run)}
+    assert found["rod-length"].passed is True
+    assert found["rod-velocity"].passed is None
+    assert "further apart than a step, or fewer than five" in found["rod-velocity"].why
+    longer = replace(run, q=run.q * (1 + 1e-9 * (np.arange(len(run.q)) > 0)[:, None]), energy=None)
+    assert {v.check: v for v in checks.judge(scene, longer)}["rod-length"].passed is False
+
+
+def test_where_no_rounding_is_known_nothing_is_said_of_velocities_along_rods() -> None:
+    scene = replace(load_scene("dumbbell"), steps=8)
+    case = checks.Case(scene=scene, trajectory=driver.run(scene, "own:velocity-verlet"))
+    case.__dict__["allowance"] = tuple(np.full_like(x, np.inf) for x in case.allowance)
+    assert rod_velocity(case).passed is None

@@ -145,6 +145,22 @@ def test_a_speed_that_is_not_kept_is_told_beside_an_angle_that_is_right() -> Non
     assert "changes the speed by 1.0e-12" in found["gyration"].why
 
 
+def test_a_field_of_strength_0_and_a_velocity_out_of_none_are_judged() -> None:
+    scene = replace(scenes.load_scene("magnetic"), steps=10, quantities=("q", "p"))
+    field = scene.terms[-1]
+    assert isinstance(field, Magnetic)
+    none = replace(scene, terms=(*scene.terms[:-1], replace(field, strength=0 * field.strength)))
+    found = {v.check: v for v in checks.judge(none, springcheck.simulate(none, "own:boris"))}
+    assert found["gyration"].passed is True
+    assert found["gyration"].sees.step is None
+    rest = replace(scene, q=0 * scene.q, p=0 * scene.p)
+    run = springcheck.simulate(rest, "own:boris")
+    run = replace(run, p=np.where(np.arange(11)[:, None] < 4, 0, [1e-3, 2e-3]), energy=None)
+    found = {v.check: v for v in checks.judge(rest, run)}
+    assert found["gyration"].passed is False
+    assert "step 4 makes a velocity out of none" in found["gyration"].why
+
+
 def test_where_no_stage_turns_by_the_field_the_turn_is_not_judged() -> None:
     scene = replace(scenes.load_scene("magnetic"), steps=20)
     for label, every in (("own:rk4", 1), ("own:boris", 2)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -10,13 +11,14 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import engines
+from springcheck import driver, engines
 from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import ModulatedSpring
-from springcheck.studies.stability import multipliers
+from springcheck.physics.trajectory import Outcome
+from springcheck.studies.stability import measure, multipliers
 
 ORDERS = 60
 """Of Hill's series to both sides: the terms fall like (r/4 n**2)**n."""
@@ -163,3 +165,49 @@ def test_a_modulation_that_is_a_little_too_deep_has_another_multiplier(size: flo
 
 def test_scenes_without_a_modulation_have_no_multipliers() -> None:
     assert not multipliers.serves(scenefile.load_scene("driven-spring"), engines.parse("own:euler"))
+
+
+@pytest.mark.parametrize("label", ["own:euler", "own:implicit-euler"])
+def test_a_multiplier_beyond_doubles_is_left_out_with_its_reason(label: str, tmp_path: Path) -> None:
+    """4096 steps of h w = 0.77 grow, or shrink, by more than doubles can hold."""
+    term = ModulatedSpring(i=np.array([0]), k=1.0, depth=0.3, frequency=0.002, phase=0.4, at=0.0)
+    slow = Scene(m=[1.0], q=[0.3], p=[0.7], terms=(term,), step=0.1, steps=10, name="slow")
+    found = springcheck.stability(slow, [label], path=tmp_path / "slow.h5")
+    assert found.status == 0
+    assert found.multipliers == ()
+    (left,) = found.left_out
+    assert left.method == label
+    assert "beyond what doubles can invert" in left.reason
+    assert left.reason in " ".join(str(found).split())
+    again = measure.stored(tmp_path / "slow.h5")
+    assert (again.left_out, again.multipliers) == (found.left_out, ())
+
+
+def test_an_engine_that_is_lost_fails_only_where_its_scheme_does_not_grow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As one in single precision is, 1e38 from where it began."""
+    play = driver.run
+
+    def lost(*given: Any) -> Any:
+        return replace(play(*given), outcome=Outcome(status="diverged", step=0, message="not finite"))
+
+    monkeypatch.setattr(driver, "run", lost)
+    term = ModulatedSpring(i=np.array([0]), k=2.9, depth=0.3, frequency=0.004, phase=0.4, at=0.0)
+    grows = replace(scenefile.load_scene("mathieu-stable"), terms=(term,))
+    found = multipliers.measure(grows, engines.parse("own:euler"))
+    assert "its run diverged as its scheme grows: not finite" in found.why
+    stays = multipliers.measure(scenefile.load_scene("mathieu-stable"), engines.parse("own:velocity-verlet"))
+    assert not stays.why
+    assert not stays.off <= stays.bound
+
+
+def test_a_place_of_rest_far_from_0_rounds_what_is_displaced_from_it() -> None:
+    scene = scenefile.load_scene("mathieu-stable")
+    term = scene.terms[0]
+    assert isinstance(term, ModulatedSpring)
+    label = engines.parse("own:velocity-verlet")
+    near = multipliers.measure(scene, label)
+    far = multipliers.measure(replace(scene, terms=(replace(term, at=np.array([1e6])),)), label)
+    assert near.bound < far.off <= far.bound
+    assert far.bound == pytest.approx(near.bound * (1 + 1e6), rel=1e-6)

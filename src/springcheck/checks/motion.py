@@ -329,17 +329,24 @@ def gyration(case: Case) -> Finding | str:
     with np.errstate(all="ignore"):
         off, unit = np.abs(after - before * (1 - 1j * half) / (1 + 1j * half)), of_p[:, a] + of_p[:, b]
         seen, limit = off / unit, case.roundings * unit / np.abs(before)
+        ratio, right = after / before, 2 * np.arctan(half)
+        # a step longer by x turns by sin(2 atan(h W/2)) x more, where there is a field
+        felt = np.sin(right) != 0
+        longer = np.min(limit[:, felt] / np.abs(np.sin(right[felt])), initial=np.inf)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
     if seen[worst] <= case.roundings and not np.any(limit < 1):
         return "rounding may be as large as the velocity"
-    ratio, right = after[worst] / before[worst], 2 * np.arctan(half[worst[1]])
+    by, right = ratio[worst], right[worst[1]]
+    did = (
+        f"turns by {-np.angle(by):.9g}, off by {-np.angle(by) - right:.1e} from 2 atan(h W/2), where h W is "
+        f"{2 * half[worst[1]]:.9g}, and changes the speed by {np.abs(by) - 1:.1e} of it"
+        if before[worst]
+        else "makes a velocity out of none"
+    )
     return Finding(
         seen[worst],
         case.roundings,
         "roundings",
-        f"roundings along one step of {scheme.title}; step {int(case.steps[worst[0] + 1])} turns by "
-        f"{-np.angle(ratio):.9g}, off by {-np.angle(ratio) - right:.1e} from 2 atan(h W/2), where h W is "
-        f"{2 * half[worst[1]]:.9g}, and changes the speed by {np.abs(ratio) - 1:.1e} of it",
-        # a step longer by x turns by sin(2 atan(h W/2)) x more
-        Limits(step=float(np.min(limit / np.abs(np.sin(2 * np.arctan(half)))))),
+        f"roundings along one step of {scheme.title}; step {int(case.steps[worst[0] + 1])} {did}",
+        Limits(step=None if np.isinf(longer) else float(longer)),
     )

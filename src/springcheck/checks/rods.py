@@ -7,31 +7,21 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
-from springcheck.checks.requires import MAP
-from springcheck.checks.thermal import reading
-from springcheck.physics.arrays import Extended
+from springcheck.checks.requires import MAP, missing
+from springcheck.checks.thermal import reading, thermostat
 from springcheck.physics.exact.well import PI
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import PROJECT
+from springcheck.thermal.draws import roundings_of
 
 
 def _rods(case: Case) -> Rods:
     found = case.system.rods
     assert found is not None
     return found
-
-
-def _allowed(case: Case) -> tuple[int, Extended]:
-    """Roundings along a step, and one rounding of the momenta that it leads to (f-1, n); of the frames of a
-    thermostat the last, whose draws they tell."""
-    if not case.law.has("random"):
-        return case.roundings, case.allowance[1]
-    found = reading(case)
-    assert found.allowed is not None
-    return found.roundings, found.allowed[1]
 
 
 HELD_RIGID = frozenset({"named", "two-frames", "rods"})
@@ -43,7 +33,8 @@ def rod_length(case: Case) -> Finding:
     """Every rod has its length at every frame, to rounding or to the tolerance that its engine declares."""
     rods, how = _rods(case), case.trajectory.arithmetic
     q = case.trajectory.q[1:].astype(np.longdouble)
-    roundings, _ = _allowed(case)
+    heated = case.law.has("random")
+    roundings = roundings_of(thermostat(case), case.judged) if heated else case.roundings
     with np.errstate(all="ignore"):
         off = np.abs(rods.strain(q))
         bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
@@ -64,13 +55,23 @@ def rod_velocity(case: Case) -> Finding | str:
     rods, bath = _rods(case), THERMOSTATS.get(case.trajectory.scheme)
     if bath and bath.held and bath.held[-1] != PROJECT:
         return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
-    roundings, of_p = _allowed(case)
+    if case.law.has("random"):
+        # what a step adds up depends on its draws, which frames further apart do not tell
+        if why := missing(case, {"every-step"}):
+            return why
+        found = reading(case)
+        assert found.allowed is not None
+        roundings, of_p = found.roundings, found.allowed[1]
+    else:
+        roundings, of_p = case.roundings, case.allowance[1]
     q, p = (x[-len(of_p) :].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
     with np.errstate(all="ignore"):
         r, m = rods.ways(q), case.judged.m
         off = np.abs(rods.dot(r, rods.apart(p / m)))
         unit = rods.sum_of_sizes(r, of_p / m)
         # where a step has no solution nothing is known of its momenta
+        if not np.any(np.isfinite(unit)):
+            return "no step has a solution whose rounding is known"
         seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
     worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"

@@ -14,7 +14,7 @@ from springcheck.checks.check import Chance, Finding, check
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
-from springcheck.thermal import THERMOSTATS, chance, rigid
+from springcheck.thermal import THERMOSTATS, Thermostat, chance, rigid
 from springcheck.thermal.draws import SMALLEST, Reading, law_of, read
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
@@ -27,11 +27,16 @@ def reading(case: Case) -> Reading:
     return case.once(_reading)
 
 
-def _reading(case: Case) -> Reading:
-    run = case.trajectory
-    scheme = THERMOSTATS[run.scheme]
+def thermostat(case: Case) -> Thermostat:
+    """Its scheme.  MethodError: of one that nobody knows how it holds rods."""
+    scheme = THERMOSTATS[case.trajectory.scheme]
     if case.judged.system.rods and not scheme.held:
         raise MethodError(f"no stages of {scheme.title} with rods are known")
+    return scheme
+
+
+def _reading(case: Case) -> Reading:
+    run, scheme = case.trajectory, thermostat(case)
     # where a draw acts in two steps, that of the start is not in the record
     skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
     q, p = run.q[skipped:], run.p[skipped:]

@@ -24,7 +24,7 @@ from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import sorted_out
+from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import costs, limits, multipliers, propagators, regions, resonance
 from springcheck.studies.stability.longest import fastest
@@ -87,8 +87,8 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         regions=tuple(of_regions),
         resonances=tuple(of_resonances),
         costs=tuple(row for rows in of_costs for row in rows),
-        multipliers=tuple(of_multipliers),
-        left_out=tuple(left_out),
+        multipliers=tuple(x for x in of_multipliers if not x.why),
+        left_out=(*left_out, *(LeftOut(method=x.method, reason=x.why) for x in of_multipliers if x.why)),
         resumed=kept.resumed,
         path=kept.path,
     )

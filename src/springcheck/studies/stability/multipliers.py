@@ -20,6 +20,12 @@ from springcheck.physics.scene import Scene
 MOST_STEPS = 4096
 """In a period: of a scene whose step is shorter the multipliers of that many are measured."""
 
+INVERTIBLE = 2.0**500
+"""Size of a matrix up to which, and down to its inverse, all products of two elements are doubles."""
+
+LOST = 2.0**60
+"""Size of states from which on an engine in single precision may overflow: their squares do."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Multiplier:
@@ -29,15 +35,19 @@ class Multiplier:
     steps: int
     """In a period of the modulation."""
     grown: float
-    """Measured: two starts, a period each."""
+    """Factor of a period, measured: two starts, a period each."""
     turned: float
+    """Angle of a period [rad], from 0 to pi, measured by the same; NaN, as all, where nothing was."""
     grown_predicted: float
     """By the scheme's own steps."""
     turned_predicted: float
     off: float
     """Distance of both in the complex plane."""
     bound: float
-    """Roundings of each step, carried to the end of the period, by the condition of the eigenvectors."""
+    """Roundings of each step, carried to the end of the period, by the condition of the eigenvectors: of a
+    state of size 1 + |place of rest|, as each is rounded with its distance from 0."""
+    why: str = ""
+    """Why nothing was measured."""
 
 
 def serves(scene: Scene, label: Label) -> bool:
@@ -47,7 +57,8 @@ def serves(scene: Scene, label: Label) -> bool:
 
 
 def measure(scene: Scene, label: Label) -> Multiplier:
-    """Run a period from two starts, in whole steps that come nearest to that of the scene."""
+    """Run a period from two starts, in at most `MOST_STEPS` whole steps that come nearest to that of the
+    scene."""
     found = floquet(scene.system)
     assert found is not None
     _, period, _ = found
@@ -55,17 +66,29 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     scene = replace(scene, step=np.copysign(period / steps, scene.step), steps=steps, every=steps)
     rest, size = float(_spring(scene).at[0]), float(scene.m[0] * 2 * np.pi / period)
     starts = [(rest + 1, 0.0), (rest, size)]
-    runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
-    complete = all(run.outcome.status == "complete" for run in runs)
-    ends = np.array([[run.q[-1, 0] - rest, run.p[-1, 0] / size] for run in runs]).T
     right = _powers(scene, label, starts, rest, size)
+    largest_seen = np.max(np.abs(right), axis=(1, 2))
+    if not np.all((largest_seen <= INVERTIBLE) & (largest_seen >= 1 / INVERTIBLE)):
+        return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
+    try:
+        # a rounding of the state after each step, carried on to the end
+        carried = [
+            np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right
+        ]
+    except np.linalg.LinAlgError:
+        return _unknown(label, steps, "doubles cannot invert the products of its scheme's steps")
+    runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
+    lost = next((run.outcome for run in runs if run.outcome.status != "complete"), None)
+    if lost and np.max(largest_seen) > LOST:
+        return _unknown(label, steps, f"its run {lost.status} as its scheme grows: {lost.message}")
+    ends = np.array([[run.q[-1, 0] - rest, run.p[-1, 0] / size] for run in runs]).T
     values, vectors = np.linalg.eig(right[-1])
-    own, largest = _largest(values), _largest(np.linalg.eigvals(ends)) if complete else complex(np.nan)
-    # a rounding of the state after each step, carried on to the end
-    carried = [np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right]
+    own, largest = _largest(values), complex(np.nan) if lost else _largest(np.linalg.eigvals(ends))
     law, method = schemes.Law(scheme=_scheme(label), scene=scene, h=scene.step), engines.method(label)
     # a velocity rebuilt from positions has the rounding of these over the step
     each = law.roundings * (1 + steps / (2 * np.pi) * method.rebuilds_velocity)
+    # each position is rounded as it is, beside a displacement of 1 from the place of rest
+    each *= 1 + abs(rest)
     allowed = engines.arithmetic(label).state * each * float(np.sum(carried)) * float(np.linalg.cond(vectors))
     return Multiplier(
         method=str(label),
@@ -103,7 +126,15 @@ def _powers(
         np.array([[one[i], clock] for one in starts], np.longdouble) for i, clock in enumerate((0.0, CLOCK))
     )
     out = []
-    for _ in range(scene.steps):
-        q, p = law.step(q, p)
-        out.append([q[:, 0] - rest, p[:, 0] / size])
-    return np.array(out, np.float64)
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        for _ in range(scene.steps):
+            q, p = law.step(q, p)
+            out.append([q[:, 0] - rest, p[:, 0] / size])
+        return np.array(out, np.float64)
+
+
+def _unknown(label: Label, steps: int, why: str) -> Multiplier:
+    none = dict.fromkeys(("grown", "turned", "grown_predicted", "turned_predicted", "off", "bound"), np.nan)
+    return Multiplier(
+        method=str(label), steps=steps, why=f"its Floquet multiplier is not measured: {why}", **none
+    )
