@@ -17,11 +17,11 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1375,
     ("engines",): 2619,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4791,
+    ("checks",): 4804,
     ("identify",): 8185,
     ("formats", "store"): 5149,
     ("studies",): 1615,
-    ("studies/*",): 11138,
+    ("studies/*",): 11163,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6837,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
