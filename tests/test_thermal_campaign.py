@@ -26,6 +26,7 @@ WRONG_BEFORE = {
     154: ("andersen-leapfrog", "coupled"), 185: ("andersen-leapfrog", "whole"), 292: ("gj-vii", "coupled"),
     596: ("gj-i", "coupled"), 597: ("gj-ii", "coupled"), 1031: ("gj-ii", "text"),
     60041: ("gj-iii", "strided"), 60056: ("bbk", "strided"),
+    60881: ("gj-iii-half", "single"), 70073: ("lammps-langevin", "coupled"),
 }  # fmt: skip
 """Cases that had a wrong name, a list without the right one or no end, with their schemes and kinds."""
 
@@ -35,7 +36,7 @@ def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
     scheme, kind, (t, q, p, scene) = campaign.file_of(case, *WRONG_BEFORE[case])
     found = campaign.of_bath(t, q, p, None, scene.m)
     assert found is None or found.scheme in (None, scheme), kind
-    if kind != "coupled":
+    if kind != "coupled" or case > 60000:
         assert found is not None
         assert scheme in [one.scheme for one in found.candidates]
 

@@ -124,7 +124,7 @@ def identify_thermal(
         )
     jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
     if np.std(jump) < 1e-6 * sizes[0]:
-        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0]), mixed))
+        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0]), beside, mixed))
     if collided := tuple(between_collisions(q, v, h)):
         return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
     white = all(map(_is_white, left))
@@ -241,7 +241,11 @@ def _of_one(
             else:
                 # of several particles' collisions each mode has a part
                 names = _of_no_memory(q, v, inf if mixed else close)
-                found = [Candidate(scheme=name) for name in names]
+                found = [
+                    y
+                    for name in names
+                    for y in (likely((name,), q, v, h) if name == "gj-iii-half" else [Candidate(scheme=name)])
+                ]
         elif -b < h and _is_correlated(left):
             roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
             rates = {n: _rate(root, -b / h) for n, root in roots.items()}
@@ -330,13 +334,13 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
     )
     memory = np.linalg.lstsq(known, v[1:], rcond=None)[0][0] / np.sqrt(np.var(left) * inverse[0, 0])
     if abs(memory) > 5:
-        # digits may hide that five steps of leapfrog have one slope
-        return () if close < 1e-6 else ("andersen-leapfrog",)
+        # digits may hide that five steps of leapfrog have one slope, and few frames that a draw is carried on
+        return ("gj-iii-half", *(() if close < 1e-6 else ("andersen-leapfrog",)))
     # a collision in every step leaves what Brownian motion does
     return ("brownian", "andersen-leapfrog")
 
 
-def _of_two_halves(q: Floats, h: float, misfit: float, mixed: bool) -> Thermal | None:
+def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mixed: bool) -> Thermal | None:
     """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
     half = np.diff(q) / h
     known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
@@ -349,7 +353,13 @@ def _of_two_halves(q: Floats, h: float, misfit: float, mixed: bool) -> Thermal |
     # a force that is not linear leaves more than draws
     bent = _follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
     of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
-    uniform, normal = _is_uniform(left / noise), bool(np.max(np.abs(left)) > 2.2 * noise) and not mixed
+    draws = left / noise
+    if beside is not None:
+        # a weak joint to what stands beside, which does not show by itself, is no draw
+        more = np.concatenate([known, beside[1:-1]], axis=1)
+        draws = draws - more @ np.linalg.lstsq(more, draws, rcond=None)[0]
+        draws /= np.std(draws)
+    uniform, normal = _is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
     found = []
     for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
         # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
