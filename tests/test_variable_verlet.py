@@ -15,7 +15,7 @@ from springcheck.checks import replayed
 from springcheck.engines.contract import Label, Stopped
 from springcheck.engines.openmm import ENGINE
 from springcheck.engines.openmm.variable import Variable
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
@@ -153,7 +153,8 @@ def test_a_gain_is_a_part_of_a_size_of_the_energy_where_the_energy_is_negative()
 def test_nothing_that_moves_has_no_gain_and_openmm_takes_no_part_of_no_amplitude() -> None:
     still = replace(saddle(0.0), q=np.zeros(2))
     for scene in (still, saddle(0.0, 1.0)):
-        with pytest.raises(MethodError, match="energy of the start is 0"):
+        # a scene is refused as such where long double is no wider than double
+        with pytest.raises((MethodError, SceneError), match=r"energy of (the|its) start is 0"):
             springcheck.simulate(scene, LABEL)
 
 
