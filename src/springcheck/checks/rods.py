@@ -52,10 +52,10 @@ def rod_length(case: Case) -> Finding:
 @check("along", family="motion", requires=HELD_RIGID)
 def rod_velocity(case: Case) -> Finding | str:
     """The ends of a rod have one velocity along it, to rounding."""
-    rods, bath = _rods(case), THERMOSTATS.get(case.trajectory.scheme)
+    rods, bath, heated = _rods(case), THERMOSTATS.get(case.trajectory.scheme), case.law.has("random")
     if bath and bath.held and bath.held[-1] != PROJECT:
         return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
-    if case.law.has("random"):
+    if heated:
         # what a step adds up depends on its draws, which frames further apart do not tell
         if why := missing(case, {"every-step"}):
             return why
