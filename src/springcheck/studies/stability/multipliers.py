@@ -53,7 +53,7 @@ class Multiplier:
 def serves(scene: Scene, label: Label) -> bool:
     """Whether a method of fixed step takes the scene, one modulated spring whose exact motion is known."""
     one = scene.n == 1 and floquet(scene.system) is not None and not engines.refusal(scene, label)
-    return one and schemes.scheme(engines.method(label).scheme).has("one-step")
+    return one and _scheme(label).has("one-step")
 
 
 def measure(scene: Scene, label: Label) -> Multiplier:
