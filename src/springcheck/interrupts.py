@@ -142,14 +142,17 @@ def _waited_for(child: int, heard: Sequence[int]) -> int:
 
     def forward(number: int, frame: object) -> None:
         _State.seen = True
-        os.kill(child, number)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child, number)
 
     for number in heard:
         signal.signal(number, forward)
     signal.pthread_sigmask(signal.SIG_SETMASK, _State.mask)
     _, raw = os.waitpid(child, 0)
+    # a program that has ended by itself has its exit status, whatever comes while this interpreter shuts down
+    then = signal.SIG_IGN if _State.board[0] else signal.SIG_DFL
     for number in heard:
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, then)
     return os.waitstatus_to_exitcode(raw)
 
 
