@@ -42,6 +42,7 @@ def test_every_document_of_a_command_keeps_to_its_schema(command: str) -> None:
         document = schemas.printed(words + again)
         assert document["schema"] == f"springcheck/{command}/{schemas.SCHEMA}"
         assert schemas.problems(document, schema(command)) == []
+        assert schemas.unlisted(document, schema(command)) == [], "python validation/schemas.py write"
 
 
 def test_every_command_that_prints_a_document_has_a_schema() -> None:
@@ -57,11 +58,13 @@ def test_every_command_that_prints_a_document_has_a_schema() -> None:
 @pytest.mark.parametrize("command", ["judge", "identify"])
 def test_a_document_that_does_not_keep_to_its_schema_is_seen(command: str) -> None:
     document = schemas.printed(next(words for words in schemas.WAYS[command] if "run.h5" not in words))
+    assert schemas.unlisted(document, schema(command)) == [], "python validation/schemas.py write"
     del document["schema"]
     assert schemas.problems({**document, "not_trusted": 3}, schema(command)) == [
         ".schema is missing",
         ".not_trusted is number, not array",
     ]
+    assert schemas.unlisted({**document, "more": 3}, schema(command)) == [".more is not in the schema"]
 
 
 def test_the_schema_of_scene_files_is_what_reads_them() -> None:
