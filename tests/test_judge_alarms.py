@@ -4,6 +4,8 @@ recorded states, motion near an instability, and numbers at both ends of double'
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import pytest
 import springcheck
 from springcheck import checks, schemes
 from springcheck.physics import exact
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
@@ -78,6 +80,38 @@ WELLS: dict[str, tuple[Term, ...]] = {
     "off centre": (Quartic(i=np.array([0]), b=np.array([2.3]), at=np.array([0.7])), wall(1.1, 0.2)),
     "pendulum": (Cosine(i=np.array([0]), depth=np.array([2.3]), wave=np.array([1.7]), at=np.array([0.3])),),
 }
+
+
+@pytest.mark.parametrize("name", ["implicit-euler", "velocity-verlet"])
+def test_an_engine_that_counts_displacements_from_the_start_says_so(name: str) -> None:
+    """Total Lagrangian finite elements: F(q0) - K u.  What has decayed keeps the digits of the start."""
+    k, h, steps = (1.7e4, 0.3, 12) if name == "implicit-euler" else (1.7, 0.1, 200)
+    scene = one(wall(k), step=h, steps=steps)
+    (q0,), (m,) = scene.q, scene.m
+
+    def step(i: int, q: Floats, p: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+        u, v = kept
+        if name == "implicit-euler":
+            v = (v + h * (-k * q0 - k * share * u) / m) / (1 + h * h * k * share / m)
+            u = u + h * v
+        else:
+            half = v + h / 2 * (-k * q0 - k * share * u) / m
+            u = u + h * half
+            v = half + h / 2 * (-k * q0 - k * share * u) / m
+        kept[:] = u, v
+        return q0 + u, m * v
+
+    def judged(**changes: Any) -> list[str]:
+        kept[:] = 0 * scene.q, scene.p / m
+        run = steppers.record(scene, schemes.scheme(name), partial(step, **changes))
+        return alarms(checks.judge(scene, replace(run, arithmetic=how)))
+
+    kept = [0 * scene.q, scene.p / m]
+    how = Arithmetic()
+    assert ("step-defect" in str(judged())) is (name == "implicit-euler")
+    how = Arithmetic(from_start=True)
+    assert judged() == []
+    assert judged(share=1 + 1e-11) != []
 
 
 @pytest.mark.parametrize("name", FIXED)

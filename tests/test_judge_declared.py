@@ -103,6 +103,7 @@ DECLARED: dict[str, dict[str, Any]] = {
     "lengths": {"arithmetic": Arithmetic(lengths=1e-8)},
     "cancels": {"arithmetic": Arithmetic(cancels=2)},
     "keeps_displacement": {"arithmetic": Arithmetic(keeps_displacement=True), "rebuilds_velocity": True},
+    "from_start": {"arithmetic": Arithmetic(from_start=True)},
     "rebuilds_velocity": {"rebuilds_velocity": True},
     "off_axis": {"off_axis": 1e-9},
 }

@@ -81,15 +81,16 @@ class Claim:
     @cached_property
     def origins(self) -> Floats:
         """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
-        have their rest lengths, or from the nearest place to which a term of its own ties a particle; and
-        from a border of the box."""
+        have their rest lengths, or from the nearest place to which a term of its own ties a particle; from
+        the start, where it says so; and from a border of the box."""
         rest = self.system.rest_positions
         zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
         for term in self.judged.terms:
             if term.bodies == 1 and term.origin:
                 np.minimum.at(sites, term.particles[0], np.abs(term.elongation(zero)))
         tied = np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
-        return tied + self.scene.periods
+        start = np.abs(self.scene.q) if self.trajectory.arithmetic.from_start else 0.0
+        return np.asarray(np.maximum(tied, start) + self.scene.periods)
 
     @property
     def roundings(self) -> int:

@@ -104,9 +104,14 @@ def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: floa
     if how.force > how.state:
         more = more + whole * how.force / np.longdouble(how.state)
 
+    far = case.scene.periods
+    if how.from_start:
+        # of the force at the start, and of what the displacement from it changes
+        far = far + np.abs(case.scene.q)
+
     def force(q: Reals, p: Reals) -> Reals:
         # the nearest image is the difference of positions that lie in the box
-        sizes = plain(q + case.scene.periods, p)
+        sizes = plain(q + far, p)
         bound = sizes * more
         if how.quantum:
             # each term's force on a particle is cut off once in a kick, not once for every rounding, and a

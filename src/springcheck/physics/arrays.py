@@ -71,6 +71,8 @@ class Arithmetic:
     of what comes of 1 - c, where c itself is rounded."""
     keeps_displacement: bool = False
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
+    from_start: bool = False
+    """Positions are kept as displacements from the start, as total Lagrangian finite elements do."""
 
     @property
     def unit(self) -> float:
@@ -87,6 +89,7 @@ class Arithmetic:
             "excess": f"every force {self.excess:.2g} too large",
             "stale": f"forces kept within {self.stale:.2g}",
             "lengths": f"lengths of rods kept to {self.lengths:.2g}",
+            "from_start": "positions kept as displacements from the start",
             "cancels": "coefficients of the bath from 1 - exp(-friction h) as a difference",
         }
         plain = Arithmetic()

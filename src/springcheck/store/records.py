@@ -43,6 +43,7 @@ KEPT = {
     "rod_tolerance": "arithmetic.lengths",
     "bath_cancels": "arithmetic.cancels",
     "keeps_displacement": "arithmetic.keeps_displacement",
+    "counts_from_start": "arithmetic.from_start",
     "rebuilds_velocity": "rebuilds_velocity",
     "off_axis": "off_axis",
 }
@@ -85,6 +86,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     rod_tolerance: float = 0.0
     bath_cancels: int = 0
     keeps_displacement: bool = False
+    counts_from_start: bool = False
     rebuilds_velocity: bool = False
     off_axis: float | None = None
 
