@@ -108,6 +108,27 @@ def test_the_draws_that_are_found_are_those_of_the_generator() -> None:
     assert tangential.draws.shape == (scene.steps, 5)
 
 
+@pytest.mark.parametrize(
+    ("name", "seed", "steps"),
+    [("obabo", 1, 150), ("vanden-eijnden-ciccotti", 1, 150), ("baoab", 73, 82), ("baoa", 177, 400)],
+)
+def test_the_draws_of_a_rod_that_turns_far_in_a_step_are_found(name: str, seed: int, steps: int) -> None:
+    """By 0.5 to 1.46 rad: slopes of draws bend, and a change may lead to where no push keeps a length."""
+    scene = replace(load_scene("dumbbell"), steps=steps, bath=Bath(temperature=2.494338785, friction=1.0))
+    run = driver.run(scene, f"own:{name}", seed=seed)
+    r = run.q[:, 2:] - run.q[:, :2]
+    assert np.max(np.abs(r[:-1, 0] * r[1:, 1] - r[:-1, 1] * r[1:, 0])) > np.sin(0.5) * 0.6**2
+    scheme = THERMOSTATS[name]
+    with np.errstate(all="ignore"):
+        found = read(scheme, scene, run.q, run.p)
+    drawn = np.random.Generator(np.random.PCG64(seed)).standard_normal((steps, scheme.draws * scene.n))
+    # what lies along the rod acts nowhere, but in the momenta of LF-middle
+    most = np.sum(drawn**2, axis=1) * (1 + 1e-8)
+    assert found.draws.shape == (steps, drawn.shape[1] - (0 if name == "baoa" else scheme.draws))
+    assert np.all(np.sum(found.draws**2, axis=1) <= most)
+    assert [v for v in checks.judge(scene, run) if v.passed is False] == []
+
+
 def temperature(name: str, n: int = 20000, steps: int = 40) -> tuple[float, float]:
     """Of free dumbbells side by side by one scheme over that of the bath, and its standard error: the turn of
     a step is 0.15 at the thermal speed, where terms of second order would make 2e-2."""

@@ -22,14 +22,17 @@ from springcheck.thermal.draws import Reading, one_rounding, roundings_of
 from springcheck.thermal.stepper import Met, Stepper, forces
 
 SMALL_DRAW = 1e-4
-"""By which a draw is changed to see what it does: a step bends by less than that part of it."""
+"""By which a draw is changed, to both sides, to see what it does: what bends leaves its square, 1e-8."""
 
 UNSEEN_DRAW = 1e-6
 """Singular value over the largest below which a combination of draws does nothing: roundings over such a
 change, also where the reference is no wider than double, make 1e-8."""
 
-MOST_GAUSS_NEWTON = 8
-"""Of which each leaves about `SMALL_DRAW` of what was off."""
+MOST_GAUSS_NEWTON = 10
+"""Of which each leaves about the square of what was off, once that is small: 4 to 9 are needed."""
+
+MOST_HALVINGS = 8
+"""Of a change after which no push along a rod would keep its length: 3 are needed."""
 
 
 def read(
@@ -68,20 +71,28 @@ class _Reader:
         self._start, self._end = (wide[0][:-1], wide[1][:-1]), wide[0][1:]
         target = np.concatenate([x[1:] for x in wide], axis=-1)
         x = np.zeros((len(target), u * n), np.longdouble)
-        of = self._allowed(x)
+        of, now = self._allowed(x), self._at(x)
         for iteration in range(MOST_GAUSS_NEWTON):
-            now = self._at(x)
-            slopes = [(self._at(x + SMALL_DRAW * unit) - now) / SMALL_DRAW for unit in np.eye(u * n)]
+            # to one side, what bends would show as a combination that does something, where none does
+            sides = ((self._at(x + unit), self._at(x - unit)) for unit in SMALL_DRAW * np.eye(u * n))
+            slopes = [(more - less) / (2 * SMALL_DRAW) for more, less in sides]
             J = _finite(np.stack(slopes, axis=-1) / of[..., None])
             inverse = np.linalg.pinv(J, rcond=UNSEEN_DRAW)
             change = (inverse @ _finite((target - now) / of)[..., None])[..., 0]
+            last = np.all(np.isfinite(now), axis=-1)
+            for _ in range(MOST_HALVINGS):
+                now = self._at(x + change)
+                if not np.any(beyond := last & ~np.all(np.isfinite(now), axis=-1)):
+                    break
+                change[beyond] /= 2
             x = x + change
             if iteration == 1:
                 of = self._allowed(x)
-            elif iteration and np.all(np.abs(change) <= 1e-15 * (1 + np.abs(x))):
+            elif iteration and np.all(np.abs(change) <= 1e-9 * (1 + np.abs(x))):
+                # the next would be as much smaller as slopes are known: by 1e-8
                 break
         of = self._allowed(x)
-        left = np.asarray(((target - self._at(x)) / of) ** 2, np.float64)
+        left = np.asarray(((target - now) / of) ** 2, np.float64)
         # of all draws those that were found leave the least, in the mean over the numbers of a state
         across = np.sqrt(np.mean(left, axis=-1, keepdims=True))
         position = J[:, :n]
