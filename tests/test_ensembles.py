@@ -96,6 +96,18 @@ def test_a_cell_that_explodes_leaves_the_others_alone(tmp_path: Path) -> None:
     assert np.all(columns["max_error"][[0, 2]] < 1)
 
 
+def test_a_cell_that_an_engine_gives_up_at_once_has_no_error(tmp_path: Path) -> None:
+    """As such a run of its own has none: that of the start is 0, which says nothing."""
+    cells = vary.plan(["spring.0.stiffness=2,1e308", "particle.0.position=1e3"])
+    scene = scenefile.load_scene("spring-uneven")
+    (tally,) = measure.record(scene, cells, tmp_path / "e.h5", ["own:euler"]).tallies
+    columns = measure.stored(tmp_path / "e.h5").of("own:euler")
+    assert columns["steps"].tolist() == [200, 0]
+    for name in ("max_error", "energy_drift"):
+        assert np.isnan(columns[name]).tolist() == [False, True]
+        assert tally.smallest[name] == columns[name][0]
+
+
 @pytest.mark.skipif(
     bool(np.finfo(np.longdouble).max == np.finfo(np.float64).max), reason="no width holds the squares"
 )

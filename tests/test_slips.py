@@ -182,12 +182,36 @@ def test_closed_streams_lead_nowhere_and_not_into_the_store() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
-@pytest.mark.parametrize("line", ["list", "run spring --method own:euler --json", "check 0.h5", "--version"])
+@pytest.mark.parametrize(
+    "line", ["list", "run spring --method own:euler --json", "check 0.h5", "--version", "--help"]
+)
 def test_a_full_disk_is_one_line(line: str) -> None:
     main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "0.h5"])
     done = program(f"{line} > /dev/full")
     assert done.returncode == 2
     assert done.stderr == "springcheck: No space left on device\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell is needed")
+@pytest.mark.parametrize(
+    ("line", "unbuffered"),
+    [("list", ""), ("list", "1"), ("identify 0.h5", ""), ("--help", ""), ("run nothing", "")],
+)
+def test_what_nobody_reads_any_more_ends_without_a_word_as_by_sigpipe(line: str, unbuffered: str) -> None:
+    """`springcheck identify FILE | head -4` is no mistake: the exit status is a shell's 128 + 13."""
+    if "0.h5" in line:
+        main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "0.h5"])
+    ours, theirs = os.pipe()
+    os.close(ours)
+    home = str(Path(springcheck.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "-m", "springcheck", *line.split()], stdout=theirs,
+        # where a mistake is printed
+        stderr=theirs if "nothing" in line else subprocess.PIPE,
+        env=os.environ | {"PYTHONUNBUFFERED": unbuffered, "PYTHONPATH": home}, check=False,
+    )  # fmt: skip
+    os.close(theirs)
+    assert (done.returncode, done.stderr or b"") == (141, b"")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell is needed")

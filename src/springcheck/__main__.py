@@ -40,10 +40,13 @@ def _main() -> int:
         # an import that was interrupted may raise an error of its own
         if interrupts.seen():
             interrupts.leave()
-        if not isinstance(error, Exception) or os.environ.get("SPRINGCHECK_TRACEBACK"):
+        if isinstance(error, BrokenPipeError):
+            status = interrupts.unread()
+        elif not isinstance(error, Exception) or os.environ.get("SPRINGCHECK_TRACEBACK"):
             raise
-        sys.stderr.write(f"springcheck: {slips.one_line(error)}\n")
-        status = 2
+        else:
+            sys.stderr.write(f"springcheck: {slips.one_line(error)}\n")
+            status = 2
     if interrupts.seen():
         interrupts.leave()
     if any(not one.daemon for one in threading.enumerate() if one is not threading.main_thread()):

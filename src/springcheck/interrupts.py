@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 STATUS = 130
 """Exit status of a program that was interrupted, as shells expect it."""
 
+BROKEN_PIPE = 141
+"""Exit status of a program whose output nobody reads any more: 128 + SIGPIPE, as shells have it."""
+
 GRACE = 1.5
 """Seconds from the signal to the end of the process, whatever it is doing: native code that does not return,
 a library that has swallowed the exception, a terminal that takes no more output."""
@@ -183,6 +186,14 @@ def ends(status: int) -> int:
     if _State.board is not None:
         _State.board[0:2] = bytes((1, status & 0xFF))
     return status
+
+
+def unread() -> int:
+    """Nobody reads the output any more, nor is anything left to say -> `BROKEN_PIPE`."""
+    for stream in (1, 2):
+        # of what stands in a buffer the interpreter's shutdown would say that it cannot be written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    return BROKEN_PIPE
 
 
 def seen() -> bool:

@@ -103,10 +103,12 @@ def _interrupted() -> int:
 
 def _mistake(error: SpringcheckError | OSError) -> int:
     """Say what went wrong in one line; returns the exit status."""
-    if not isinstance(error, BrokenPipeError):
-        # the library names its files; what is left of OSError is our own output, on a full disk for one
-        said = error.strerror if isinstance(error, OSError) else None
-        print(f"springcheck: {said or error}", file=sys.stderr)
+    if isinstance(error, BrokenPipeError):
+        # the program ends without a word
+        raise error
+    # the library names its files; what is left of OSError is our own output, on a full disk for one
+    said = error.strerror if isinstance(error, OSError) else None
+    print(f"springcheck: {said or error}", file=sys.stderr)
     if isinstance(error, OSError):
         # nothing more can be written, by the interpreter's shutdown either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -121,7 +123,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    version = f"springcheck {springcheck.__version__}"
+    parser.add_argument("--version", action="version", version=version, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="name")
 
     every: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
@@ -146,14 +149,6 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         else:
             parser_of.set_defaults(command=one.perform)
     return parser
-
-
-class _Version(argparse.Action):
-    """As argparse has it, but that a disk that is full is a mistake."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        print(f"springcheck {springcheck.__version__}", flush=True)
-        parser.exit()
 
 
 def _study(study: Study, options: argparse.Namespace) -> int:

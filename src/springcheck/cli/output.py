@@ -9,6 +9,7 @@ import sys
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -32,16 +33,14 @@ def show(lines: Sequence[RenderableType]) -> None:
     # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
     # who wants no colours wants none, whatever else is said; Rich would still write bold
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
-    console = Console(highlight=False, width=None if terminal else 1 << 16, color_system=colours)
-    if terminal:
-        for line in lines:
-            console.print(line, crop=False)
-        return
-    with console.capture() as captured:
-        for line in lines:
-            console.print(line, crop=False)
-    # a line that was folded ends in a blank, which a file or a diff need not keep
-    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+    # what Rich writes to a pipe that is closed ends the program with a status of Rich's
+    width, into = (None, None) if terminal else (1 << 16, StringIO())
+    console = Console(highlight=False, width=width, color_system=colours, file=into)
+    for line in lines:
+        console.print(line, crop=False)
+    if into is not None:
+        # a line that was folded ends in a blank, which a file or a diff need not keep
+        print("\n".join(line.rstrip() for line in into.getvalue().splitlines()))
 
 
 def folded(line: str) -> str:

@@ -48,6 +48,10 @@ class Parser(argparse.ArgumentParser):
         sys.stderr.write(f"springcheck: {plain(message, LONGEST_MESSAGE)}\n")
         raise SystemExit(2)
 
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """As argparse has it, but that it says of a full disk or a closed pipe."""
+        print(message, end="", file=file, flush=True)
+
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         found, extra = self.parse_known_args(args, namespace)
         if extra:

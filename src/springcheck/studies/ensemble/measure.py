@@ -164,10 +164,11 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
         drift = _drifts(scene, changes, chosen, many, q, p)
         error = _errors(scene, changes, chosen, many, q, p)
     held = np.arange(len(q))[:, None] < frames
-    found["energy_drift"][chosen] = np.take_along_axis(
-        drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0
-    )[0]
-    found["max_error"][chosen] = np.max(np.where(held, error, 0), axis=0)
+    drift = np.take_along_axis(drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0)[0]
+    # a cell that left no frame but the start has neither: those of the start are nothing
+    left = frames > 1
+    found["energy_drift"][chosen] = np.where(left, drift, np.nan)
+    found["max_error"][chosen] = np.where(left, np.max(np.where(held, error, 0), axis=0), np.nan)
 
 
 def _of_copies(values: Reals, copies: int) -> Reals:
