@@ -16,8 +16,10 @@ import pytest
 from rich.text import Text
 
 from springcheck import driver, engines, schemes
+from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
+from springcheck.physics.terms import Damping
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
@@ -179,6 +181,22 @@ def test_the_largest_step_is_where_the_scene_itself_begins_to_grow(
     assert below < 10
     # the lightly damped circuit grows by 7e-6 a step there, the others by far more
     assert above > (1.2 if name == "rlc-circuit" and method == "own:euler" else 1e10) * below
+
+
+def test_of_joined_masses_with_unlike_friction_the_weakest_decay_sets_explicit_euler_s_limit() -> None:
+    m, k, c = np.array([2.3, 0.071]), np.array([1.7, 5.3, 0.0]), np.array([0.31, 0.0])
+    scene = builders.chain(2, m, k)
+    scene = replace(scene, terms=(*scene.terms, Damping(i=[0], c=c[:1])))
+    stiff = np.array([[k[0] + k[1], -k[1]], [-k[1], k[1]]])
+    motion = np.block([[np.zeros((2, 2)), np.diag(1 / m)], [-stiff, -np.diag(c / m)]])
+    # |1 + h x| = 1; the growth there is 1e-7 a step at 1.6 times that only
+    limit = min(-2 * x.real / abs(x) ** 2 for x in np.linalg.eigvals(motion))
+    assert limit == pytest.approx(5.34128e-05, rel=1e-5)
+    assert longest(schemes.scheme("explicit-euler"), scene) == pytest.approx(limit, rel=1e-8)
+    # of three masses with friction on the middle one, the mode that leaves it at rest has none
+    even = builders.chain(3, 1.3, 2.9)
+    even = replace(even, terms=(*even.terms, Damping(i=[1], c=[0.2])))
+    assert longest(schemes.scheme("explicit-euler"), even) == 0
 
 
 @pytest.mark.parametrize(

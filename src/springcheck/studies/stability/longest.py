@@ -43,6 +43,9 @@ GROWTH = 1e-7
 """Growth per step from which coupled modes count as growing: eigenvalues of their matrix that are nearly
 equal are known to the square root of the rounding only."""
 
+DECAY = 2.0**-80
+"""Decay below which a mode has none, over the largest friction rate: the square of 2**12 roundings."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linear:
@@ -121,6 +124,9 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
             _scaled(System(scene.derived(terms=tuple(x for x in terms if x.kind == "potential"))), at)[None]
             for terms in (system.slow, system.fast)
         ]
+        w2, modes = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
+        if scheme.b and w2[0] >= -GROWTH * w2[-1]:
+            return _oscillators(w2, modes, np.asarray(system.friction_rates, np.float64))
         return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
     if system.has_modes:
         modes, rate = system.modes, system.modes.rate
@@ -136,6 +142,26 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     if scene.n <= MOST_DENSE:
         w2 = np.linalg.eigvalsh(_scaled(system, here).astype(np.float64))
     return Linear.of_modes(w2, np.broadcast_to(system.friction_rates[:1], w2.shape))
+
+
+def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
+    """Oscillators with the eigenvalues of these modes joined by friction: a Runge-Kutta step of both grows alike.
+
+    Between the modes the motion is a skew matrix less C, so the decay of an eigenvector (u, v) is
+    v* C v/(u* u + v* v), which no frequency beside it hides.
+    """
+    w, c = np.diag(np.sqrt(np.maximum(w2, 0))), modes.T @ (rate[:, None] * modes)
+    values, vectors = np.linalg.eig(np.block([[np.zeros_like(w), w], [-w, -c]]))
+    size, v = np.abs(vectors) ** 2, vectors[len(w) :]
+    decay = np.real(np.sum(v.conj() * (c @ v), axis=0)) / size.sum(axis=0)
+    # a vector is known to some roundings, and the decay of what no friction acts on to their square
+    decay = np.where(decay > DECAY * np.max(rate), decay, 0.0)
+    turns, alone = values.imag > 0, np.sort(decay[values.imag == 0])
+    one, other = alone[::2], alone[1::2]
+    return Linear.of_modes(
+        np.append(decay[turns] ** 2 + values.imag[turns] ** 2, one * other),
+        np.append(2 * decay[turns], one + other),
+    )
 
 
 def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
