@@ -145,7 +145,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
 
 
 def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
-    """Oscillators with the eigenvalues of these modes joined by friction: a Runge-Kutta step of both grows alike.
+    """Oscillators with the eigenvalues of modes that friction joins: Runge-Kutta steps of both grow alike.
 
     Between the modes the motion is a skew matrix less C, so the decay of an eigenvector (u, v) is
     v* C v/(u* u + v* v), which no frequency beside it hides.
